@@ -128,27 +128,11 @@ def animation_html(
     The page needs no other file and no network; it is light or dark with the system, and stands still at first for
     readers who ask for reduced motion.
 
-    Parameters
-    ----------
-    motion : Motion
-        One that does not close is shown to and fro over the part it reaches, with the reason underneath.
-    frames : int
-        Poses in the file, 2..2000; the page interpolates between them.
-    title, note : str
-        Heading, and a remark under the picture.
-    seconds : float
-        Time of one pass at speed 1.
-    width, height : float
-        Largest size of the picture in pixels of the drawing; it scales with the page.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    GeometryError
-        Nothing of the motion is assembled, or a number is out of its bounds.
+    `motion`: one that does not close is shown to and fro over the part it reaches, with the reason underneath.
+    `frames`: poses in the file, 2..2000; the page interpolates between them. `title`, `note`: heading, and a remark
+    under the picture. `seconds`: time of one pass at speed 1. `width`, `height`: largest size of the picture in pixels
+    of the drawing; it scales with the page. Raises `GeometryError`: nothing of the motion is assembled, or a number is
+    out of its bounds.
     """
     _check_seconds(seconds)
     shown = frames_of(motion, frames)
@@ -239,20 +223,9 @@ def animated_svg(
 ) -> str:
     """One SVG that moves by itself (SMIL, one clock), for pages and slides where no script runs.
 
-    Parameters
-    ----------
-    motion, frames, title, seconds, width, height
-        As for :func:`animation_html`.
-
-    Returns
-    -------
-    str
-        It stands still for readers who ask for reduced motion.
-
-    Raises
-    ------
-    GeometryError
-        Nothing of the motion is assembled, or a number is out of its bounds.
+    `motion`, `frames`, `title`, `seconds`, `width`, `height`: as for :func:`animation_html`. It stands still for
+    readers who ask for reduced motion. Raises `GeometryError`: nothing of the motion is assembled, or a number is out
+    of its bounds.
     """
     _check_seconds(seconds)
     shown = frames_of(motion, frames)
@@ -292,29 +265,11 @@ def save_gif(
 ) -> int:
     """Write an endless GIF of a motion.
 
-    Parameters
-    ----------
-    motion : Motion
-        One that does not close is shown to and fro over the part it reaches, with the reason underneath.
-    path : path-like
-    frames : int
-        Pictures of one pass, 2..2000.
-    title : str
-        Written above the picture.
-    seconds : float
-        Time of one pass; a GIF counts hundredths of a second, and most viewers show at most 50 pictures a second.
-    width, height : float
-        Largest size of the picture in pixels.
-
-    Returns
-    -------
-    int
-        Number of pictures in the file.
-
-    Raises
-    ------
-    GeometryError
-        Nothing of the motion is assembled, or a number is out of its bounds.
+    `motion`: one that does not close is shown to and fro over the part it reaches, with the reason underneath.
+    `frames`: pictures of one pass, 2..2000. `title`: written above the picture. `seconds`: time of one pass; a GIF
+    counts hundredths of a second, and most viewers show at most 50 pictures a second. `width`, `height`: largest size
+    of the picture in pixels. Number of pictures in the file. Raises `GeometryError`: nothing of the motion is
+    assembled, or a number is out of its bounds.
     """
     _check_seconds(seconds)
     shown = frames_of(motion, frames)
@@ -323,16 +278,8 @@ def save_gif(
     passes = max(len(shown.poses) - 1, 1)
     duration = max(20, round(seconds / passes * 100.0) * 10)
     first, *rest = [pictures[k] for k in shown.order]
-    first.save(
-        Path(path),
-        format="GIF",
-        save_all=True,
-        append_images=rest,
-        duration=duration,
-        loop=0,
-        optimize=True,
-        disposal=1,
-    )
+    endless = {"save_all": True, "loop": 0, "optimize": True, "disposal": 1}
+    first.save(Path(path), format="GIF", append_images=rest, duration=duration, **endless)
     return 1 + len(rest)
 
 

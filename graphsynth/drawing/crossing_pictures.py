@@ -215,16 +215,8 @@ def region_picture(problem: CircleEllipse, exaggeration: float | None = None) ->
     turn = np.linspace(0.0, math.tau, 2881)
     distance = 1.0 / np.hypot(np.cos(turn) / a, np.sin(turn) / b) - R
     for sign, colour in ((1.0, LIGHT["a"]), (-1.0, LIGHT["jam"])):
-        unrolled.fill_between(
-            np.degrees(turn),
-            distance,
-            0.0,
-            where=sign * distance > 0.0,
-            color=colour,
-            alpha=0.45,
-            lw=0,
-            interpolate=True,
-        )
+        where, look = sign * distance > 0.0, {"color": colour, "alpha": 0.45, "lw": 0}
+        unrolled.fill_between(np.degrees(turn), distance, 0.0, where=where, interpolate=True, **look)
     unrolled.axhline(0.0, color=LIGHT["ink"], lw=1.2)
     unrolled.plot(np.degrees(turn), distance, color=LIGHT["b"], lw=1.2)
     unrolled.margins(x=0)

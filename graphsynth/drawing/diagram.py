@@ -50,31 +50,11 @@ def mechanism_sketch(
 ) -> Sketch:
     """Build the diagram of a mechanism, with room for all the poses given.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-    poses : array_like, shape (n, links, 3) or (links, 3)
-        Assembled poses ``(x, y, theta)``.  Guides are as long as the travel in them; named points are traced over them.
-    width, height : float
-        Largest size in pixels.
-    numbers : bool
-        Write the numbers of the links.
-    grounded : bool
-        Draw the frame as ground; False shows a chain, whose links are all alike.
-    traces : bool
-        Draw the paths of the named points.
-    title : str
-        Read out by screen readers.
-
-    Returns
-    -------
-    Sketch
-        Its shapes are fixed to the links: ``sketch.svg(pose)`` for any pose.
-
-    Raises
-    ------
-    GeometryError
-        If a pose is not finite or does not fit the mechanism.
+    `poses` (shape (n, links, 3) or (links, 3)): assembled poses ``(x, y, theta)``.  Guides are as long as the travel in
+    them; named points are traced over them. `width`, `height`: largest size in pixels. `numbers`: write the numbers of
+    the links. `grounded`: draw the frame as ground; False shows a chain, whose links are all alike. `traces`: draw the
+    paths of the named points. `title`: read out by screen readers. Its shapes are fixed to the links:
+    ``sketch.svg(pose)`` for any pose. Raises `GeometryError` if a pose is not finite or does not fit the mechanism.
     """
     array = _checked(mechanism, poses)
     lower, upper = bounds(mechanism, array)
@@ -149,30 +129,11 @@ def mechanism_svg(
 ) -> str:
     """Kinematic diagram as one self-contained ``<svg>``, light or dark with the page; needs no third-party package.
 
-    Parameters
-    ----------
-    what : Mechanism or Motion
-        A motion shows the paths of the named points too.
-    pose : array_like of shape (links, 3), or int, optional
-        Pose of a mechanism (its own by default), or sample of a motion (the first by default).
-    width, height : float
-        Largest size in pixels.
-    numbers : bool
-        Write the numbers of the links.
-    title : str
-        Read out by screen readers.
+    `what`: a motion shows the paths of the named points too. `pose` (shape (links, 3)): pose of a mechanism (its own by
+    default), or sample of a motion (the first by default). `width`, `height`: largest size in pixels. `numbers`: write
+    the numbers of the links. `title`: read out by screen readers. Raises `GeometryError`: there is no pose, or it is
+    not assembled.
 
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    GeometryError
-        There is no pose, or it is not assembled.
-
-    Examples
-    --------
     >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute
     >>> graph = MechanismGraph(2, [(0, 1)], frame=0)
     >>> crank = Mechanism(graph, [Revolute(0, 1)], [Driver(0, 1)], {"A": (1, (1, 0))}, pose=[(0, 0, 0), (0, 0, 0.5)])
@@ -195,21 +156,8 @@ def draw_mechanism(
 ) -> object:
     """Kinematic diagram on matplotlib axes: the same shapes as :func:`mechanism_svg`, in data coordinates.
 
-    Parameters
-    ----------
-    what, pose, width, height, numbers
-        As for :func:`mechanism_svg`.
-    ax : matplotlib.axes.Axes, optional
-        Axes of a new figure by default (``ax.figure.savefig(...)`` writes it).
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-
-    Raises
-    ------
-    GeometryError
-        There is no pose, or it is not assembled.
+    `what`, `pose`, `width`, `height`, `numbers`: as for :func:`mechanism_svg`. `ax`: axes of a new figure by default
+    (``ax.figure.savefig(...)`` writes it). Raises `GeometryError`: there is no pose, or it is not assembled.
     """
     from graphsynth.drawing.canvas import draw, figure_of
 

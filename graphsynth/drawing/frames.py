@@ -125,24 +125,10 @@ _STARTS = 24  # inputs tried where the first pose is not known
 def motion_over_reach(mechanism: Mechanism, samples: int = 361) -> Motion:
     """Simulate one turn of the first driver; if the branch ends, everything between its two ends.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-        Its pose, if it has one, gives the input at which the motion begins (for a linear law); otherwise the
-        first of 24 inputs around the turn at which it can be assembled.
-    samples : int
-        Of the turn, 2 or more.
-
-    Returns
-    -------
-    Motion
-        Over the turn if it is completed.  Otherwise not `completed`, its samples run from one end of the branch to the
-        other, and `reason` tells both.
-
-    Raises
-    ------
-    GeometryError
-        No driver, a sliding driver without a pose, or nothing that can be assembled.
+    `mechanism`: its pose, if it has one, gives the input at which the motion begins (for a linear law); otherwise the
+    first of 24 inputs around the turn at which it can be assembled. `samples`: of the turn, 2 or more. Over the turn if
+    it is completed.  Otherwise not `completed`, its samples run from one end of the branch to the other, and `reason`
+    tells both. Raises `GeometryError`: no driver, a sliding driver without a pose, or nothing that can be assembled.
     """
     if not mechanism.drivers:
         raise GeometryError("the mechanism has no driver, so it cannot be moved; add one")

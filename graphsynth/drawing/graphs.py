@@ -31,30 +31,12 @@ def graph_sketch(
 ) -> tuple[Sketch, list[tuple[float, float, float]]]:
     """Build the kinematic diagram of a chain or a mechanism from its automatic sketch.
 
-    Parameters
-    ----------
-    graph : MechanismGraph
-        Planar (space 3), joints of mobility 1 (drawn as turning pairs) and 2 (drawn as a pin in a slot).  With a frame
-        its joints stand on the ground; without one all links are alike.
-    driver : int, optional
-        Link on the frame whose joint gets the driver's arrow.
-    width, height : float
-        Largest size in pixels.
-    numbers : bool
-        Write the numbers of the links.
-    title : str
-        Read out by screen readers.
-
-    Returns
-    -------
-    Sketch, list of (x, y, theta)
-        The diagram and the pose it is drawn in: ``sketch.svg(pose)``.  The mean distance of neighbouring joints is 1;
-        dimensions are those of a readable picture, nothing is said about motion.
-
-    Raises
-    ------
-    GraphError
-        Another space, a joint of higher mobility, a graph that is not connected.
+    `graph`: planar (space 3), joints of mobility 1 (drawn as turning pairs) and 2 (drawn as a pin in a slot).  With a
+    frame its joints stand on the ground; without one all links are alike. `driver`: link on the frame whose joint gets
+    the driver's arrow. `width`, `height`: largest size in pixels. `numbers`: write the numbers of the links. `title`:
+    read out by screen readers. The diagram and the pose it is drawn in: ``sketch.svg(pose)``.  The mean distance of
+    neighbouring joints is 1; dimensions are those of a readable picture, nothing is said about motion. Raises
+    `GraphError`: another space, a joint of higher mobility, a graph that is not connected.
     """
     if graph.space != 3 or any(joint.mobility > 2 for joint in graph.joints):
         raise GraphError("only planar graphs (space 3) with joints of mobility 1 and 2 have a kinematic diagram")
@@ -85,8 +67,6 @@ def _joint(places: JointLayout, k: int) -> JointGeometry:
 def graph_svg(graph: MechanismGraph, *, driver: int | None = None, width: float = 480.0, title: str = "") -> str:
     """Kinematic diagram of a graph as one ``<svg>``; see :func:`graph_sketch`.
 
-    Examples
-    --------
     >>> from graphsynth.structure.graph import MechanismGraph
     >>> svg = graph_svg(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0))
     >>> svg.count('data-part="joint'), svg.count('data-part="link')

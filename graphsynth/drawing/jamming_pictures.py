@@ -322,45 +322,22 @@ def _panel(axes: Any, bearing: Bearing, tilt: float, factor: float) -> None:
     view = math.radians(_SIDE)
     behind = np.linspace(view + 0.5 * math.pi, view + 1.5 * math.pi, _AROUND)
     flat = np.array([[-top], [top]])
-    axes.plot_surface(
-        hole * np.cos(behind) + 0.0 * flat,
-        hole * np.sin(behind) + 0.0 * flat,
-        flat + 0.0 * behind,
-        color="#d9dee3",
-        linewidth=0,
-        shade=False,
-        antialiased=False,
-        rcount=2,
-        ccount=_AROUND,
-        zorder=1,
-    )
+    look: dict[str, Any] = {"linewidth": 0, "shade": False, "antialiased": False, "ccount": _AROUND}
+    wall_of_hole = [hole * np.cos(behind) + 0.0 * flat, hole * np.sin(behind) + 0.0 * flat, flat + 0.0 * behind]
+    axes.plot_surface(*wall_of_hole, color="#d9dee3", rcount=2, zorder=1, **look)
     for level in (-top, top):
         axes.plot(hole * np.cos(behind), hole * np.sin(behind), level, color=LIGHT["ink"], lw=1.3, zorder=2)
     phi, z = np.meshgrid(np.linspace(0.0, math.tau, _AROUND), np.linspace(-h, h, _ALONG))
     X, Y, Z, out = wall(bearing, tilt, factor, phi, z)
     out = 0.25 * (out[:-1, :-1] + out[1:, :-1] + out[:-1, 1:] + out[1:, 1:])
-    axes.plot_surface(
-        X,
-        Y,
-        Z,
-        facecolors=_shades(out, phi),
-        linewidth=0,
-        shade=False,
-        antialiased=False,
-        rcount=_ALONG,
-        ccount=_AROUND,
-        zorder=3,
-    )
+    axes.plot_surface(X, Y, Z, facecolors=_shades(out, phi), rcount=_ALONG, zorder=3, **look)
     lid = [np.stack([np.full(_AROUND, rim.mean()), rim]) for rim in (X[-1], Y[-1], Z[-1])]
-    axes.plot_surface(
-        *lid, color="#cfe3f2", linewidth=0, shade=False, antialiased=False, rcount=2, ccount=_AROUND, zorder=4
-    )
+    axes.plot_surface(*lid, color="#cfe3f2", rcount=2, zorder=4, **look)
     axes.plot(X[-1], Y[-1], Z[-1], color=LIGHT["ink"], lw=1.0, zorder=4)
     front = np.linspace(view - 0.5 * math.pi, view + 0.5 * math.pi, _AROUND)
     for level in (-top, top):  # the part cut away, as a thin line
-        axes.plot(
-            hole * np.cos(front), hole * np.sin(front), level, color=LIGHT["ink"], lw=0.8, ls=(0, (4, 3)), zorder=5
-        )
+        edge = (hole * np.cos(front), hole * np.sin(front), level)
+        axes.plot(*edge, color=LIGHT["ink"], lw=0.8, ls=(0, (4, 3)), zorder=5)
     axes.plot([0, 0], [0, 0], [-1.5 * top, 1.5 * top], color=LIGHT["soft"], lw=0.9, ls=(0, (8, 3, 2, 3)), zorder=6)
     reach = float(max(hole, np.hypot(X, Y).max()))
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-1.5 * top, 1.5 * top))

@@ -205,9 +205,8 @@ def _in_pi(halves: int) -> str:
     ['-π/2', '0', 'π/2', 'π', '3π/2', '2π']
     """
     if halves % 2:
-        return f"{halves}π/2".replace("1π", "π") if abs(halves) == 1 else f"{halves}π/2"
-    whole = halves // 2
-    return "0" if whole == 0 else f"{whole}π" if abs(whole) != 1 else ("π" if whole > 0 else "-π")
+        return f"{halves}π/2" if abs(halves) > 1 else f"{halves}π/2".replace("1", "")
+    return {0: "0", 2: "π", -2: "-π"}.get(halves, f"{halves // 2}π")
 
 
 #: Points up to which the emptiest corner is found at once.

@@ -213,18 +213,8 @@ class Sketch:
         """Draw a vertex of a graph: a circle with its number."""
         fill, ink = ("ink", "paper") if filled else ("paper", "ink")
         self._disc(point, radius, Style("ink", 1.6, fill))
-        self.shapes.append(
-            Text(
-                point,
-                text,
-                colour=ink,
-                size=radius * 1.1,
-                halo=0.0,
-                link=self._link,
-                layer=self._layer,
-                part=self._part,
-            )
-        )
+        where = (self._link, self._layer, self._part)
+        self.shapes.append(Text(point, text, 0j, "middle", ink, radius * 1.1, 0.0, "", *where))
 
     def ordered(self) -> list[Shape]:
         """Return the shapes from back to front; inside a layer in the order they were drawn."""

@@ -314,18 +314,9 @@ def _conclude(
     text = f"{verdict}: {reason}; proved from psi = 0 to {covered:.9g}" if reason else f"{verdict}: one regular branch"
     if constant is not None:
         text += "; the working mode is proved constant" if constant else "; a change of the working mode is proved"
+    seconds, proof = perf_counter() - begin, None if boxes is None else (system, *boxes)
     return FullTurnCertificate(
-        verdict,
-        drives,
-        covered,
-        sigma,
-        constant,
-        arcs,
-        found.tested,
-        reason,
-        perf_counter() - begin,
-        text,
-        None if boxes is None else (system, *boxes),
+        verdict, drives, covered, sigma, constant, arcs, found.tested, reason, seconds, text, proof
     )
 
 

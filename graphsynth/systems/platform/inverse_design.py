@@ -155,23 +155,13 @@ def refine_design(
     best, reached, reason_there = _grow(mechanism, theory, target, couplers, samples, tolerance)
     if best is not None and reached == 1.0:
         return assess_design(best.mechanism, target, theory.home, samples=samples, iterations=count)
-    nothing = np.full(3, np.nan)
     rejected = best.mechanism if best is not None else _linear(mechanism, theory, target)
-    return Design(
-        rejected,
-        False,
-        reason_there or reason,
-        target,
-        nothing + 0j,
-        nothing,
-        math.nan,
-        math.nan,
-        math.nan,
-        math.nan,
-        count,
-        reached,
-        None,
-    )
+    return _rejected(rejected, reason_there or reason, target, count, reached)
+
+
+def _rejected(mechanism: SingleMotorPlatform, reason: str, target: Complex, count: int, reached: float) -> Design:
+    nan, nothing = math.nan, np.full(3, np.nan)
+    return Design(mechanism, False, reason, target, nothing + 0j, nothing, nan, nan, nan, nan, count, reached, None)
 
 
 def _grow(
@@ -253,22 +243,7 @@ def assess_design(
     weight = np.array([1.0, 1.0, mechanism.Lc])
     sweep = cold_sweep(mechanism, samples)
     if sweep.reason:
-        nothing = np.full(3, np.nan)
-        return Design(
-            mechanism,
-            False,
-            sweep.reason,
-            target,
-            nothing + 0j,
-            nothing,
-            math.nan,
-            math.nan,
-            math.nan,
-            math.nan,
-            iterations,
-            math.nan,
-            None,
-        )
+        return _rejected(mechanism, sweep.reason, target, iterations, math.nan)
     measured: Harmonics = harmonics(sweep.pose)
     size = float(np.linalg.norm(weight * target)) or math.nan
     achieved, mean = measured.order(1), measured.mean - start

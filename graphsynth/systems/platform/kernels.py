@@ -81,20 +81,9 @@ def drive_at(p, scaled, psi, parameter, e):
         ax, ay = p[k, 2] * math.cos(angle), p[k, 2] * math.sin(angle)
         bx, by = (ax, ay) if scaled else (-ay, ax)
         f = parameter if scaled else 1.0
-        _y, _x, c, t, rate, _lx, _ly, _half = rocker(
-            p[k, 0] + f * ax,
-            p[k, 1] + f * ay,
-            bx,
-            by,
-            p[k, 4],
-            p[k, 5],
-            p[k, 6],
-            p[k, 7],
-            p[k, 8],
-            p[k, 9],
-            p[k, 10],
-            p[k, 11],
-        )
+        c0, c1, c2, c3, c4, c5 = p[k, 6], p[k, 7], p[k, 8], p[k, 9], p[k, 10], p[k, 11]
+        x, y = p[k, 0] + f * ax, p[k, 1] + f * ay
+        _y, _x, c, t, rate, _lx, _ly, _half = rocker(x, y, bx, by, p[k, 4], p[k, 5], c0, c1, c2, c3, c4, c5)
         arm(p, k, c * p[k, 12] - t * p[k, 13], c * p[k, 13] + t * p[k, 12], rate, e)
 
 

@@ -137,20 +137,10 @@ def resistance_effect(
     if simulate:
         for k, value in enumerate(values):
             found[k] = steady_ripple(replace(drive, motor=replace(motor, resistance=float(value))), revolutions)
+    calms, ripple = forcing > natural / math.sqrt(2.0), np.asarray(size * speed)
+    current = np.asarray(2.0 * force * torque / (ratio * motor.torque_constant))
     return ResistanceEffect(
-        values,
-        w,
-        inertia,
-        natural,
-        forcing,
-        harmonic,
-        damping,
-        forcing > natural / math.sqrt(2.0),
-        True,
-        np.asarray(size * speed),
-        np.asarray(2.0 * force * torque / (ratio * motor.torque_constant)),
-        found[:, 0],
-        found[:, 1],
+        values, w, inertia, natural, forcing, harmonic, damping, calms, True, ripple, current, found[:, 0], found[:, 1]
     )
 
 

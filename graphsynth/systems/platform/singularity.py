@@ -113,20 +113,10 @@ def singularity(
     legs = tuple(k + 1 for k in range(3) if abs(sines[k]) <= tolerance)
     lost = np.array([0.5 * JX[k - 1] for k in legs]).reshape(-1, 3)
     kind = ("regular", "I", "II", "III")[bool(legs) + 2 * bool(free.any())]
-    return Singularity(
-        kind,
-        legs,
-        uncontrolled,
-        _centre(X, uncontrolled),
-        stress,
-        lost,
-        float(np.linalg.det(JX)),
-        float(values[-1]),
-        float(values[-1]) / largest,
-        (float(sines[0]), float(sines[1]), float(sines[2])),
-        length,
-        tolerance,
-    )
+    smallest, (first, second, third) = float(values[-1]), sines.tolist()
+    determinant, ratio, centre = float(np.linalg.det(JX)), smallest / largest, _centre(X, uncontrolled)
+    moved, signed = (kind, legs, uncontrolled, centre, stress, lost), (first, second, third)
+    return Singularity(*moved, determinant, smallest, ratio, signed, length, tolerance)
 
 
 def _oriented(row: Array) -> Array:

@@ -293,16 +293,8 @@ def cold_sweep(mechanism: SingleMotorPlatform, samples: int) -> Sweep:
         return _failed(mechanism, f"the path does not close after one turn (period {motion.period})")
     if not motion.working_mode_constant:
         return _failed(mechanism, "a leg passes its boundary: the working mode changes during the turn")
-    return Sweep(
-        mechanism,
-        motion.psi[:-1],
-        motion.pose[:-1],
-        motion.theta[:-1],
-        motion.drive[:-1],
-        motion.label.sigma,
-        motion.label.sign,
-        "",
-    )
+    psi, pose, theta, drive = (a[:-1] for a in (motion.psi, motion.pose, motion.theta, motion.drive))
+    return Sweep(mechanism, psi, pose, theta, drive, motion.label.sigma, motion.label.sign, "")
 
 
 def _drives(mechanism: SingleMotorPlatform) -> str:
