@@ -18,7 +18,7 @@ _shown.WORK.update(
         "simulate": "graphsynth.kinematics.simulation:simulate",
         "modes": "graphsynth.kinematics.engine.start:assembly_modes",
         "assess jamming": "graphsynth.jamming.assess:assess_jamming",
-        "static forces": "graphsynth.dynamics.static:static_forces",
+        "static forces": "graphsynth.dynamics.inverse:static_forces",
         "embody": "graphsynth.kinematics.dimensional.api:embody",
         "draw graph": "graphsynth.drawing.methods:draw_graph",
         "graph picture": "graphsynth.drawing.methods:graph_picture",

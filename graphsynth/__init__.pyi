@@ -6,7 +6,7 @@ from .core.errors import GraphsynthError as GraphsynthError
 from .drawing.methods import Drawing as Drawing
 from .drawing.plots import Chart as Chart
 from .dynamics.elements import Force as Force, Torque as Torque
-from .dynamics.static import StaticForces as StaticForces
+from .dynamics.inverse import StaticForces as StaticForces
 from .intervals.boxes import Status as Status
 from .intervals.interval import Interval as Interval
 from .intervals.paving import pave as pave

@@ -330,7 +330,7 @@ class MotionMethods(Shown):
     def forces(self, loads: Mapping[str | int, Any], **options: Any) -> gs.StaticForces:
         """Return the static forces in all joints under loads, as in ``motion.forces({"P": (0.0, -100.0)})``.
 
-        See :func:`graphsynth.dynamics.static.static_forces`.
+        See :func:`graphsynth.dynamics.inverse.static_forces`.
         """
         found: gs.StaticForces = work("static forces")(self, loads, **options)
         return found

@@ -43,15 +43,12 @@ class Guard:
         self.uncertainty = 0.0
         self.factor, self.message = 0.0, ""
         self._slots = slots
-        self._time = t
         self.value, self.slope, _ = state_values(piece, t, q, v, slots)
         rates = piece.rows.directions(t, q, v, slots)[2] @ v
         self._fresh = np.array([bool(s) and not s * rates[f] > 1e-300 for f, s in enumerate(piece.senses)])
         self.value[self._fresh] = 0.0
         self._held = [
-            f
-            for f, e in enumerate(piece.rows.elements)
-            if not piece.senses[f] and f not in piece.stuck and not e.smooth and e.static > 0.0
+            f for f, e in enumerate(piece.rows.elements) if not piece.senses[f] and f not in piece.stuck and e.sticks
         ]
         # sliding speeds over which friction falls, in the unit of the rates
         self._narrow = np.array(
@@ -108,7 +105,7 @@ class Guard:
             self.message = self._still_one(min(t1, stepper.latest), np.asarray(solver.y))
             if self.message:
                 return Finding(message=self.message)
-        self.value, self.slope, self._time = value, slope, t1
+        self.value, self.slope = value, slope
         self._fresh[:] = False
         return Finding()
 

@@ -238,6 +238,11 @@ class FrictionElement:
         return self.regular > 0.0
 
     @property
+    def sticks(self) -> bool:
+        """Whether it can stick."""
+        return not self.smooth and self.static > 0.0
+
+    @property
     def onset(self) -> float:
         """Coefficient at the first instant of sliding."""
         return self.static if self.stribeck > 0.0 else self.kinetic

@@ -285,7 +285,7 @@ class DryMotion:
             if f not in resting and f not in released and (s or self.rows.elements[f].smooth)
         }
         for f, e in enumerate(self.rows.elements):
-            if piece.senses[f] == 0 and f not in piece.stuck and not e.smooth and e.static > 0.0:
+            if piece.senses[f] == 0 and f not in piece.stuck and e.sticks:
                 if slow[f]:
                     resting.append(f)
                 else:

@@ -92,11 +92,7 @@ class FrictionProblem:
     @property
     def resting(self) -> list[int]:
         """Elements at rest that could stick."""
-        return [
-            f
-            for f, e in enumerate(self.elements)
-            if not e.smooth and e.static > 0.0 and abs(self.rates[f]) <= self.noise[f]
-        ]
+        return [f for f, e in enumerate(self.elements) if e.sticks and abs(self.rates[f]) <= self.noise[f]]
 
     def moving(self) -> dict[int, int]:
         """Senses of the elements that slide."""

@@ -134,11 +134,7 @@ def make_piece(
 ) -> Piece:
     """Lock what sticks and fix the senses of what slides; ``quiet`` are rates that count as 0."""
     base = rows.compiled
-    stuck = [
-        f
-        for f, e in enumerate(rows.elements)
-        if solution.senses[f] == 0 and not e.smooth and e.static > 0.0 and not problem.idle(f)
-    ]
+    stuck = [f for f, e in enumerate(rows.elements) if solution.senses[f] == 0 and e.sticks and not problem.idle(f)]
     kept = problem._independent(stuck)
     held = locked(base, rows, kept, coordinates[kept])
     table = held.tables.friction_table.copy()
@@ -185,6 +181,6 @@ def state_values(piece: Piece, t: float, q: Array, v: Array, slots: Array) -> tu
             value[f], slope[f] = e.static * e.lever * e.load(lam) - abs(float(forces[f])), np.nan
         elif s and not e.smooth:
             value[f], slope[f] = s * u[f], s * du[f]
-        elif not e.smooth and e.static > 0.0 and abs(u[f]) > piece.quiet[f]:
+        elif e.sticks and abs(u[f]) > piece.quiet[f]:
             value[f] = -1.0  # what held it besides friction lets it go
     return value, slope, factor

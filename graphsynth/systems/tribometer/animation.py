@@ -47,19 +47,7 @@ def animations(context: Context, motion: StickSlipMotion) -> tuple[Picture, ...]
 
 
 def tribometer_sketch(motion: StickSlipMotion, at: float = 0.0) -> str:
-    """Draw the tribometer at one moment, its parts named.
-
-    Parameters
-    ----------
-    motion : StickSlipMotion
-    at : float
-        Time, s; the nearest known one is shown.
-
-    Raises
-    ------
-    SpecError
-        Nothing of the motion is known.
-    """
+    """Draw the tribometer at the known moment next to a time, s, its parts named; `SpecError` if nothing is known."""
     known = _known(motion)
     k = int(known[np.argmin(np.abs(motion.t[known] - at))])
     drawing = Moving(_WIDTH, _SCENE + 16.0, 1.0)
@@ -70,25 +58,10 @@ def tribometer_sketch(motion: StickSlipMotion, at: float = 0.0) -> str:
 
 
 def tribometer_animation(motion: StickSlipMotion, *, frames: int = 240, seconds: float = 0.0) -> str:
-    """Draw the tribometer over the run, with the displacements of both platforms below.
+    """Draw the tribometer over the run as one SVG, with the displacements of both platforms below.
 
-    Parameters
-    ----------
-    motion : StickSlipMotion
-    frames : int
-        Pictures, 2 to 2000.
-    seconds : float
-        Time of one pass; 0 for real time.
-
-    Returns
-    -------
-    str
-        One SVG.
-
-    Raises
-    ------
-    SpecError
-        Nothing of the motion is known, or the number of frames is out of bounds.
+    ``frames`` are 2 to 2000 pictures, ``seconds`` the time of one pass (0 for real time); `SpecError` if nothing of the
+    motion is known, or the number of frames is out of bounds.
     """
     if not 2 <= frames <= 2000:
         raise SpecError(f"The number of frames is {frames}; give 2 to 2000.")

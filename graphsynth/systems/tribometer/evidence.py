@@ -176,18 +176,8 @@ def _default(method: str, name: str) -> Any:
 def event_problem(model: Tribometer, duration: float, effort: Effort | None = None) -> Problem:
     """Compare the event-driven run with multiple precision: final position and every event.
 
-    Parameters
-    ----------
-    model : Tribometer
-        Its law has a Taylor series at rest.
-    duration : float
-        s; the multiple-precision run takes seconds for each second.
-    effort : Effort, optional
-
-    Raises
-    ------
-    SpecError
-        A law without a Taylor series.
+    The law of the model has a Taylor series at rest, or `SpecError` is raised; multiple precision takes seconds for
+    each second of ``duration``.
     """
     from graphsynth.systems.tribometer.precise import precise_motion
 
@@ -261,21 +251,8 @@ def stick_slip_problem(
 ) -> Problem:
     """Compare all three ways to simulate stick-slip over some seconds.
 
-    Parameters
-    ----------
-    model : Tribometer
-    duration : float
-        s.
-    steps, speeds : tuple of float
-        Of time stepping, s; of the regularised form, m/s.
-    solvers : tuple of str
-        For the regularised form.
-    effort : Effort, optional
-
-    Raises
-    ------
-    SpecError
-        If the event-driven run does not finish: then there is no reference.
+    ``steps`` are those of time stepping, s, ``speeds`` and ``solvers`` those of the regularised form; `SpecError` if
+    the event-driven run does not finish: then there is no reference.
     """
     effort = effort or Effort()
     defaults = {

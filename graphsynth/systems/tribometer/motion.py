@@ -125,19 +125,9 @@ class Columns(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class EventPath:
-    """The nodes of one run of the automaton.
+    """The nodes of one run of the automaton, shape (n, 8), see `Columns`; how it ended, and the steps it took.
 
-    Attributes
-    ----------
-    nodes : ndarray, shape (n, 8)
-        See `Columns`.
-    status : RunStatus
-    data : ndarray
-        Data of the kernels.
-    tolerance : float
-        Relative tolerance of the integrated pieces.
-    steps : int
-        Steps taken.
+    ``data`` are those of the kernels, ``tolerance`` the relative one of integrated pieces.
     """
 
     nodes: Array

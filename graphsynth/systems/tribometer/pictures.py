@@ -141,24 +141,10 @@ def _sticking(motion: StickSlipMotion) -> list[tuple[float, float]]:
 
 
 def platforms_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (9.0, 6.0)) -> Figure:
-    """Displacements of both platforms over time, and below the friction force between its limits.
+    """Displacements of both platforms over time, and below the friction force between its limits; size in inches.
 
-    The upper part is Figure 7b of the source [Perechesova et al. 2014].  Sticking is shaded.
-
-    Parameters
-    ----------
-    motion : StickSlipMotion
-    size : tuple of float
-        Inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    SpecError
-        If the run failed at its start.
+    The upper part is Figure 7b of the source [Perechesova et al. 2014].  Sticking is shaded.  `SpecError` if the run
+    failed at its start.
     """
     _known(motion)
     figure = new_figure(size)
@@ -189,20 +175,10 @@ def platforms_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (9
 def phase_picture(
     motion: StickSlipMotion, *, settled: float | None = None, size: tuple[float, float] = (6.0, 5.0)
 ) -> Figure:
-    """Velocity of the upper platform over its displacement; stick and slip in two colours.
+    """Velocity of the upper platform over its displacement; stick and slip in two colours; size in inches.
 
-    Parameters
-    ----------
-    motion : StickSlipMotion
-    settled : float, optional
-        Time after which the motion is drawn strongly, for example to show the limit cycle; before it, faintly.
-    size : tuple of float
-        Inches.
-
-    Raises
-    ------
-    SpecError
-        If the run failed at its start.
+    After the time ``settled`` the motion is drawn strongly, for example to show the limit cycle; before it, faintly.
+    `SpecError` if the run failed at its start.
     """
     _known(motion)
     figure = new_figure(size)
@@ -227,13 +203,7 @@ def phase_picture(
 
 
 def friction_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (6.0, 4.5)) -> Figure:
-    """Friction force over sliding velocity, with the curve of the law; sticking is the upright line at zero.
-
-    Raises
-    ------
-    SpecError
-        If the run failed at its start.
-    """
+    """Friction force over sliding velocity, with the curve of the law; sticking is the upright line at zero."""
     _known(motion)
     figure = new_figure(size)
     axes = figure.subplots()

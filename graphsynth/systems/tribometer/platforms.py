@@ -398,14 +398,7 @@ class Platforms:
         return isinstance(self.law, TwoCoefficientLaw) and self.law.viscous == 0.0
 
     def stiffened(self, factor: float, *, scaled_damping: bool = True) -> Self:
-        """Return the same tribometer with the stiffness times ``factor``.
-
-        Parameters
-        ----------
-        factor : float
-        scaled_damping : bool
-            Change the damping so that the damping ratio stays.
-        """
+        """Return the same with the stiffness times ``factor``; with ``scaled_damping`` the damping ratio stays."""
         factor = positive("factor on the stiffness", factor)
         damping = self.damping * math.sqrt(factor) if scaled_damping else self.damping
         return replace(self, stiffness=self.stiffness * factor, damping=damping)
