@@ -11,44 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from graphsynth.core.compilation import kernel
+from graphsynth.synthesis.kernels import layout as lay
 from graphsynth.synthesis.kernels.contracted import automorphisms
-from graphsynth.synthesis.kernels.layout import (
-    BYTE,
-    COEF,
-    COPIES,
-    DIGITS,
-    ENTRY,
-    FLIP,
-    GAIN,
-    GAINS,
-    HEADER,
-    HEAVIEST,
-    INDEX,
-    KIND,
-    LABELS,
-    LABELS_END,
-    LEFT,
-    NEED,
-    ONES,
-    OWN,
-    PACKED,
-    REP,
-    REVERSE,
-    ROW,
-    SET,
-    SIZE,
-    SLOT,
-    STAMP,
-    SUM,
-    TOP,
-    VAR,
-    WAYS,
-    WEIGHT,
-    U,
-    V,
-    glue,
-    inner,
-)
+from graphsynth.synthesis.kernels.layout import glue, inner
 from graphsynth.synthesis.kernels.variables import (
     build_variables,
     fits,
@@ -81,24 +46,24 @@ def _store(key, words, number, layer, shift, value, work):
         h ^= h >> np.uint64(29)
     slot = np.int64(h & np.uint64(capacity - 1))
     half = shift >> 1
-    while work.states[STAMP, slot] == layer:
-        at = work.states[SLOT, slot]
+    while work.states[lay.STAMP, slot] == layer:
+        at = work.states[lay.SLOT, slot]
         same = True
         for i in range(words):
             if work.keys[shift + at * words + i] != key[i]:
                 same = False
                 break
         if same:
-            work.states[SUM, half + at] += value
+            work.states[lay.SUM, half + at] += value
             return number
         slot = (slot + 1) & (capacity - 1)
     if (number + 1) * words > capacity or 2 * (number + 1) > capacity:
         return -1
-    work.states[STAMP, slot] = layer
-    work.states[SLOT, slot] = number
+    work.states[lay.STAMP, slot] = layer
+    work.states[lay.SLOT, slot] = number
     for i in range(words):
         work.keys[shift + number * words + i] = key[i]
-    work.states[SUM, half + number] = value
+    work.states[lay.SUM, half + number] = value
     return number + 1
 
 
@@ -113,7 +78,7 @@ def count_states(count, sets, tables, work):
     """
     work.state[STEPS] = 0
     if sets == 0:
-        return work.tables[WAYS, 0, tables.target]
+        return work.tables[lay.WAYS, 0, tables.target]
     needs = (sets + 7) // 8
     words = needs + 1
     if not lay_lanes(count, sets, needs, work):
@@ -123,7 +88,7 @@ def count_states(count, sets, tables, work):
     capacity = work.states.shape[1]
     key = np.zeros(words, np.uint64)
     for s in range(sets):
-        key[s // 8] |= np.uint64(work.sets[NEED, s]) << np.uint64(8 * (s % 8))
+        key[s // 8] |= np.uint64(work.sets[lay.NEED, s]) << np.uint64(8 * (s % 8))
     key[needs] = np.uint64(tables.target)
     work.state[1] += 1
     shift = np.int64(0)
@@ -137,38 +102,38 @@ def count_states(count, sets, tables, work):
         work.state[1] += 1
         layer = work.state[1]
         fresh = np.int64(0)
-        work.state[STEPS] += states * needs * (work.variables[ENTRY, j + 1] - work.variables[ENTRY, j])
+        work.state[STEPS] += states * needs * (work.variables[lay.ENTRY, j + 1] - work.variables[lay.ENTRY, j])
         for at in range(states):
             base = shift + at * words
             left = np.int64(work.keys[base + needs])
-            value = work.states[SUM, (shift >> 1) + at]
-            for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
-                if not fits(tables.resources[DIGITS, left], work.entries[PACKED, g], tables.guard):
+            value = work.states[lay.SUM, (shift >> 1) + at]
+            for g in range(work.variables[lay.ENTRY, j], work.variables[lay.ENTRY, j + 1]):
+                if not fits(tables.resources[lay.DIGITS, left], work.entries[lay.PACKED, g], tables.guard):
                     continue
-                index = left - work.entries[INDEX, g]
-                ways = work.tables[WAYS, j + 1, index]
+                index = left - work.entries[lay.INDEX, g]
+                ways = work.tables[lay.WAYS, j + 1, index]
                 if ways == 0:
                     continue
-                gain = np.uint64(work.entries[GAIN, g])
-                cap = np.uint64(min(work.tables[GAINS, j + 1, index], BYTE)) * ONES
+                gain = np.uint64(work.entries[lay.GAIN, g])
+                cap = np.uint64(min(work.tables[lay.GAINS, j + 1, index], lay.BYTE)) * lay.ONES
                 # eight sets at a time: needs less gains, not below 0; later variables must be able to give the rest
-                alive = TOP
+                alive = lay.TOP
                 open_ = np.uint64(0)
                 for i in range(needs):
-                    raised = (work.keys[base + i] | TOP) - work.lanes[coefs + i] * gain
-                    keep = raised & TOP
+                    raised = (work.keys[base + i] | lay.TOP) - work.lanes[coefs + i] * gain
+                    keep = raised & lay.TOP
                     need = raised & (keep - (keep >> np.uint64(7)))
-                    alive &= (work.lanes[rests + i] | TOP) - need
-                    alive &= (cap | TOP) - need
+                    alive &= (work.lanes[rests + i] | lay.TOP) - need
+                    alive &= (cap | lay.TOP) - need
                     open_ |= need
                     key[i] = need
-                if alive != TOP:
+                if alive != lay.TOP:
                     continue
                 if open_ == 0:  # nothing is needed any more: the table counts the rest
-                    total += value * work.entries[COPIES, g] * ways
+                    total += value * work.entries[lay.COPIES, g] * ways
                     continue
                 key[needs] = np.uint64(index)
-                fresh = _store(key, words, fresh, layer, other, value * work.entries[COPIES, g], work)
+                fresh = _store(key, words, fresh, layer, other, value * work.entries[lay.COPIES, g], work)
                 if fresh < 0:
                     return np.int64(NO_ROOM)
         states = fresh
@@ -199,7 +164,7 @@ def frame_stabiliser(order, frame_mode, frame, work):
         elif frame_mode == FRAME_VERTEX:
             image = np.int64(work.perms[g, frame])
         else:
-            image = work.class_of[work.perms[g, work.classes[U, frame]], work.perms[g, work.classes[V, frame]]]
+            image = work.class_of[work.perms[g, work.classes[lay.U, frame]], work.perms[g, work.classes[lay.V, frame]]]
         if image < frame:
             return 0
         if image == frame:
@@ -242,7 +207,7 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
                 if kept == 0:
                     continue
                 if mode == FRAME_PATH:
-                    work.classes[KIND, frame] += 1
+                    work.classes[lay.KIND, frame] += 1
                 fixed = np.int64(0)
                 for i in range(kept):
                     n = fixed_by(work.members[i], m, sets, tables, work)
@@ -252,7 +217,7 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
                         return TOO_LARGE
                     fixed += n
                 if mode == FRAME_PATH:
-                    work.classes[KIND, frame] -= 1
+                    work.classes[lay.KIND, frame] -= 1
                 if total > (np.int64(1) << 62) - fixed // kept:
                     return TOO_LARGE
                 total += fixed // kept
@@ -263,18 +228,18 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
 @inner
 def _least(e, others, turned, tables, work):
     """Estimate how often the label of a class is at most those of ``others`` classes alike, and at most its reverse."""
-    kind = work.classes[KIND, e]
+    kind = work.classes[lay.KIND, e]
     above = least = same = 0.0
-    for label in range(tables.kinds[LABELS_END, kind] - 1, tables.kinds[LABELS, kind] - 1, -1):
-        packed = tables.labels[PACKED, label]
-        if tables.labels[WEIGHT, label] < tables.space and fits(
-            tables.resources[DIGITS, tables.target], packed, tables.guard
+    for label in range(tables.kinds[lay.LABELS_END, kind] - 1, tables.kinds[lay.LABELS, kind] - 1, -1):
+        packed = tables.labels[lay.PACKED, label]
+        if tables.labels[lay.WEIGHT, label] < tables.space and fits(
+            tables.resources[lay.DIGITS, tables.target], packed, tables.guard
         ):
             # the others are as free as if the first variable were this class
-            ways = float(work.tables[WAYS, 1, tables.target - tables.labels[INDEX, label]])
+            ways = float(work.tables[lay.WAYS, 1, tables.target - tables.labels[lay.INDEX, label]])
             above += ways
             least += ways * above**others
-            if tables.labels[REVERSE, label] == label:
+            if tables.labels[lay.REVERSE, label] == label:
                 same += ways
     if above == 0.0:
         return 1.0
@@ -289,7 +254,7 @@ def _visited(order, m, tables, work):
     """
     share = 1.0
     for e in range(m):
-        work.classes[VAR, e] = 0  # of the classes to which this one is taken
+        work.classes[lay.VAR, e] = 0  # of the classes to which this one is taken
     for e in range(m):
         others = np.int64(0)
         turned = False
@@ -300,11 +265,11 @@ def _visited(order, m, tables, work):
                 first += 1
             if first < e or _stays(e, perm, work):
                 continue
-            image = work.class_of[perm[work.classes[U, e]], perm[work.classes[V, e]]]
+            image = work.class_of[perm[work.classes[lay.U, e]], perm[work.classes[lay.V, e]]]
             if image == e:
                 turned = True
-            elif work.classes[VAR, image] <= e:
-                work.classes[VAR, image] = e + 1
+            elif work.classes[lay.VAR, image] <= e:
+                work.classes[lay.VAR, image] = e + 1
                 others += 1
         if others or turned:
             share *= _least(e, others, turned, tables, work)
@@ -314,8 +279,8 @@ def _visited(order, m, tables, work):
 @inner
 def _stays(e, perm, work):
     """Tell whether a vertex permutation takes a class to itself, not reversed."""
-    a = perm[work.classes[U, e]]
-    b = perm[work.classes[V, e]]
+    a = perm[work.classes[lay.U, e]]
+    b = perm[work.classes[lay.V, e]]
     return a < b and work.class_of[a, b] == e
 
 
@@ -369,7 +334,7 @@ def fixed_table(k, mult, frame_modes, frame_degree, tables, work, out):
                 continue
             kept = frame_stabiliser(order, mode, frame, work)
             if mode == FRAME_PATH:
-                work.classes[KIND, frame] += 1
+                work.classes[lay.KIND, frame] += 1
             for i in range(kept):
                 if n == out.shape[0]:
                     return TOO_LARGE
@@ -383,7 +348,7 @@ def fixed_table(k, mult, frame_modes, frame_degree, tables, work, out):
                 out[n, 4] = fixed
                 n += 1
             if mode == FRAME_PATH:
-                work.classes[KIND, frame] -= 1
+                work.classes[lay.KIND, frame] -= 1
     return n
 
 
@@ -393,25 +358,25 @@ def open_fixed(k, mult, mode, frame, member, tables, work):
     automorphisms(k, mult, work.perms)
     m, sets = load_graph(k, mult, tables, work)
     if mode == FRAME_PATH:
-        work.classes[KIND, frame] += 1
+        work.classes[lay.KIND, frame] += 1
     count = build_variables(m, sets, work.perms[member], tables, work)
     plain_entries(count, tables, work)
     unconstrained_ways(count, np.bool_(False), tables, work)
-    return count, m, sets, work.tables[WAYS, 0, tables.target]
+    return count, m, sets, work.tables[lay.WAYS, 0, tables.target]
 
 
 @inner
 def _nth_label(j, g, rank, tables, work):
     """Return label number ``rank`` of those that entry g of variable j stands for."""
-    kind = work.classes[KIND, work.variables[REP, j]]
-    heaviest = work.classes[HEAVIEST, work.variables[REP, j]]
-    packed = work.entries[PACKED, g]
-    for label in range(tables.kinds[LABELS, kind], tables.kinds[LABELS_END, kind]):
-        if work.variables[OWN, j] and tables.labels[REVERSE, label] != label:
+    kind = work.classes[lay.KIND, work.variables[lay.REP, j]]
+    heaviest = work.classes[lay.HEAVIEST, work.variables[lay.REP, j]]
+    packed = work.entries[lay.PACKED, g]
+    for label in range(tables.kinds[lay.LABELS, kind], tables.kinds[lay.LABELS_END, kind]):
+        if work.variables[lay.OWN, j] and tables.labels[lay.REVERSE, label] != label:
             continue
-        if heaviest - tables.labels[WEIGHT, label] != work.entries[GAIN, g]:
+        if heaviest - tables.labels[lay.WEIGHT, label] != work.entries[lay.GAIN, g]:
             continue
-        if tables.labels[PACKED, label] * work.variables[SIZE, j] != packed:
+        if tables.labels[lay.PACKED, label] * work.variables[lay.SIZE, j] != packed:
             continue
         if rank == 0:
             return label
@@ -426,27 +391,27 @@ def decode_fixed(count, m, sets, number, tables, work, row):
     index = np.int64(tables.target)
     chosen = np.empty(count, np.int64)
     for j in range(count):
-        for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
-            if not fits(tables.resources[DIGITS, index], work.entries[PACKED, g], tables.guard):
+        for g in range(work.variables[lay.ENTRY, j], work.variables[lay.ENTRY, j + 1]):
+            if not fits(tables.resources[lay.DIGITS, index], work.entries[lay.PACKED, g], tables.guard):
                 continue
-            ways = work.tables[WAYS, j + 1, index - work.entries[INDEX, g]]
-            block = work.entries[COPIES, g] * ways
+            ways = work.tables[lay.WAYS, j + 1, index - work.entries[lay.INDEX, g]]
+            block = work.entries[lay.COPIES, g] * ways
             if number >= block:
                 number -= block
                 continue
             chosen[j] = _nth_label(j, g, number // ways, tables, work)
             number %= ways
-            index -= work.entries[INDEX, g]
-            for q in range(work.variables[ROW, j], work.variables[ROW, j + 1]):
-                s = work.rows[SET, q]
-                work.sets[LEFT, s] -= work.rows[COEF, q] * work.entries[GAIN, g]
+            index -= work.entries[lay.INDEX, g]
+            for q in range(work.variables[lay.ROW, j], work.variables[lay.ROW, j + 1]):
+                s = work.rows[lay.SET, q]
+                work.sets[lay.LEFT, s] -= work.rows[lay.COEF, q] * work.entries[lay.GAIN, g]
             break
     for s in range(sets):
-        if work.sets[LEFT, s] > 0:
+        if work.sets[lay.LEFT, s] > 0:
             return False
     for e in range(m):
-        label = chosen[work.classes[VAR, e]]
-        if work.classes[FLIP, e]:
-            label = tables.labels[REVERSE, label]
-        row[HEADER + e] = label
+        label = chosen[work.classes[lay.VAR, e]]
+        if work.classes[lay.FLIP, e]:
+            label = tables.labels[lay.REVERSE, label]
+        row[lay.HEADER + e] = label
     return True

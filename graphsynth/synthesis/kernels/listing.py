@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from graphsynth.core.compilation import kernel
+from graphsynth.synthesis.kernels import layout as lay
 from graphsynth.synthesis.kernels.contracted import automorphisms
 from graphsynth.synthesis.kernels.counting import (
     FRAME_NONE,
@@ -20,41 +21,7 @@ from graphsynth.synthesis.kernels.counting import (
     degree_of,
     frame_stabiliser,
 )
-from graphsynth.synthesis.kernels.layout import (
-    AT,
-    BYTE,
-    DIGITS,
-    FLIP,
-    FOLD,
-    GAINS,
-    HEADER,
-    HEAVIEST,
-    INDEX,
-    KIND,
-    LABEL,
-    LABELS,
-    LABELS_END,
-    MAX_PAIRS,
-    NEED,
-    ONE,
-    ONES,
-    OTHER,
-    OWN,
-    PACKED,
-    PAIR_AT,
-    REP,
-    REVERSE,
-    SIZE,
-    TOP,
-    TURNED,
-    USED,
-    VAR,
-    WAYS,
-    WEIGHT,
-    U,
-    V,
-    inner,
-)
+from graphsynth.synthesis.kernels.layout import inner
 from graphsynth.synthesis.kernels.variables import (
     build_variables,
     fits,
@@ -90,12 +57,12 @@ def _has_order(perm, k, p):
 def _is_fixed(perm, m, tables, work):
     """Tell whether the labelling of the current leaf is fixed by a vertex permutation."""
     for e in range(m):
-        a = perm[work.classes[U, e]]
-        b = perm[work.classes[V, e]]
-        want = work.classes[LABEL, e]
+        a = perm[work.classes[lay.U, e]]
+        b = perm[work.classes[lay.V, e]]
+        want = work.classes[lay.LABEL, e]
         if a > b:
-            want = tables.labels[REVERSE, want]
-        if work.classes[LABEL, work.class_of[a, b]] != want:
+            want = tables.labels[lay.REVERSE, want]
+        if work.classes[lay.LABEL, work.class_of[a, b]] != want:
             return False
     return True
 
@@ -106,13 +73,13 @@ def _is_first(kept, m, tables, work):
     for i in range(1, kept):  # the first one is the identity
         perm = work.perms[work.members[i]]
         for e in range(m):
-            a = perm[work.classes[U, e]]
-            b = perm[work.classes[V, e]]
-            image = work.classes[LABEL, work.class_of[a, b]]
+            a = perm[work.classes[lay.U, e]]
+            b = perm[work.classes[lay.V, e]]
+            image = work.classes[lay.LABEL, work.class_of[a, b]]
             if a > b:
-                image = tables.labels[REVERSE, image]
-            if image != work.classes[LABEL, e]:
-                if image < work.classes[LABEL, e]:
+                image = tables.labels[lay.REVERSE, image]
+            if image != work.classes[lay.LABEL, e]:
+                if image < work.classes[lay.LABEL, e]:
                     return False
                 break
     return True
@@ -129,7 +96,7 @@ def _is_new(k, symmetry, tables, work):
         if _has_order(perm, k, symmetry) and _is_fixed(perm, m, tables, work):
             return False
     for e in range(witness - kept):  # noqa: SIM110 (no generators in compiled code)
-        if tables.labels[FOLD, work.classes[LABEL, e]] >= symmetry:
+        if tables.labels[lay.FOLD, work.classes[lay.LABEL, e]] >= symmetry:
             return False
     return True
 
@@ -169,12 +136,12 @@ def _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, wo
             if w < st[KEPT]:
                 if _has_order(work.perms[work.members[w]], k, symmetry):
                     return 1
-            elif work.classes[KIND, w - st[KEPT]] >= 2 * symmetry:
+            elif work.classes[lay.KIND, w - st[KEPT]] >= 2 * symmetry:
                 return 1
             st[WITNESS] += 1
         # next frame
         if st[KEPT] and st[MODE] == FRAME_PATH:
-            work.classes[KIND, st[FRAME]] -= 1
+            work.classes[lay.KIND, st[FRAME]] -= 1
         st[KEPT] = 0
         st[FRAME] += 1
         frames = 1 if st[MODE] == FRAME_NONE else (k if st[MODE] == FRAME_VERTEX else m)
@@ -188,7 +155,7 @@ def _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, wo
         st[KEPT] = _open_frame(k, mult, st[MODE], st[FRAME], frame_degree, work)
         st[WITNESS] = -1
         if st[KEPT] and st[MODE] == FRAME_PATH:
-            work.classes[KIND, st[FRAME]] += 1
+            work.classes[lay.KIND, st[FRAME]] += 1
     return 0
 
 
@@ -203,37 +170,37 @@ def _lay_pairs(symmetry, work):
     st = work.state
     count = st[COUNT]
     m = st[CLASSES]
-    members = min(st[KEPT], MAX_PAIRS) if symmetry == 0 else np.int64(0)
+    members = min(st[KEPT], lay.MAX_PAIRS) if symmetry == 0 else np.int64(0)
     at = np.int64(0)
     for depth in range(count):
-        work.pairs[PAIR_AT, depth] = at
+        work.pairs[lay.PAIR_AT, depth] = at
         for i in range(1, members):
             perm = work.perms[work.members[i]]
             for e in range(m):
-                a = perm[work.classes[U, e]]
-                b = perm[work.classes[V, e]]
+                a = perm[work.classes[lay.U, e]]
+                b = perm[work.classes[lay.V, e]]
                 image = work.class_of[a, b]
                 if image == e and a < b:
                     continue
-                if max(work.classes[VAR, e], work.classes[VAR, image]) == depth:
-                    work.pairs[ONE, at] = work.classes[VAR, e]
-                    work.pairs[OTHER, at] = work.classes[VAR, image]
-                    work.pairs[TURNED, at] = a > b
+                if max(work.classes[lay.VAR, e], work.classes[lay.VAR, image]) == depth:
+                    work.pairs[lay.ONE, at] = work.classes[lay.VAR, e]
+                    work.pairs[lay.OTHER, at] = work.classes[lay.VAR, image]
+                    work.pairs[lay.TURNED, at] = a > b
                     at += 1
                 break
-    work.pairs[PAIR_AT, count] = at
+    work.pairs[lay.PAIR_AT, count] = at
 
 
 @inner
 def _is_ordered(depth, label, labels, variables, pairs):
     """Check the conditions of ``_lay_pairs`` that the variable at ``depth`` completes."""
-    for i in range(pairs[PAIR_AT, depth], pairs[PAIR_AT, depth + 1]):
-        one = pairs[ONE, i]
-        other = pairs[OTHER, i]
-        mine = label if one == depth else variables[AT, one]
-        image = label if other == depth else variables[AT, other]
-        if pairs[TURNED, i]:
-            image = labels[REVERSE, image]
+    for i in range(pairs[lay.PAIR_AT, depth], pairs[lay.PAIR_AT, depth + 1]):
+        one = pairs[lay.ONE, i]
+        other = pairs[lay.OTHER, i]
+        mine = label if one == depth else variables[lay.AT, one]
+        image = label if other == depth else variables[lay.AT, other]
+        if pairs[lay.TURNED, i]:
+            image = labels[lay.REVERSE, image]
         if image < mine:
             return False
     return True
@@ -252,12 +219,12 @@ def _open_search(symmetry, tables, work):
     for i in range(st[WORDS]):
         work.keys[i] = 0
     for i in range(st[SETS]):
-        work.keys[i // 8] |= np.uint64(work.sets[NEED, i]) << np.uint64(8 * (i % 8))
+        work.keys[i // 8] |= np.uint64(work.sets[lay.NEED, i]) << np.uint64(8 * (i % 8))
     laid = lay_lanes(st[COUNT], st[SETS], st[WORDS], work)
     _lay_pairs(symmetry, work)
     st[DEPTH] = 0
-    work.variables[AT, 0] = tables.kinds[LABELS, work.classes[KIND, work.variables[REP, 0]]]
-    work.variables[USED, 0] = tables.target
+    work.variables[lay.AT, 0] = tables.kinds[lay.LABELS, work.classes[lay.KIND, work.variables[lay.REP, 0]]]
+    work.variables[lay.USED, 0] = tables.target
     st[ACTIVE] = 1
     return laid
 
@@ -269,11 +236,11 @@ def _emit(k, symmetry, tables, work, rows, n):
     m = st[CLASSES]
     st[VISITED] += 1
     for e in range(m):
-        label = variables[AT, classes[VAR, e]]
-        if classes[FLIP, e]:
-            label = labels[REVERSE, label]
-        classes[LABEL, e] = label
-        rows[n, HEADER + e] = label
+        label = variables[lay.AT, classes[lay.VAR, e]]
+        if classes[lay.FLIP, e]:
+            label = labels[lay.REVERSE, label]
+        classes[lay.LABEL, e] = label
+        rows[n, lay.HEADER + e] = label
     if st[KEPT] > 1 and not _is_first(st[KEPT], m, tables, work):
         return n
     if symmetry and not _is_new(k, symmetry, tables, work):
@@ -290,16 +257,16 @@ def _step(depth, needs, gain, most, keys, lanes):
 
     What the sets need after the step goes to the next row of ``keys``, so nothing has to be taken back.
     """
-    cap = np.uint64(min(most, BYTE)) * ONES | TOP
-    alive = TOP
+    cap = np.uint64(min(most, lay.BYTE)) * lay.ONES | lay.TOP
+    alive = lay.TOP
     for i in range(needs):
-        raised = (keys[depth * needs + i] | TOP) - lanes[2 * depth * needs + i] * gain
-        keep = raised & TOP
+        raised = (keys[depth * needs + i] | lay.TOP) - lanes[2 * depth * needs + i] * gain
+        keep = raised & lay.TOP
         need = raised & (keep - (keep >> np.uint64(7)))
-        alive &= (lanes[(2 * depth + 1) * needs + i] | TOP) - need
+        alive &= (lanes[(2 * depth + 1) * needs + i] | lay.TOP) - need
         alive &= cap - need
         keys[(depth + 1) * needs + i] = need
-    return alive == TOP
+    return alive == lay.TOP
 
 
 @inner
@@ -313,31 +280,31 @@ def _search(k, symmetry, tables, work, rows, n):
     needs, parts, last = st[WORDS], st[PARTS], st[COUNT] - 1
     depth = st[DEPTH]
     while depth >= 0:
-        rep = variables[REP, depth]
-        end = kinds[LABELS_END, classes[KIND, rep]]
-        size = variables[SIZE, depth]
-        left = variables[USED, depth]
-        label = variables[AT, depth]
+        rep = variables[lay.REP, depth]
+        end = kinds[lay.LABELS_END, classes[lay.KIND, rep]]
+        size = variables[lay.SIZE, depth]
+        left = variables[lay.USED, depth]
+        label = variables[lay.AT, depth]
         index = left
         descend = False
         # the next label of this variable that leaves a labelling possible
         while label < end and n < rows.shape[0]:
-            index = left - labels[INDEX, label] * size
-            usable = fits(resources[DIGITS, left], labels[PACKED, label] * size, guard)
-            usable = usable and ahead[WAYS, depth + 1, index] != 0
-            if variables[OWN, depth] and labels[REVERSE, label] != label:
+            index = left - labels[lay.INDEX, label] * size
+            usable = fits(resources[lay.DIGITS, left], labels[lay.PACKED, label] * size, guard)
+            usable = usable and ahead[lay.WAYS, depth + 1, index] != 0
+            if variables[lay.OWN, depth] and labels[lay.REVERSE, label] != label:
                 usable = False
-            if rep == fold_class and labels[FOLD, label] < symmetry:
+            if rep == fold_class and labels[lay.FOLD, label] < symmetry:
                 usable = False
             usable = usable and _is_ordered(depth, label, labels, variables, pairs)
             if usable:
-                gain = np.uint64(classes[HEAVIEST, rep] - labels[WEIGHT, label])
-                usable = _step(depth, needs, gain, ahead[GAINS, depth + 1, index], keys, lanes)
+                gain = np.uint64(classes[lay.HEAVIEST, rep] - labels[lay.WEIGHT, label])
+                usable = _step(depth, needs, gain, ahead[lay.GAINS, depth + 1, index], keys, lanes)
             if usable and parts > 1 and depth + 1 == min(PREFIX, last + 1):
                 st[MET] += 1
                 usable = st[MET] % parts == st[PART]
             if usable:
-                variables[AT, depth] = label
+                variables[lay.AT, depth] = label
                 if depth < last:
                     descend = True
                     break
@@ -345,16 +312,16 @@ def _search(k, symmetry, tables, work, rows, n):
             label += 1
         if descend:  # the next variable starts with its first label
             depth += 1
-            variables[USED, depth] = index
-            variables[AT, depth] = kinds[LABELS, classes[KIND, variables[REP, depth]]]
+            variables[lay.USED, depth] = index
+            variables[lay.AT, depth] = kinds[lay.LABELS, classes[lay.KIND, variables[lay.REP, depth]]]
             continue
         if label < end:  # the rows are full
-            variables[AT, depth] = label
+            variables[lay.AT, depth] = label
             st[DEPTH] = depth
             return n
         depth -= 1  # no label is left: the variable before takes its next one
         if depth >= 0:
-            variables[AT, depth] += 1
+            variables[lay.AT, depth] += 1
     st[ACTIVE] = 0
     return n
 

@@ -4,40 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from graphsynth.synthesis.kernels import layout as lay
 from graphsynth.synthesis.kernels.contracted import critical_sets, popcount
-from graphsynth.synthesis.kernels.layout import (
-    BYTE,
-    COEF,
-    COPIES,
-    DIGITS,
-    ENTRY,
-    FINAL,
-    FLIP,
-    GAIN,
-    GAINS,
-    GROUPS,
-    GROUPS_END,
-    HEAVIEST,
-    INDEX,
-    KIND,
-    LEFT,
-    MASK,
-    MAX_ENTRIES,
-    NEED,
-    OWN,
-    PACKED,
-    REP,
-    ROW,
-    SET,
-    SIZE,
-    VAR,
-    WAYS,
-    WEIGHT,
-    U,
-    V,
-    glue,
-    inner,
-)
+from graphsynth.synthesis.kernels.layout import glue, inner
 
 
 @inner
@@ -47,10 +16,10 @@ def lay_classes(k, mult, tables, work):
     for u in range(k):
         for v in range(u + 1, k):
             if mult[u, v]:
-                work.classes[U, m] = u
-                work.classes[V, m] = v
-                work.classes[KIND, m] = 2 * np.int64(mult[u, v])
-                work.classes[HEAVIEST, m] = tables.heaviest[mult[u, v]]
+                work.classes[lay.U, m] = u
+                work.classes[lay.V, m] = v
+                work.classes[lay.KIND, m] = 2 * np.int64(mult[u, v])
+                work.classes[lay.HEAVIEST, m] = tables.heaviest[mult[u, v]]
                 work.class_of[u, v] = m
                 work.class_of[v, u] = m
                 m += 1
@@ -72,60 +41,60 @@ def build_variables(m, sets, perm, tables, work):
     the rest is counted by a table.
     """
     for e in range(m):
-        work.classes[VAR, e] = -1
+        work.classes[lay.VAR, e] = -1
     count = np.int64(0)
     masks = np.empty(m, np.int64)
     # cycles of classes under the automorphism
     for e in range(m):
-        if work.classes[VAR, e] >= 0:
+        if work.classes[lay.VAR, e] >= 0:
             continue
         at = e
         flip = 0
         size = 0
         mask = np.int64(0)
         while True:
-            work.classes[VAR, at] = count
-            work.classes[FLIP, at] = flip
+            work.classes[lay.VAR, at] = count
+            work.classes[lay.FLIP, at] = flip
             mask |= np.int64(1) << at
             size += 1
-            a = perm[work.classes[U, at]]
-            b = perm[work.classes[V, at]]
+            a = perm[work.classes[lay.U, at]]
+            b = perm[work.classes[lay.V, at]]
             if a > b:
                 flip ^= 1
             at = work.class_of[a, b]
             if at == e:
                 break
-        work.variables[REP, count] = e
-        work.variables[SIZE, count] = size
-        work.variables[OWN, count] = flip
+        work.variables[lay.REP, count] = e
+        work.variables[lay.SIZE, count] = size
+        work.variables[lay.OWN, count] = flip
         masks[count] = mask
         count += 1
     # variables in the order in which they are chosen
     order = _smallest_sets_first(count, sets, masks, work)
     rank = np.empty(count, np.int64)
-    rep = work.variables[REP, :count].copy()
-    size_ = work.variables[SIZE, :count].copy()
-    own = work.variables[OWN, :count].copy()
+    rep = work.variables[lay.REP, :count].copy()
+    size_ = work.variables[lay.SIZE, :count].copy()
+    own = work.variables[lay.OWN, :count].copy()
     for j in range(count):
         rank[order[j]] = j
-        work.variables[REP, j] = rep[order[j]]
-        work.variables[SIZE, j] = size_[order[j]]
-        work.variables[OWN, j] = own[order[j]]
+        work.variables[lay.REP, j] = rep[order[j]]
+        work.variables[lay.SIZE, j] = size_[order[j]]
+        work.variables[lay.OWN, j] = own[order[j]]
     # their new numbers
     for e in range(m):
-        work.classes[VAR, e] = rank[work.classes[VAR, e]]
+        work.classes[lay.VAR, e] = rank[work.classes[lay.VAR, e]]
     # the critical sets that each variable serves, and how often
     at = 0
     for j in range(count):
-        work.variables[ROW, j] = at
+        work.variables[lay.ROW, j] = at
         mask = masks[order[j]]
         for s in range(sets):
-            c = popcount(work.sets[MASK, s] & mask)
+            c = popcount(work.sets[lay.MASK, s] & mask)
             if c:
-                work.rows[SET, at] = s
-                work.rows[COEF, at] = c
+                work.rows[lay.SET, at] = s
+                work.rows[lay.COEF, at] = c
                 at += 1
-    work.variables[ROW, count] = at
+    work.variables[lay.ROW, count] = at
     return count
 
 
@@ -141,12 +110,12 @@ def _smallest_sets_first(count, sets, masks, work):
         for s in range(sets):
             left = 0
             for j in range(count):
-                if not opened[j] and work.sets[MASK, s] & masks[j]:
+                if not opened[j] and work.sets[lay.MASK, s] & masks[j]:
                     left += 1
             if 0 < left < fewest:
                 fewest = left
                 chosen = s
-        inside = work.sets[MASK, chosen] if chosen >= 0 else np.int64(-1)
+        inside = work.sets[lay.MASK, chosen] if chosen >= 0 else np.int64(-1)
         first = placed
         for j in range(count):
             if not opened[j] and (chosen < 0 or inside & masks[j]):
@@ -169,7 +138,7 @@ def _smallest_sets_first(count, sets, masks, work):
 def _coverage(mask, sets, work):
     total = 0
     for s in range(sets):
-        if work.sets[MASK, s] & mask:
+        if work.sets[lay.MASK, s] & mask:
             total += 1
     return total
 
@@ -179,22 +148,22 @@ def plain_entries(count, tables, work):
     """Give each variable its own choices, one entry for each group of labels alike; return False on overflow."""
     at = 0
     for j in range(count):
-        work.variables[ENTRY, j] = at
-        own_kind = 2 * work.classes[KIND, work.variables[REP, j]] + work.variables[OWN, j]
-        size = work.variables[SIZE, j]
-        heaviest = work.classes[HEAVIEST, work.variables[REP, j]]
-        for g in range(tables.group_kinds[GROUPS, own_kind], tables.group_kinds[GROUPS_END, own_kind]):
-            packed = tables.groups[PACKED, g] * size
-            if not fits(tables.resources[DIGITS, tables.target], packed, tables.guard):
+        work.variables[lay.ENTRY, j] = at
+        own_kind = 2 * work.classes[lay.KIND, work.variables[lay.REP, j]] + work.variables[lay.OWN, j]
+        size = work.variables[lay.SIZE, j]
+        heaviest = work.classes[lay.HEAVIEST, work.variables[lay.REP, j]]
+        for g in range(tables.group_kinds[lay.GROUPS, own_kind], tables.group_kinds[lay.GROUPS_END, own_kind]):
+            packed = tables.groups[lay.PACKED, g] * size
+            if not fits(tables.resources[lay.DIGITS, tables.target], packed, tables.guard):
                 continue
-            if at == MAX_ENTRIES:
+            if at == lay.MAX_ENTRIES:
                 return False
-            work.entries[GAIN, at] = heaviest - tables.groups[WEIGHT, g]
-            work.entries[INDEX, at] = tables.groups[INDEX, g] * size
-            work.entries[PACKED, at] = packed
-            work.entries[COPIES, at] = tables.groups[COPIES, g]
+            work.entries[lay.GAIN, at] = heaviest - tables.groups[lay.WEIGHT, g]
+            work.entries[lay.INDEX, at] = tables.groups[lay.INDEX, g] * size
+            work.entries[lay.PACKED, at] = packed
+            work.entries[lay.COPIES, at] = tables.groups[lay.COPIES, g]
             at += 1
-    work.variables[ENTRY, count] = at
+    work.variables[lay.ENTRY, count] = at
     return True
 
 
@@ -215,21 +184,23 @@ def unconstrained_ways(count, yes_or_no, tables, work):
     resources = tables.resources.shape[1]
     top = 1.0
     for i in range(resources):
-        work.tables[WAYS, count, i] = tables.resources[FINAL, i]
+        work.tables[lay.WAYS, count, i] = tables.resources[lay.FINAL, i]
     for j in range(count - 1, -1, -1):
         choices = 0.0
         for i in range(resources):
-            work.tables[WAYS, j, i] = 0
-        for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
-            shift = work.entries[INDEX, g]
-            packed = work.entries[PACKED, g]
-            choices += work.entries[COPIES, g]
+            work.tables[lay.WAYS, j, i] = 0
+        for g in range(work.variables[lay.ENTRY, j], work.variables[lay.ENTRY, j + 1]):
+            shift = work.entries[lay.INDEX, g]
+            packed = work.entries[lay.PACKED, g]
+            choices += work.entries[lay.COPIES, g]
             for i in range(shift, resources):
-                if fits(tables.resources[DIGITS, i], packed, tables.guard):
+                if fits(tables.resources[lay.DIGITS, i], packed, tables.guard):
                     if yes_or_no:
-                        work.tables[WAYS, j, i] |= work.tables[WAYS, j + 1, i - shift]
+                        work.tables[lay.WAYS, j, i] |= work.tables[lay.WAYS, j + 1, i - shift]
                     else:
-                        work.tables[WAYS, j, i] += work.entries[COPIES, g] * work.tables[WAYS, j + 1, i - shift]
+                        work.tables[lay.WAYS, j, i] += (
+                            work.entries[lay.COPIES, g] * work.tables[lay.WAYS, j + 1, i - shift]
+                        )
         top *= choices
     return top
 
@@ -239,22 +210,22 @@ def lay_gains(count, tables, work):
     """Fill ``work.tables[GAINS, j, r]``: the most that variables j, j+1, ... give one critical set while using up r."""
     resources = tables.resources.shape[1]
     for i in range(resources):
-        work.tables[GAINS, count, i] = 0
+        work.tables[lay.GAINS, count, i] = 0
     for j in range(count - 1, -1, -1):
         factor = np.int64(0)
-        for q in range(work.variables[ROW, j], work.variables[ROW, j + 1]):
-            factor = max(factor, work.rows[COEF, q])
+        for q in range(work.variables[lay.ROW, j], work.variables[lay.ROW, j + 1]):
+            factor = max(factor, work.rows[lay.COEF, q])
         for i in range(resources):
-            work.tables[GAINS, j, i] = 0
-        for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
-            shift = work.entries[INDEX, g]
+            work.tables[lay.GAINS, j, i] = 0
+        for g in range(work.variables[lay.ENTRY, j], work.variables[lay.ENTRY, j + 1]):
+            shift = work.entries[lay.INDEX, g]
             for i in range(shift, resources):
-                if work.tables[WAYS, j + 1, i - shift] and fits(
-                    tables.resources[DIGITS, i], work.entries[PACKED, g], tables.guard
+                if work.tables[lay.WAYS, j + 1, i - shift] and fits(
+                    tables.resources[lay.DIGITS, i], work.entries[lay.PACKED, g], tables.guard
                 ):
-                    gain = work.tables[GAINS, j + 1, i - shift] + factor * work.entries[GAIN, g]
-                    if gain > work.tables[GAINS, j, i]:
-                        work.tables[GAINS, j, i] = gain
+                    gain = work.tables[lay.GAINS, j + 1, i - shift] + factor * work.entries[lay.GAIN, g]
+                    if gain > work.tables[lay.GAINS, j, i]:
+                        work.tables[lay.GAINS, j, i] = gain
 
 
 @inner
@@ -266,23 +237,23 @@ def lay_lanes(count, sets, words, work):
     for i in range(2 * count * words):
         work.lanes[i] = 0
     for s in range(sets):
-        work.sets[LEFT, s] = 0
-        if work.sets[NEED, s] > BYTE:
+        work.sets[lay.LEFT, s] = 0
+        if work.sets[lay.NEED, s] > lay.BYTE:
             return False
     for j in range(count - 1, -1, -1):
         base = 2 * j * words
         for s in range(sets):
-            rest = min(work.sets[LEFT, s], BYTE)
+            rest = min(work.sets[lay.LEFT, s], lay.BYTE)
             work.lanes[base + words + s // 8] |= np.uint64(rest) << np.uint64(8 * (s % 8))
         most = 0
-        for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
-            most = max(most, work.entries[GAIN, g])
-        for q in range(work.variables[ROW, j], work.variables[ROW, j + 1]):
-            s = work.rows[SET, q]
-            if work.rows[COEF, q] * most > BYTE:
+        for g in range(work.variables[lay.ENTRY, j], work.variables[lay.ENTRY, j + 1]):
+            most = max(most, work.entries[lay.GAIN, g])
+        for q in range(work.variables[lay.ROW, j], work.variables[lay.ROW, j + 1]):
+            s = work.rows[lay.SET, q]
+            if work.rows[lay.COEF, q] * most > lay.BYTE:
                 return False
-            work.sets[LEFT, s] += work.rows[COEF, q] * most
-            work.lanes[base + s // 8] |= np.uint64(work.rows[COEF, q]) << np.uint64(8 * (s % 8))
+            work.sets[lay.LEFT, s] += work.rows[lay.COEF, q] * most
+            work.lanes[base + s // 8] |= np.uint64(work.rows[lay.COEF, q]) << np.uint64(8 * (s % 8))
     return True
 
 
@@ -290,4 +261,4 @@ def lay_lanes(count, sets, words, work):
 def start_needs(sets, work):
     """Reset what each critical set needs, for a depth-first search."""
     for s in range(sets):
-        work.sets[LEFT, s] = work.sets[NEED, s]
+        work.sets[lay.LEFT, s] = work.sets[lay.NEED, s]
