@@ -3,48 +3,37 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 
+from graphsynth.cli.question import limit, numbers, shard, workers
+
 Parsers = argparse._SubParsersAction  # argparse has no public name for it
-_MOST_NUMBERS = 300
 #: Tilt that every joint takes up by default, degrees.
 JOINT_LIMIT = 0.3
 
 
-def add_catalog(
-    verbs: Parsers[argparse.ArgumentParser],
-    shard: Callable[[str], tuple[int, int]],
-    workers: Callable[[str], int],
-) -> None:
-    """Add the verb with its own verbs; ``shard`` and ``workers`` read I/M and a number of processes."""
+def add_catalog(verbs: Parsers[argparse.ArgumentParser]) -> None:
+    """Add the verb with its own verbs."""
     summary = "Build, evaluate, ask, check, export and merge catalogues of chains and mechanisms."
     parser = verbs.add_parser("catalog", help=summary, description=summary, allow_abbrev=False)
     own = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
-    _add_build(own, shard, workers)
-    _add_query(own)
-    _add_verify(own)
-    _add_export(own)
-    _add_merge(own)
-    _add_evaluate(own, workers)
-    _add_site(own, workers)
+    for add in (_add_build, _add_query, _add_verify, _add_export, _add_merge, _add_evaluate, _add_site):
+        add(own)
 
 
 def _action(own: Parsers[argparse.ArgumentParser], name: str, summary: str) -> argparse.ArgumentParser:
     parser = own.add_parser(name, help=summary, description=summary, allow_abbrev=False)
     parser.set_defaults(module="catalog")
     parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
+    if name not in ("build", "merge"):
+        parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
     return parser
 
 
-def _add_build(
-    own: Parsers[argparse.ArgumentParser],
-    shard: Callable[[str], tuple[int, int]],
-    workers: Callable[[str], int],
-) -> None:
+def _add_build(own: Parsers[argparse.ArgumentParser]) -> None:
     parser = _action(own, "build", "Make a catalogue file, or go on with one.")
-    parser.add_argument("--links", type=_numbers, required=True, metavar="N..M", help="numbers of links, 18 at most")
-    parser.add_argument("--mobility", type=_numbers, default=[1], metavar="W", help="mobility, or W..V (default 1)")
+    parser.add_argument("--links", type=numbers, required=True, metavar="N..M", help="numbers of links, 18 at most")
+    parser.add_argument("--mobility", type=numbers, default=[1], metavar="W", help="mobility, or W..V (default 1)")
     parser.add_argument(
         "--fractionated", action="store_true", help="for W >= 2: include chains that fall apart at a link or a joint"
     )
@@ -66,12 +55,11 @@ def _add_build(
 
 def _add_query(own: Parsers[argparse.ArgumentParser]) -> None:
     parser = _action(own, "query", "Ask a catalogue.")
-    parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
     parser.add_argument("--where", default="1", metavar="CONDITION", help="SQL condition on the rows of the table")
     parser.add_argument("--table", default="chains", metavar="NAME", help="table (default chains)")
     parser.add_argument("--sql", metavar="TEXT", help="any SQL question instead")
     parser.add_argument("--entry", metavar="KEY|LABEL", help="everything about one chain instead")
-    parser.add_argument("--limit", type=_limit, default=20, metavar="N", help="rows read (default 20; 0: all)")
+    parser.add_argument("--limit", type=limit, default=20, metavar="N", help="rows read (default 20; 0: all)")
     parser.add_argument(
         "--seconds",
         type=float,
@@ -83,8 +71,7 @@ def _add_query(own: Parsers[argparse.ArgumentParser]) -> None:
 
 def _add_verify(own: Parsers[argparse.ArgumentParser]) -> None:
     parser = _action(own, "verify", "Recompute every stored field by another route; status 1 if something differs.")
-    parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
-    parser.add_argument("--chains", type=_limit, metavar="N", help="only N chains of each family, drawn at random")
+    parser.add_argument("--chains", type=limit, metavar="N", help="only N chains of each family, drawn at random")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the draw (default 0)")
     parser.add_argument(
         "--quick",
@@ -95,7 +82,6 @@ def _add_verify(own: Parsers[argparse.ArgumentParser]) -> None:
 
 def _add_export(own: Parsers[argparse.ArgumentParser]) -> None:
     parser = _action(own, "export", "Write the tables to files, the same bytes for the same content.")
-    parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder for the files")
     parser.add_argument("--form", choices=("csv", "jsonl", "parquet"), default="csv", help="default csv")
 
@@ -106,24 +92,23 @@ def _add_merge(own: Parsers[argparse.ArgumentParser]) -> None:
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="the catalogue")
 
 
-def _add_evaluate(own: Parsers[argparse.ArgumentParser], workers: Callable[[str], int]) -> None:
+def _add_evaluate(own: Parsers[argparse.ArgumentParser]) -> None:
     summary = "Find dimensions for a full rotation; store them with transmission and, if asked, a jamming verdict."
     parser = _action(own, "evaluate", summary)
-    parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
-    parser.add_argument("--links", type=_numbers, metavar="N..M", help="numbers of links (default all)")
-    parser.add_argument("--mobility", type=_numbers, metavar="W..V", help="mobilities (default all)")
+    parser.add_argument("--links", type=numbers, metavar="N..M", help="numbers of links (default all)")
+    parser.add_argument("--mobility", type=numbers, metavar="W..V", help="mobilities (default all)")
     parser.add_argument(
         "--per-chain",
-        type=_limit,
+        type=limit,
         default=1,
         metavar="N",
         help="mechanisms of each chain, those of the smallest groups first (default 1; 0: all)",
     )
     parser.add_argument(
-        "--limit", type=_limit, metavar="N", default=0, help="evaluate at most N mechanisms now (default 0: all)"
+        "--limit", type=limit, metavar="N", default=0, help="evaluate at most N mechanisms now (default 0: all)"
     )
-    parser.add_argument("--seed", type=_limit, default=0, metavar="S", help="of the search for dimensions (default 0)")
-    parser.add_argument("--tries", type=_limit, default=4, metavar="N", help="searches for each mechanism (default 4)")
+    parser.add_argument("--seed", type=limit, default=0, metavar="S", help="of the search for dimensions (default 0)")
+    parser.add_argument("--tries", type=limit, default=4, metavar="N", help="searches for each mechanism (default 4)")
     parser.add_argument(
         "--tilt",
         type=float,
@@ -139,9 +124,8 @@ def _add_evaluate(own: Parsers[argparse.ArgumentParser], workers: Callable[[str]
     parser.add_argument("--workers", type=workers, metavar="K", help="worker processes (default one)")
 
 
-def _add_site(own: Parsers[argparse.ArgumentParser], workers: Callable[[str], int]) -> None:
+def _add_site(own: Parsers[argparse.ArgumentParser]) -> None:
     parser = _action(own, "site", "Write the atlas page: a static site that opens from a file.")
-    parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder of the page")
     parser.add_argument(
         "--motion-links",
@@ -153,21 +137,3 @@ def _add_site(own: Parsers[argparse.ArgumentParser], workers: Callable[[str], in
     parser.add_argument(
         "--workers", type=workers, metavar="K", help="worker processes (default: one; all for big work)"
     )
-
-
-def _numbers(text: str) -> list[int]:
-    """Read '8' or '4..12'."""
-    low, dots, high = text.partition("..")
-    try:
-        first, last = int(low), int(high if dots else low)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} must be a number or N..M, for example 4..12") from None
-    if not 1 <= first <= last < _MOST_NUMBERS:
-        raise argparse.ArgumentTypeError(f"{text!r} must be N..M with 1 <= N <= M < {_MOST_NUMBERS}")
-    return list(range(first, last + 1))
-
-
-def _limit(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} must be a whole number, 0 or more")
-    return int(text)

@@ -19,7 +19,7 @@ from typing import NoReturn
 import graphsynth
 from graphsynth.cli.catalog_options import add_catalog
 from graphsynth.cli.console import note, settle
-from graphsynth.cli.question import add_question
+from graphsynth.cli.question import add_question, shard, workers
 from graphsynth.cli.stress import add_stress
 from graphsynth.core.compilation import announce
 from graphsynth.core.errors import GraphsynthError
@@ -167,7 +167,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"graphsynth {graphsynth.__version__}")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
-    _add_solve(verbs)
+    add_question(_verb(verbs, "solve", "solve", "Print all integer solutions of the structural system."))
     _add_count(verbs)
     _add_enumerate(verbs)
     _add_show(verbs)
@@ -175,10 +175,10 @@ def _parser() -> argparse.ArgumentParser:
     _add_animate(verbs)
     _add_run(verbs)
     _add_accuracy(verbs)
-    _add_schema(verbs)
+    _verb(verbs, "schema", "doctor", "Print the JSON Schema of scene files, for editors.")
     _verb(verbs, "doctor", "doctor", "Say where the machine code of the kernels comes from, and why.")
     add_stress(partial(_verb, verbs))
-    add_catalog(verbs, _shard, _workers)
+    add_catalog(verbs)
     return parser
 
 
@@ -191,19 +191,14 @@ def _verb(
     return parser
 
 
-def _add_solve(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = _verb(verbs, "solve", "solve", "Print all integer solutions of the structural system.")
-    add_question(parser)
-
-
 def _add_work(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frame", action="store_true", help="choose a frame: mechanisms instead of chains")
     parser.add_argument("--assur", type=int, metavar="N", help="Assur groups with N moving links instead of chains")
     parser.add_argument("--truss", type=int, metavar="N", help="Baranov trusses with N links instead of chains")
     parser.add_argument("--symmetry", type=int, metavar="P", help="require an automorphism of prime order P")
-    parser.add_argument("--shard", type=_shard, metavar="I/M", help="do only shard I of M (1 <= I <= M)")
+    parser.add_argument("--shard", type=shard, metavar="I/M", help="do only shard I of M (1 <= I <= M)")
     parser.add_argument(
-        "--workers", type=_workers, metavar="K", help="worker processes (default: one; all for big work)"
+        "--workers", type=workers, metavar="K", help="worker processes (default: one; all for big work)"
     )
 
 
@@ -279,7 +274,7 @@ def _add_run(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
     parser = _verb(verbs, "run", "run", "Run a scene: from the question to a report.")
     parser.add_argument("scene", metavar="SCENE", help="name of a shipped scene, or a TOML file")
     parser.add_argument("--out", type=Path, metavar="DIR", help="report folder (default graphsynth-out/SCENE)")
-    parser.add_argument("--workers", type=_workers, metavar="K", help="processes (default: all cores for a stream)")
+    parser.add_argument("--workers", type=workers, metavar="K", help="processes (default: all cores for a stream)")
     parser.add_argument("--fresh", action="store_true", help="start anew, do not go on with an interrupted run in DIR")
     parser.add_argument(
         "--explain", action="store_true", help="print what ran and why, what did not, imports, time and memory"
@@ -292,27 +287,3 @@ def _add_accuracy(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--out", type=Path, metavar="DIR", help="report folder (default graphsynth-out/SCENE-accuracy)")
     parser.add_argument("--rounds", type=int, default=3, metavar="N", help="timed runs of each row (default 3)")
     parser.add_argument("--quick", action="store_true", help="fewer and easier settings, to try the command")
-
-
-def _add_schema(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    _verb(verbs, "schema", "doctor", "Print the JSON Schema of scene files, for editors.")
-
-
-def _shard(text: str) -> tuple[int, int]:
-    try:
-        i, m = map(int, text.split("/"))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} must be I/M, for example 3/16") from None
-    if m < 1 or not 1 <= i <= m:
-        raise argparse.ArgumentTypeError(f"{text!r} must be I/M with 1 <= I <= M")
-    return i, m
-
-
-def _workers(text: str) -> int:
-    try:
-        count = int(text)
-    except ValueError:
-        count = 0
-    if not 1 <= count <= 1024:
-        raise argparse.ArgumentTypeError(f"{text!r} must be a whole number from 1 to 1024")
-    return count

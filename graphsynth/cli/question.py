@@ -1,4 +1,4 @@
-"""The structural question on the command line, shared by ``solve``, ``count`` and ``enumerate``."""
+"""What several verbs share: the structural question, shards, numbers of processes, ranges of numbers."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ _VARIABLES = {
     "sub-edges": ("G", "sub-edges"),
 }
 _KINDS = [*(f"p{i}" for i in range(1, 6)), *(f"n{a}" for a in range(2, 10))]
+_MOST_NUMBERS = 300
 _OF_CHAINS = {"W", "Pi", "N", "p1", "p2", "p3", "p4", "p5"}
 
 
@@ -115,3 +116,44 @@ def problem_of(options: argparse.Namespace) -> Problem:
         options.fractionated,
         options.symmetry,
     )
+
+
+def shard(text: str) -> tuple[int, int]:
+    """Read I/M."""
+    try:
+        i, m = map(int, text.split("/"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} must be I/M, for example 3/16") from None
+    if m < 1 or not 1 <= i <= m:
+        raise argparse.ArgumentTypeError(f"{text!r} must be I/M with 1 <= I <= M")
+    return i, m
+
+
+def workers(text: str) -> int:
+    """Read a number of processes."""
+    try:
+        count = int(text)
+    except ValueError:
+        count = 0
+    if not 1 <= count <= 1024:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a whole number from 1 to 1024")
+    return count
+
+
+def numbers(text: str) -> list[int]:
+    """Read '8' or '4..12'."""
+    low, dots, high = text.partition("..")
+    try:
+        first, last = int(low), int(high if dots else low)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a number or N..M, for example 4..12") from None
+    if not 1 <= first <= last < _MOST_NUMBERS:
+        raise argparse.ArgumentTypeError(f"{text!r} must be N..M with 1 <= N <= M < {_MOST_NUMBERS}")
+    return list(range(first, last + 1))
+
+
+def limit(text: str) -> int:
+    """Read a number that may be 0."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} must be a whole number, 0 or more")
+    return int(text)

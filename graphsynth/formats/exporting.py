@@ -191,11 +191,7 @@ def _forest(mechanism: Mechanism) -> set[int]:
 
 
 def _component(
-    joints: tuple[JointGeometry, ...],
-    slides: set[int],
-    start: int,
-    seen: set[int],
-    edges: list[tuple[int, int, int]],
+    joints: tuple[JointGeometry, ...], slides: set[int], start: int, seen: set[int], edges: list[tuple[int, int, int]]
 ) -> list[int]:
     """Walk the chosen sliding joints from ``start``; return the links reached, ``start`` first."""
     reached = [start]

@@ -78,6 +78,23 @@ def test_show_falls_back_to_levels_and_says_so(tmp_path: Path, capsys: pytest.Ca
     assert "only planar graphs" in capsys.readouterr().err
 
 
+def test_lines_break_between_words_where_the_terminal_ends(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mechanism = eight(0).with_frame(0).to_text()
+    monkeypatch.delenv("COLUMNS", raising=False)
+    assert main(["show", mechanism]) == 0
+    whole = capsys.readouterr().out
+    monkeypatch.setenv("COLUMNS", "50")
+    assert main(["show", mechanism]) == 0
+    broken = capsys.readouterr().out
+    assert max(map(len, whole.splitlines())) > 80 and max(map(len, broken.splitlines())) <= 50
+    assert whole.split() == broken.split()
+    assert main(["show", "no/such.g6"]) == 2
+    said = capsys.readouterr().err
+    assert max(map(len, said.splitlines())) <= 50 and "nor is this a key or the text form" in " ".join(said.split())
+
+
 def test_show_refuses_another_suffix(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", eight(0).key, "-o", str(tmp_path / "x.bmp")]) == 2
     assert "must end in .svg, .png, .pdf, .tikz, .tex, .dxf, .g6" in capsys.readouterr().err

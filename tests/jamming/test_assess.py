@@ -275,6 +275,16 @@ def test_report_is_plain_data():
         assess_jamming(DECK, condition="C")
 
 
+def test_reports_begin_with_one_sentence_and_tell_all_on_request():
+    assert all(verdict.sentence.endswith(".") and len(verdict.sentence) <= 100 for verdict in Verdict)
+    for report in (assess_jamming(DECK), assess_jamming(TiltedFourBar(), Bearing(17.5, 10, 0.0))):
+        lines, told = repr(report).splitlines(), report.details()
+        assert lines[0] == report.verdict.sentence == told.splitlines()[0]
+        assert len(lines) <= 10 and all(len(line) <= 120 for line in lines)
+        assert report.statement in told and report.method in told and all(note in told for note in report.notes)
+    assert "reason" in repr(report) and report.verdict is Verdict.UNDECIDED
+
+
 def test_import_is_cheap():
     code = "import graphsynth.jamming, sys; print([m for m in ('pandas','scipy','matplotlib','sympy','networkx') if m in sys.modules])"
     assert (

@@ -353,9 +353,8 @@ def jam_arcs(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A
 
     Parameters
     ----------
-    linkage : TiltedFourBar
-    bearing : Bearing
-        Dimensions in millimetres.
+    linkage, bearing : TiltedFourBar, Bearing
+        Dimensions of the bearing in millimetres.
     condition : {"A", "B"}
         Contact condition: short bearing in a long hole, or long shaft in a short hole.
 

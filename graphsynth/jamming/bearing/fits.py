@@ -226,10 +226,8 @@ def tightest_free_fit(
 
     Parameters
     ----------
-    box : ToleranceBox
-        Ranges of all parameters; the statement holds for each of their combinations.
-    condition : {"A", "B", "general"}
-        Contact condition.
+    box, condition : ToleranceBox, {"A", "B", "general"}
+        Ranges of all parameters, for each combination of which the statement holds; contact condition.
     fits : tuple of str, optional
         Names, see `STANDARD_FITS`.
     diameter : Given, optional

@@ -39,9 +39,8 @@ def largest_misalignment(linkage: TiltedFourBar, bearing: Bearing, condition: Co
 
     Parameters
     ----------
-    linkage : TiltedFourBar
-    bearing : Bearing
-        Dimensions in millimetres.
+    linkage, bearing : TiltedFourBar, Bearing
+        Dimensions of the bearing in millimetres.
     condition : {"A", "B"}
         Contact condition: short bearing in a long hole, or long shaft in a short hole.
 
@@ -93,9 +92,8 @@ def smallest_clearance(linkage: TiltedFourBar, bearing: Bearing, condition: Cond
 
     Parameters
     ----------
-    linkage : TiltedFourBar
-    bearing : Bearing
-        Dimensions in millimetres.
+    linkage, bearing : TiltedFourBar, Bearing
+        Dimensions of the bearing in millimetres.
     condition : {"A", "B"}
         Contact condition: short bearing in a long hole, or long shaft in a short hole.
 
@@ -133,9 +131,8 @@ def largest_height(linkage: TiltedFourBar, bearing: Bearing, condition: Conditio
 
     Parameters
     ----------
-    linkage : TiltedFourBar
-    bearing : Bearing
-        Dimensions in millimetres.
+    linkage, bearing : TiltedFourBar, Bearing
+        Dimensions of the bearing in millimetres.
     condition : {"A", "B"}
         Contact condition: short bearing in a long hole, or long shaft in a short hole.
 
@@ -218,10 +215,8 @@ def certified_largest_misalignment(box: ToleranceBox, condition: Condition = "A"
 
     Parameters
     ----------
-    box : ToleranceBox
-        Ranges of all parameters; the statement holds for each of their combinations.
-    condition : {"A", "B", "general"}
-        Contact condition.
+    box, condition : ToleranceBox, {"A", "B", "general"}
+        Ranges of all parameters, for each combination of which the statement holds; contact condition.
 
     Returns
     -------
@@ -262,10 +257,8 @@ def certified_smallest_clearance(box: ToleranceBox, condition: Condition = "A") 
 
     Parameters
     ----------
-    box : ToleranceBox
-        Ranges of all parameters; the statement holds for each of their combinations.
-    condition : {"A", "B", "general"}
-        Contact condition.
+    box, condition : ToleranceBox, {"A", "B", "general"}
+        Ranges of all parameters, for each combination of which the statement holds; contact condition.
 
     Returns
     -------
@@ -298,10 +291,8 @@ def certified_largest_height(box: ToleranceBox, condition: Condition = "A") -> C
 
     Parameters
     ----------
-    box : ToleranceBox
-        Ranges of all parameters; the statement holds for each of their combinations.
-    condition : {"A", "B", "general"}
-        Contact condition.
+    box, condition : ToleranceBox, {"A", "B", "general"}
+        Ranges of all parameters, for each combination of which the statement holds; contact condition.
 
     Returns
     -------
@@ -335,10 +326,7 @@ def _reading(condition: Condition) -> Condition:
 
 
 def _bracket(
-    search: _LimitSearch,
-    box: ToleranceBox,
-    propose: Callable[[ToleranceBox], float | None],
-    span: tuple[float, float],
+    search: _LimitSearch, box: ToleranceBox, propose: Callable[[ToleranceBox], float | None], span: tuple[float, float]
 ) -> CertifiedLimit:
     """Prove both sides of the edge that is proposed, or else found by halving ``span``."""
     check_condition(box, search.condition)

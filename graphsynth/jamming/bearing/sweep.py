@@ -167,9 +167,7 @@ def _classify(found: PieceInterference, size: int) -> NDArray[np.int8]:
     return kind
 
 
-def _joined(
-    done: list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int8]]],
-) -> list[tuple[Span, ...]]:
+def _joined(done: list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int8]]]) -> list[tuple[Span, ...]]:
     """Sort the pieces and join neighbours of one kind; their borders are the same doubles."""
     lo, hi, kind = (np.concatenate([part[i] for part in done]) for i in range(3))
     order = np.argsort(lo, kind="stable")
@@ -197,10 +195,8 @@ def sweep_linkage(
 
     Parameters
     ----------
-    box : ToleranceBox
-        Ranges of all parameters; the statement holds for each of their combinations.
-    condition : {"A", "B", "general"}
-        Contact condition.
+    box, condition : ToleranceBox, {"A", "B", "general"}
+        Ranges of all parameters, for each combination of which the statement holds; contact condition.
     resolution : float, optional
         Undecided pieces no longer than this (radians) are left.
     max_pieces, max_seconds : optional

@@ -110,10 +110,7 @@ class CoupledReport(Assessment):
 
     def _figures(self) -> list[tuple[str, str]]:
         rows = [
-            (
-                "limits",
-                f"used to {100.0 * self.worst_factor:.4g} % at most, at input {self.worst_input:.6g}",
-            ),
+            ("limits", f"used to {100.0 * self.worst_factor:.4g} % at most, at input {self.worst_input:.6g}"),
             (
                 "misalignments",
                 f"may be {self.smallest_scale:.6g} times as large, by input {self.smallest_scale_input:.6g}",
@@ -227,11 +224,9 @@ def assess_coupled(
 
     Examples
     --------
-    >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
+    >>> from graphsynth import Mechanism
     >>> from graphsynth.jamming import Bearing
-    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
-    >>> joints = Revolute(0, 1), Revolute(1, 2, (1, 0)), Revolute(2, 3, (2.5, 0), (2.5, 0)), Revolute(0, 3, (2, 0))
-    >>> motion = simulate(Mechanism(graph, joints, [Driver(0, 1)]), np.radians([0.0, 90.0, 180.0]))
+    >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate(np.radians([0.0, 90.0, 180.0]))
     >>> report = assess_coupled(motion, Bearing(), Misalignment(0, 1, 0.012))
     >>> report.verdict.name, [round(float(f), 4) for f in report.factor]
     ('FREE_ESTIMATED', [0.9694, 0.9894, 0.7915])
@@ -286,9 +281,7 @@ def _report(given: JointProblem, motion: Motion, begin: float) -> CoupledReport:
         lean = np.hypot(tilt.tau[..., 0], tilt.tau[..., 1])
         used = np.where(layout.limit > 0.0, lean / (tilt.lower[:, None] * layout.limit), 0.0)
         slip = np.where(
-            np.isfinite(layout.end_float) & (layout.end_float > 0.0),
-            np.abs(tilt.zeta) / layout.end_float,
-            0.0,
+            np.isfinite(layout.end_float) & (layout.end_float > 0.0), np.abs(tilt.zeta) / layout.end_float, 0.0
         )
     used = np.where(tilt.lower[:, None] > 0.0, used, 0.0)
     verdict, reason = _verdict(scale.lower, motion, keep)

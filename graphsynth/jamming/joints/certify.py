@@ -235,11 +235,9 @@ def certify_coupled(
 
     Examples
     --------
-    >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
+    >>> from graphsynth import Mechanism
     >>> from graphsynth.jamming import Bearing
-    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
-    >>> joints = Revolute(0, 1), Revolute(1, 2, (1, 0)), Revolute(2, 3, (2.5, 0), (2.5, 0)), Revolute(0, 3, (2, 0))
-    >>> motion = simulate(Mechanism(graph, joints, [Driver(0, 1)]), np.linspace(0.0, 2.0 * np.pi, 37))
+    >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate(np.linspace(0.0, 2.0 * np.pi, 37))
     >>> certify_coupled(motion, Bearing(), Misalignment(0, 1, 0.0115)).verdict.name
     'CERTIFIED_FREE'
     """

@@ -306,9 +306,7 @@ def _directions(layout: Layout, r: Array, e: Array, found: PoseSolution, length:
     weight = np.where(np.isinf(layout.limit), 100.0, (layout.limit / finite) ** 2)
     tilts = rows * weight[:, None, None]
     play = np.where(
-        np.isinf(layout.end_float),
-        10.0 * finite * length,
-        np.minimum(layout.end_float, 10.0 * finite * length),
+        np.isinf(layout.end_float), 10.0 * finite * length, np.minimum(layout.end_float, 10.0 * finite * length)
     )
     share = (play / (length * finite)) ** 2
     slips = np.zeros((len(r), len(layout.joints), 3 * loops))

@@ -358,11 +358,9 @@ def compare_sensitivities(
 
     Examples
     --------
-    >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
+    >>> from graphsynth import Mechanism
     >>> from graphsynth.jamming import Bearing
-    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
-    >>> joints = Revolute(0, 1), Revolute(1, 2, (1, 0)), Revolute(2, 3, (2.5, 0), (2.5, 0)), Revolute(0, 3, (2, 0))
-    >>> motion = simulate(Mechanism(graph, joints, [Driver(0, 1)]), np.radians([90.0]))
+    >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate(np.radians([90.0]))
     >>> table = compare_sensitivities(motion, Bearing(), Misalignment(0, 1, 0.01))
     >>> [(row.joint, row.what, round(row.promised, 6)) for row in table.rows]
     [((0, 3), 'tilt', 0.5), ((1, 2), 'tilt', 0.5), ((2, 3), 'tilt', 0.0)]
