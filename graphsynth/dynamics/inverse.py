@@ -127,9 +127,11 @@ def inverse_dynamics(
     if refuse and found.refusals:
         raise found.refusals[min(found.refusals)]
     lam[there] = found.multipliers
+    work = np.full(n, np.nan)  # of all bodies for a unit of the input
+    work[there] = (found.missing * compiled.to_rates(q[there], motion.velocities[there])).sum(axis=1)
     power_error = float(np.fmax.reduce(found.error, initial=0.0) / np.fmax.reduce(found.size, initial=1e-300))
     reactions = reactions_from_multipliers(compiled, q, v, lam, instants)
-    efforts, power = _efforts(compiled, reactions, motion, rates)
+    efforts, power = _efforts(compiled, reactions, motion, rates, work)
     equilibrium = _equilibrium_error(compiled, instants, (q, v, a, lam))
     return InverseDynamics(
         motion.inputs,
@@ -214,11 +216,13 @@ def _times(compiled: Compiled, motion: Motion, rate: Array, second: Array, given
 class Balance(NamedTuple):
     """Balance of all bodies at n samples.
 
-    Multipliers (n, rows), the drivers' included, NaN where a sample is refused; error and size of the power along the
+    Multipliers (n, rows), the drivers' included, NaN where a sample is refused; what joints and drivers
+    must give, inertia forces less loads and friction (n, coordinates); error and size of the power along the
     velocity (n,), W; why friction leaves no loads, several, or needs an open reaction, by sample.
     """
 
     multipliers: Array
+    missing: Array
     error: Array
     size: Array
     refusals: dict[int, GeometryError]
@@ -259,10 +263,10 @@ def balance(compiled: Compiled, times: Array, q: Array, v: Array, a: Array) -> B
             except GeometryError as error:
                 rubbing[k], refusals[k] = np.nan, error
     lam = start + np.einsum("nmf,nf->nm", slopes, rubbing)
-    made = np.einsum("nmc,nm->nc", J, lam)
-    rest = inertial + made - loads - np.einsum("nf,nfc->nc", rubbing, units)
+    missing = inertial - loads - np.einsum("nf,nfc->nc", rubbing, units)
+    rest = missing + np.einsum("nmc,nm->nc", J, lam)
     size = np.abs(inertial) + np.abs(loads) + np.einsum("nmc,nm->nc", np.abs(J), np.abs(lam))
-    return Balance(lam, np.abs((rest * v).sum(axis=1)), (np.abs(v) * size).sum(axis=1), refusals)
+    return Balance(lam, missing, np.abs((rest * v).sum(axis=1)), (np.abs(v) * size).sum(axis=1), refusals)
 
 
 def _loads(
@@ -290,7 +294,10 @@ def _loads(
     return found[0]
 
 
-def _efforts(compiled: Compiled, reactions: Reactions, motion: Motion, rates: Array) -> tuple[Array, Array]:
+def _efforts(
+    compiled: Compiled, reactions: Reactions, motion: Motion, rates: Array, work: Array
+) -> tuple[Array, Array]:
+    """Efforts and power of the drivers; a driver alone has its effort from the virtual work, which loses no digits."""
     from graphsynth.dynamics.values import joint_coordinate
     from graphsynth.mechanism.joints import Revolute
 
@@ -306,6 +313,9 @@ def _efforts(compiled: Compiled, reactions: Reactions, motion: Motion, rates: Ar
         else:
             direction = np.exp(1j * (motion.poses[:, joint.a, 2] + joint.angle_a))  # type: ignore[union-attr]
             efforts[:, k] = sense * (np.conj(direction) * (own.force[:, 0] + 1j * own.force[:, 1])).real
+        way = joint_coordinate(mechanism, driver.base, driver.link, motion.poses, motion.velocities)[1]
+        if len(compiled.laws) == 1:
+            efforts[:, k] = np.divide(work, way, out=efforts[:, k].copy(), where=way != 0.0)
         power += efforts[:, k] * joint_coordinate(mechanism, driver.base, driver.link, motion.poses, rates)[1]
     return efforts, power
 

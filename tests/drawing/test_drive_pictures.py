@@ -14,9 +14,6 @@ from graphsynth.drawing.drive_pictures import drive_curves, reduction_picture
 from graphsynth.drawing.palette import DARK, LIGHT
 from graphsynth.drawing.plots import themed_svg
 from graphsynth.dynamics.motors import DCMotor
-from graphsynth.systems.braider.model import Braider
-from graphsynth.systems.braider.pictures import sensor_picture, start_up_picture
-from graphsynth.systems.braider.reactions import reactions
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 from graphsynth.systems.platform.resistance import (
     resistance_effect,
@@ -66,30 +63,6 @@ def test_reduction_picture_is_log_log() -> None:
     axes = reduction_picture(study).axes[0]
     assert axes.get_xscale() == axes.get_yscale() == "log"
     np.testing.assert_array_equal(axes.lines[0].get_ydata(), study.speed)
-
-
-def test_start_up_picture_names_the_settling_time() -> None:
-    braider = Braider()
-    run = braider.simulate(np.linspace(0.0, 0.3, 601), estimate=False)
-    figure = start_up_picture(braider, run)
-    assert figure.axes[0].texts[0].get_text() == "within ±2 % from 0.108 s"
-    assert len(figure.axes[1].lines) == 2 and len(figure.axes[2].lines) == 3
-
-
-def test_sensor_picture_shows_four_joints() -> None:
-    braider = Braider()
-    found = reactions(braider, np.linspace(0.0, math.tau, 91), 1.803, 0.0)
-    figure = sensor_picture(braider, found)
-    rates, forces, paths, torque = figure.axes
-    assert len(rates.lines) == len(forces.lines) == len(paths.lines) == 4
-    np.testing.assert_array_equal(forces.lines[3].get_ydata(), np.hypot(*found.F03.T))
-    np.testing.assert_array_equal(torque.lines[0].get_ydata(), found.torque)
-    # the relative velocities around the loop add up to nothing
-    loop = rates.lines[0].get_ydata() + rates.lines[1].get_ydata() + rates.lines[2].get_ydata()
-    np.testing.assert_allclose(loop, rates.lines[3].get_ydata(), atol=1e-14)
-    timed = sensor_picture(braider, found, time=np.linspace(0.0, 1.0, 91))
-    assert timed.axes[0].get_xlabel() == "time [s]"
-    assert len(drawn(figure)) > 5000
 
 
 def test_map_shows_the_simulated_slopes() -> None:

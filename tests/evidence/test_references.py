@@ -212,7 +212,7 @@ def test_a_motor_without_load_follows_its_exponentials():
 
 
 def test_four_bar_in_long_doubles_is_the_braider():
-    from graphsynth.systems.braider.evidence_four_bar import places, shape_of_braider
+    from graphsynth.systems.braider.evidence import places, shape_of_braider
     from graphsynth.systems.braider.model import Braider
 
     braider = Braider()

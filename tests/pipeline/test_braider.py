@@ -62,7 +62,7 @@ def test_sensors_and_second_way(tables: dict[str, Any]) -> None:
     largest = [float(number) for number in told.text.split("at most ")[1].split(" mN")[0].split(", ")]
     sizes = [[1e3 * math.hypot(*force) for force in forces] for forces in turn.forces().swapaxes(0, 1)]
     assert largest == pytest.approx([max(joint) for joint in sizes], rel=6e-4)
-    second = next(t for t in report["tables"] if t.title == "Reactions had a second way")
+    second = next(t for t in report["tables"] if t.title == "Reactions found a second way")
     assert float(second.rows[0][1]) < 1e-12
     limit = next(t for t in report["tables"] if t.title == "The limit L -> 0")
     assert [float(row[3]) for row in limit.rows[3:]] == pytest.approx([1.0] * 4, abs=0.02)

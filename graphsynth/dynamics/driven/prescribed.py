@@ -23,35 +23,9 @@ def prescribed_run(
 ) -> DriveRun:
     """Motion of an ideal speed source: constant crank speed, the motor torque by inverse dynamics.
 
-    Parameters
-    ----------
-    plant : Plant
-    motor : IdealSpeed
-    train : Train
-    times : array_like, shape (n,)
-        Strictly increasing output times, s; the first is the start.
-    angle : float
-        Crank angle at the start, rad.
-    speed : float
-        0, or the crank speed of the source (rad/s): the start has no other.
-
-    Returns
-    -------
-    DriveRun
-        Closed form up to rounding; ``energy_error`` compares the kinetic energy with a quadrature of the net power
-        ``J'(q) w^3 / 2``.  NaN from the first angle on at which the mechanism cannot be assembled.
-
-    Raises
-    ------
-    SpecError
-        Bad numbers, or another speed at the start.
-
-    Examples
-    --------
-    >>> from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
-    >>> found = MotorDrivenPlatform.source(IdealSpeed(20.0)).simulate([0.0, 0.035])
-    >>> float(found.speed[-1]), round(float(found.motor_torque[-1]), 6)
-    (20.0, -0.98545)
+    ``speed`` is 0 or that of the source: the start has no other.  Closed form up to rounding; ``energy_error`` compares
+    the kinetic energy with a quadrature of the net power ``J'(q) w^3 / 2``.  NaN from the first angle on at which the
+    mechanism cannot be assembled.
     """
     begin = perf_counter()
     out = output_times(times)
@@ -65,21 +39,35 @@ def prescribed_run(
     work = np.concatenate([[0.0], np.cumsum(_net_work(plant, motor, train, out, q, w))])
     reached = int(np.isfinite(J).cumprod().sum())
     fields = {
-        "angle": q, "speed": np.full(out.size, w), "momentum": np.sqrt(J) * w,
-        "motor_torque": required / (train.ratio * eta), "kinetic_energy": 0.5 * J * w * w, "work": work,
-    }  # fmt: skip
+        "angle": q,
+        "speed": np.full(out.size, w),
+        "momentum": np.sqrt(J) * w,
+        "motor_torque": required / (train.ratio * eta),
+        "kinetic_energy": 0.5 * J * w * w,
+        "work": work,
+    }
     there = np.arange(out.size) < reached
     fields = {name: np.where(there, values, np.nan) for name, values in fields.items()}
     turns = np.where(there, np.round(q / math.tau), 0.0).astype(np.int64)
     return DriveRun(
-        time=out, currents=np.zeros((out.size, 0)), reduced_angle=fields["angle"] - math.tau * turns, turns=turns,
-        energy_error=_defect(fields["kinetic_energy"], fields["work"], reached), electric_error=0.0,
-        error=np.array([2.0**-52 * float(np.abs(q).max()), 0.0]), events=(),
-        status=RunStatus.DONE if reached == out.size else RunStatus.NOT_FINITE, reached=reached,
+        time=out,
+        currents=np.zeros((out.size, 0)),
+        reduced_angle=fields["angle"] - math.tau * turns,
+        turns=turns,
+        energy_error=_defect(fields["kinetic_energy"], fields["work"], reached),
+        electric_error=0.0,
+        error=np.array([2.0**-52 * float(np.abs(q).max()), 0.0]),
+        events=(),
+        status=RunStatus.DONE if reached == out.size else RunStatus.NOT_FINITE,
+        reached=reached,
         reason=_reason(out, reached),
-        model="ideal speed (motion given, torque by inverse dynamics)", steps=0, rejected=0, rtol=math.nan,
-        seconds=perf_counter() - begin, **fields,
-    )  # fmt: skip
+        model="ideal speed (motion given, torque by inverse dynamics)",
+        steps=0,
+        rejected=0,
+        rtol=math.nan,
+        seconds=perf_counter() - begin,
+        **fields,
+    )
 
 
 def _reason(out: Array, reached: int) -> str:

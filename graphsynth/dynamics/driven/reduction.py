@@ -36,9 +36,17 @@ class ReductionStudy:
 
 
 def choose_motor(
-    plant: Plant, motor: Motor, train: Train, times: ArrayLike, reduce: bool | str, *,
-    angle: float, speed: float, rtol: float, regular: bool = False,
-) -> tuple[Motor, str]:  # fmt: skip
+    plant: Plant,
+    motor: Motor,
+    train: Train,
+    times: ArrayLike,
+    reduce: bool | str,
+    *,
+    angle: float,
+    speed: float,
+    rtol: float,
+    regular: bool = False,
+) -> tuple[Motor, str]:
     """Motor to integrate with, and a note when it is the limit L -> 0 of the given one.
 
     ``reduce`` is True, False or "auto"; the last takes the limit for L = 0, and for a small L if the error of first
@@ -85,38 +93,25 @@ def reduction_error(
 
 
 def inductance_study(
-    plant: Plant, motor: Motor, train: Train, times: ArrayLike, inductances: Sequence[float], *,
-    angle: float = 0.0, speed: float = 0.0, after: float | None = None, rtol: float = 1e-12,
-) -> ReductionStudy:  # fmt: skip
-    """Compare the full model at several inductances (H) with the limit L -> 0.
+    plant: Plant,
+    motor: Motor,
+    train: Train,
+    times: ArrayLike,
+    inductances: Sequence[float],
+    *,
+    angle: float = 0.0,
+    speed: float = 0.0,
+    after: float | None = None,
+    rtol: float = 1e-12,
+) -> ReductionStudy:
+    """Compare the full model at several inductances (H) with the limit L -> 0 (theory/motor-drive 4, theory/braider 6).
 
-    Parameters
-    ----------
-    plant, motor, train
-        As for `graphsynth.dynamics.driven.run.run`; the inductance of ``motor`` is replaced.
-    times : array_like
-        Output times, s.
-    inductances : sequence of float
-        Positive, H.
-    after : float, optional
-        Leave out the times before this one after the start; twenty electrical time constants by default.
+    Times before ``after`` (s) are left out, twenty electrical time constants by default.
 
     Raises
     ------
     SpecError
         For a motor without inductance, an inductance that is not positive, or times all within the transient.
-
-    Notes
-    -----
-    See theory/motor-drive 4 and theory/braider 6.
-
-    Examples
-    --------
-    >>> from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
-    >>> drive = MotorDrivenPlatform.source(DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0))
-    >>> study = drive.inductance_study([0.0, 0.05], [1e-6, 1e-7])
-    >>> study.order.round(2).tolist()
-    [1.0]
     """
     if not isinstance(motor, (DCMotor, SynchronousMotor)):
         raise SpecError(f"{type(motor).__name__} has no inductance; give a DCMotor or a SynchronousMotor")

@@ -117,31 +117,13 @@ def run(
     estimate: bool = True,
     notes: tuple[str, ...] = (),
 ) -> DriveRun:
-    """Integrate a motor, its train and a mechanism from ``times[0]`` through all ``times``.
+    """Integrate a motor, its train and a mechanism from ``times[0]`` through all ``times`` (s, strictly increasing).
 
-    Parameters
-    ----------
-    plant : Plant
-    motor : Motor
-    train : Train
-    times : array_like, shape (n,)
-        Strictly increasing output times, s; the first is the start.
-    angle, speed : float
-        Crank angle (rad) and speed (rad/s) at the start.
-    currents : tuple of float, optional
-        At the start, A; zero by default.
-    regular : bool
-        Use the regularised form ``dt = sqrt(J) ds`` (theory/motor-drive 3), which passes dead centres without inertia.
-    rtol : float
-        Tolerance per step, 1e-13 to 1e-3.
-    max_steps, max_events : int
-        Guards; exceeding one is a reported failure.
-    estimate : bool
-        Also run at ``100 rtol`` with every other output and report the difference as ``error``.
-
-    Returns
-    -------
-    DriveRun
+    ``angle`` (rad), ``speed`` (rad/s) and ``currents`` (A; zero by default) are those of the start.  ``regular`` uses
+    the regularised form ``dt = sqrt(J) ds`` (theory/motor-drive 3), which passes dead centres without inertia.
+    ``rtol`` is the tolerance per step, 1e-13 to 1e-3; ``max_steps`` and ``max_events`` are guards: exceeding one is a
+    reported failure.  ``estimate`` also runs at ``100 rtol`` with every other output, and reports the difference as
+    ``error``.
 
     Raises
     ------
@@ -180,9 +162,22 @@ def _integrate(ready: Prepared, out: Array, rtol: float, max_steps: int, max_eve
     balance, marks = np.full((out.size, 6), np.nan), np.full((int(max_events), 3 + n), np.nan)
     counts = np.zeros(4, np.int64)
     status = radau.integrate(
-        setup, values, ready.rows, ready.zeros, state, out, rtol, ready.scale, ready.first, int(max_steps),
-        Y, turns, balance, marks, counts,
-    )  # fmt: skip
+        setup,
+        values,
+        ready.rows,
+        ready.zeros,
+        state,
+        out,
+        rtol,
+        ready.scale,
+        ready.first,
+        int(max_steps),
+        Y,
+        turns,
+        balance,
+        marks,
+        counts,
+    )
     return RunStatus(status), Y, turns, balance, marks, counts, state
 
 
@@ -220,9 +215,18 @@ def _largest_root(plant: Plant) -> float:
 
 
 def _result(
-    ready: Prepared, plant: Plant, motor: Motor, train: Train, out: Array, found: _Raw, error: Array,
-    regular: bool, rtol: float, seconds: float, notes: tuple[str, ...],
-) -> DriveRun:  # fmt: skip
+    ready: Prepared,
+    plant: Plant,
+    motor: Motor,
+    train: Train,
+    out: Array,
+    found: _Raw,
+    error: Array,
+    regular: bool,
+    rtol: float,
+    seconds: float,
+    notes: tuple[str, ...],
+) -> DriveRun:
     status, Y, turns, balance, marks, counts, _ = found
     angle, speed, momentum = _physical(Y, turns, ready, regular)
     currents = Y[:, 2 : Y.shape[1] - int(regular)]
@@ -238,14 +242,30 @@ def _result(
     unit = "currents negligible" if currents.shape[1] == 0 else f"{currents.shape[1]} current(s)"
     name = "S (regularised, without inertia)" if regular else "J (with inertia)"
     return DriveRun(
-        time=out, angle=angle, speed=speed, currents=currents, reduced_angle=Y[:, 0].copy(), turns=turns,
-        momentum=momentum, motor_torque=torque, kinetic_energy=kinetic, work=work, energy_error=energy,
-        electric_error=electric if currents.shape[1] else 0.0, error=error,
-        events=_events(marks[: counts[2]], regular), status=status, reached=reached,
+        time=out,
+        angle=angle,
+        speed=speed,
+        currents=currents,
+        reduced_angle=Y[:, 0].copy(),
+        turns=turns,
+        momentum=momentum,
+        motor_torque=torque,
+        kinetic_energy=kinetic,
+        work=work,
+        energy_error=energy,
+        electric_error=electric if currents.shape[1] else 0.0,
+        error=error,
+        events=_events(marks[: counts[2]], regular),
+        status=status,
+        reached=reached,
         reason=_reason(found, train, out, regular),
-        model=f"{name}, {unit}", steps=int(counts[0]), rejected=int(counts[1]), rtol=rtol, seconds=seconds,
+        model=f"{name}, {unit}",
+        steps=int(counts[0]),
+        rejected=int(counts[1]),
+        rtol=rtol,
+        seconds=seconds,
         notes=notes,
-    )  # fmt: skip
+    )
 
 
 def _reason(found: _Raw, train: Train, out: Array, regular: bool) -> str:
@@ -289,10 +309,14 @@ def _events(marks: Array, regular: bool) -> tuple[DriveEvent, ...]:
     found = []
     for row in marks:
         state = row[3:]
-        found.append(DriveEvent(
-            kind=_EVENTS[int(row[0])], time=float(state[-1] if regular else row[1]),
-            angle=float(state[0] + row[2] * math.tau),
-            currents=tuple(map(float, state[2 : state.size - int(regular)])), motion=float(state[1]),
-            fictitious_time=float(row[1]) if regular else math.nan,
-        ))  # fmt: skip
+        found.append(
+            DriveEvent(
+                kind=_EVENTS[int(row[0])],
+                time=float(state[-1] if regular else row[1]),
+                angle=float(state[0] + row[2] * math.tau),
+                currents=tuple(map(float, state[2 : state.size - int(regular)])),
+                motion=float(state[1]),
+                fictitious_time=float(row[1]) if regular else math.nan,
+            )
+        )
     return tuple(found)

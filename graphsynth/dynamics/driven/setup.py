@@ -63,9 +63,17 @@ def output_times(times: ArrayLike) -> Array:
 
 
 def prepare(
-    plant: Plant, motor: Motor, train: Train, out: Array, angle: float, speed: float,
-    currents: tuple[float, ...] | None, regular: bool, *, singular: bool = False,
-) -> Prepared:  # fmt: skip
+    plant: Plant,
+    motor: Motor,
+    train: Train,
+    out: Array,
+    angle: float,
+    speed: float,
+    currents: tuple[float, ...] | None,
+    regular: bool,
+    *,
+    singular: bool = False,
+) -> Prepared:
     """Check everything and lay it out for the integrator; the arguments are those of `run`.
 
     ``singular`` allows an inertia that vanishes, for motions that are given.
@@ -122,14 +130,36 @@ def _motor(motor: Motor) -> tuple[int, Array, int]:
     if isinstance(motor, (DCMotor, SynchronousMotor)) and motor.inductance == 0.0:
         raise SpecError("inductance = 0 has no current equation; use the reduced motor, motor.reduced()")
     if isinstance(motor, DCMotor):
-        return 1, np.array([
-            motor.inductance, motor.resistance, motor.emf_constant, motor.torque_constant, motor.gain, motor.speed,
-            motor.voltage_limit,
-        ]), 1  # fmt: skip
+        return (
+            1,
+            np.array(
+                [
+                    motor.inductance,
+                    motor.resistance,
+                    motor.emf_constant,
+                    motor.torque_constant,
+                    motor.gain,
+                    motor.speed,
+                    motor.voltage_limit,
+                ]
+            ),
+            1,
+        )
     if isinstance(motor, SynchronousMotor):
-        return 2, np.array([
-            motor.inductance, motor.resistance, motor.pole_pairs, motor.flux, motor.ud, motor.uq,
-        ]), 2  # fmt: skip
+        return (
+            2,
+            np.array(
+                [
+                    motor.inductance,
+                    motor.resistance,
+                    motor.pole_pairs,
+                    motor.flux,
+                    motor.ud,
+                    motor.uq,
+                ]
+            ),
+            2,
+        )
     if isinstance(motor, LinearCharacteristic):
         return 0, np.array([motor.stall, motor.slope]), 0
     raise SpecError(f"{type(motor).__name__} has no equation of motion to integrate; give a motor with a torque")

@@ -131,9 +131,16 @@ class FourBar:
             f3 = (a * ct2 + b * k2**2 - c * k3**2 * c32) / (c * s32)
         A = np.asarray(a * (ct + 1j * st))
         return FourBarState(
-            np.asarray(np.angle(AB)), np.asarray(np.angle(OB)), np.asarray(k2), np.asarray(k3), np.asarray(f2),
-            np.asarray(f3), A, np.asarray(AB), np.asarray(OB),
-        )  # fmt: skip
+            np.asarray(np.angle(AB)),
+            np.asarray(np.angle(OB)),
+            np.asarray(k2),
+            np.asarray(k3),
+            np.asarray(f2),
+            np.asarray(f3),
+            A,
+            np.asarray(AB),
+            np.asarray(OB),
+        )
 
     def reach(self) -> tuple[tuple[float, float], ...]:
         """Return the closed arcs of crank angles (rad) that can be assembled; ``(-pi, pi)`` for a full turn."""

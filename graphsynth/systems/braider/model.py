@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,6 +33,9 @@ from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism, TracePoint
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.braider.linkage import FourBar
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.result import Motion
 
 Array = NDArray[np.float64]
 
@@ -201,11 +204,28 @@ class Braider:
         bar, (_, i2, i3) = self.linkage, self.moments
         far, near = bar.excess
         thread = self.thread
-        linkage = np.array([
-            bar.crank, bar.coupler, bar.rocker, bar.frame, bar.branch, self.switch, math.cos(self.switch_angle),
-            math.sin(self.switch_angle), self.masses[0], self.masses[1], i2, i3, thread.weight * thread.gravity,
-            thread.guide.real, thread.guide.imag, thread.height, far, near,
-        ])  # fmt: skip
+        linkage = np.array(
+            [
+                bar.crank,
+                bar.coupler,
+                bar.rocker,
+                bar.frame,
+                bar.branch,
+                self.switch,
+                math.cos(self.switch_angle),
+                math.sin(self.switch_angle),
+                self.masses[0],
+                self.masses[1],
+                i2,
+                i3,
+                thread.weight * thread.gravity,
+                thread.guide.real,
+                thread.guide.imag,
+                thread.height,
+                far,
+                near,
+            ]
+        )
         return Plant(np.zeros((1, 1)), base=self.inertia, linkage=linkage)
 
     @property
@@ -214,9 +234,10 @@ class Braider:
         bar, (m1, m2, m3, m4) = self.linkage, self.masses
         rocker, switch = Body.bar(m3, (0.0, 0.0), (bar.rocker, 0.0)), Body.bar(m4, (0.0, 0.0), self._tip)
         return {
-            1: Body.bar(m1, (0.0, 0.0), (bar.crank, 0.0)), 2: Body.bar(m2, (0.0, 0.0), (bar.coupler, 0.0)),
+            1: Body.bar(m1, (0.0, 0.0), (bar.crank, 0.0)),
+            2: Body.bar(m2, (0.0, 0.0), (bar.coupler, 0.0)),
             3: Body.combined(rocker, switch) if m3 + m4 > 0.0 else Body(0.0, 0.0),
-        }  # fmt: skip
+        }
 
     @property
     def _tip(self) -> tuple[float, float]:
@@ -266,6 +287,23 @@ class Braider:
                 elements.append(MotorDrive(0, 1, self.motor, train))
         return DynamicModel(self.mechanism, self.bodies, elements, gravity=(0.0, 0.0))
 
+    def motion(self, theta: ArrayLike) -> Motion:
+        """Motion of the linkage at crank angles (n,), in closed form; NaN where it cannot be assembled."""
+        from graphsynth.pipeline.display import shown_motion
+
+        angle = np.atleast_1d(finite_array("theta", theta, nan=True))
+        s = self.linkage.motion(angle)
+        states = np.zeros((3, angle.size, 4, 3))  # poses and two derivatives by the crank angle
+        states[0, :, 1, 2], states[1, :, 1, 2] = angle, 1.0
+        pin = np.multiply.outer([1.0, 1j, -1.0], s.crank)
+        states[:, :, 2, 0], states[:, :, 2, 1] = pin.real, pin.imag
+        states[:, :, 2, 2] = np.unwrap(s.phi2), s.k2, s.f2
+        states[:, :, 3, 2] = np.unwrap(s.phi3), s.k3, s.f3
+        states[0, :, 3, 0] = self.linkage.frame
+        closed = angle.size > 1 and abs(angle[-1] - angle[0] - math.tau) < 1e-12 and bool(np.isfinite(states).all())
+        shown = shown_motion(self.mechanism, angle, states[0], closed=closed)
+        return replace(shown, velocities=states[1], accelerations=states[2])
+
     def tip(self, theta: ArrayLike) -> NDArray[np.complex128]:
         """Position of the switch tip C, complex, m."""
         return np.asarray(self.linkage.frame + self._arm(theta))
@@ -284,12 +322,17 @@ class Braider:
         s, (_, i2, i3), bar = self.linkage.motion(theta), self.moments, self.linkage
         m1, m2 = self.masses[:2]
         turn = s.crank * np.conj(s.coupler)  # a b exp(i (theta - phi2))
-        linkage = m1 * bar.crank**2 / 3.0 + m2 * (
-            bar.crank**2 + 0.25 * bar.coupler**2 * s.k2**2 + s.k2 * turn.real
-        ) + i2 * s.k2**2 + i3 * s.k3**2  # fmt: skip
-        slope = m2 * (
-            0.5 * bar.coupler**2 * s.k2 * s.f2 + s.f2 * turn.real - s.k2 * (1.0 - s.k2) * turn.imag
-        ) + 2.0 * i2 * s.k2 * s.f2 + 2.0 * i3 * s.k3 * s.f3  # fmt: skip
+        linkage = (
+            m1 * bar.crank**2 / 3.0
+            + m2 * (bar.crank**2 + 0.25 * bar.coupler**2 * s.k2**2 + s.k2 * turn.real)
+            + i2 * s.k2**2
+            + i3 * s.k3**2
+        )
+        slope = (
+            m2 * (0.5 * bar.coupler**2 * s.k2 * s.f2 + s.f2 * turn.real - s.k2 * (1.0 - s.k2) * turn.imag)
+            + 2.0 * i2 * s.k2 * s.f2
+            + 2.0 * i3 * s.k3 * s.f3
+        )
         return np.asarray(self.reflected_inertia + linkage), np.asarray(slope)
 
     def acceleration(self, theta: ArrayLike, speed: ArrayLike, motor_torque: ArrayLike) -> Array:
@@ -303,9 +346,17 @@ class Braider:
 
     @checked
     def simulate(
-        self, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0, currents: tuple[float, ...] | None = None,
-        reduce: bool | str = "auto", rtol: float = 1e-10, estimate: bool = True, max_steps: int = 200_000,
-    ) -> DriveRun:  # fmt: skip
+        self,
+        times: ArrayLike,
+        *,
+        angle: float = 0.0,
+        speed: float = 0.0,
+        currents: tuple[float, ...] | None = None,
+        reduce: bool | str = "auto",
+        rtol: float = 1e-10,
+        estimate: bool = True,
+        max_steps: int = 200_000,
+    ) -> DriveRun:
         """Motion from ``times[0]``; the arguments are those of `MotorDrivenPlatform.simulate`.
 
         A motion that reaches a change point of the linkage ends there with the status CHANGE_POINT: no continuation
@@ -325,9 +376,18 @@ class Braider:
             self.plant(), self.motor, self.train, times, reduce, angle=angle, speed=speed, rtol=rtol
         )
         found = run(
-            self.plant(), motor, self.train, times, angle=angle, speed=speed, currents=None if note else currents,
-            rtol=rtol, estimate=estimate, max_steps=max_steps, notes=(note,) if note else (),
-        )  # fmt: skip
+            self.plant(),
+            motor,
+            self.train,
+            times,
+            angle=angle,
+            speed=speed,
+            currents=None if note else currents,
+            rtol=rtol,
+            estimate=estimate,
+            max_steps=max_steps,
+            notes=(note,) if note else (),
+        )
         return self._until_change_point(found)
 
     def _until_change_point(self, found: DriveRun) -> DriveRun:
@@ -398,9 +458,14 @@ class Braider:
         near = np.linspace(found.time[k - 1], found.time[k + 1], 401)[1:]
         start = tuple(map(float, found.currents[k - 1]))
         fine = self.simulate(
-            [float(found.time[k - 1]), *near], angle=float(found.angle[k - 1]), speed=float(found.speed[k - 1]),
-            currents=start, reduce=False, rtol=found.rtol, estimate=False,
-        )  # fmt: skip
+            [float(found.time[k - 1]), *near],
+            angle=float(found.angle[k - 1]),
+            speed=float(found.speed[k - 1]),
+            currents=start,
+            reduce=False,
+            rtol=found.rtol,
+            estimate=False,
+        )
         best = min(max(int(np.argmax(np.abs(fine.currents[:, -1]))), 1), near.size - 1)
         left, middle, right = fine.currents[best - 1 : best + 2, -1]
         bend = left - 2.0 * middle + right
@@ -412,7 +477,7 @@ class Braider:
     @checked
     def settling(
         self, target: float, band: float = 0.02, end: float = 0.5, rtol: float = 1e-11, samples: int = 2001
-    ) -> Settling:  # fmt: skip
+    ) -> Settling:
         """First time after which ``|w / target - 1| <= band`` up to ``end``, from rest.
 
         The last crossing between samples is solved on the cubic through speeds and accelerations.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
@@ -10,17 +9,20 @@ from graphsynth.evidence.rows import plans
 from graphsynth.pipeline.system import Stage, System
 from graphsynth.pipeline.tables import In, Positions, require
 
-_Length = Annotated[float, In(above=0, why="a length must be positive")]
+Length = Annotated[float, In("mm", above=0, why="a length must be positive")]
+Mass = Annotated[float, In("g")]
+Seconds = Annotated[float, In("s", above=0)]
+Speed = Annotated[float, In("rad/s")]
 
 
 @dataclass(frozen=True, slots=True)
 class LinkageTable:
     """Crank O1A, coupler AB, rocker BO2, frame O1O2; +1: B on the left of the line from A to O2."""
 
-    crank_mm: _Length
-    coupler_mm: _Length
-    rocker_mm: _Length
-    frame_mm: _Length
+    crank: Length
+    coupler: Length
+    rocker: Length
+    frame: Length
     branch: Literal[1, -1] = 1
 
 
@@ -28,28 +30,28 @@ class LinkageTable:
 class SwitchTable:
     """Length O2C of the switch, rigid with the rocker, and the angle from rocker to switch."""
 
-    length_mm: float
-    angle_deg: float
+    length: Annotated[float, In("mm")]
+    angle: Annotated[float, In("deg")]
 
 
 @dataclass(frozen=True, slots=True)
 class MassTable:
     """Masses of the four uniform bars."""
 
-    crank_g: float
-    coupler_g: float
-    rocker_g: float
-    switch_g: float
+    crank: Mass
+    coupler: Mass
+    rocker: Mass
+    switch: Mass
 
 
 @dataclass(frozen=True, slots=True)
 class ThreadTable:
     """Weight that tightens the thread, the guide point in the plane, its height above the plane."""
 
-    weight_g: float
-    guide_mm: tuple[float, float]
-    height_mm: float
-    gravity_m_s2: float = 9.80665
+    weight: Mass
+    guide: Annotated[tuple[float, float], In("mm")]
+    height: Annotated[float, In("mm")]
+    gravity: Annotated[float, In("m/s^2")] = 9.80665
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +60,7 @@ class TrainTable:
 
     stages: tuple[tuple[int, int], ...]
     efficiency: tuple[float, ...] = ()
-    inertia_kg_m2: float = 0.0
+    inertia: Annotated[float, In("kg m^2")] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,7 @@ class MotorTable:
     flux_V_s: float
     ud_V: float
     uq_V: float
-    rotor_inertia_kg_m2: float = 0.0
+    rotor_inertia: Annotated[float, In("kg m^2")] = 0.0
     friction_Nm_s_per_rad: float = 0.0
 
 
@@ -79,17 +81,11 @@ class MotorTable:
 class StartTable:
     """Start-up from rest: its length, the speed that is to be reached and its band, the tolerance of the integrator."""
 
-    end_s: float = 0.5
-    target_rad_s: float = 1.803
-    band: float = 0.02
-    samples: int = 501
+    end: Seconds = 0.5
+    target: Annotated[float, In("rad/s", above=0)] = 1.803
+    band: Annotated[float, In(above=0)] = 0.02
+    samples: Annotated[int, In(least=20, most=100_000, why="use 20 to 100000 output times")] = 501
     tolerance: float = 1e-11
-
-    def __post_init__(self) -> None:
-        for name in ("end_s", "target_rad_s", "band"):
-            value = getattr(self, name)
-            require(math.isfinite(value) and value > 0, f"has {name} = {value}; it must be positive")
-        require(20 <= self.samples <= 100_000, f"has samples = {self.samples}; use 20 to 100000 output times")
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,12 +103,12 @@ class BraiderTable:
     train: TrainTable
     motor: MotorTable
     start: StartTable = field(default_factory=StartTable)
-    speed_rad_s: float = 1.803
+    speed: Speed = 1.803
     positions: Positions = 360
     inductances_H: tuple[float, ...] = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12)
 
     def __post_init__(self) -> None:
-        require(self.speed_rad_s != 0, "has speed_rad_s = 0; give the speed of the crank for the sensors")
+        require(self.speed != 0, "has speed = 0; give the speed of the crank for the sensors")
         require(all(x > 0 for x in self.inductances_H), "has an inductances_H that is not positive; each must be")
 
 
@@ -125,11 +121,11 @@ SYSTEM = System(
         Stage("start up", f"{_HERE}.stages:start_up", (), ("start_up",)),
         Stage("sensors", f"{_HERE}.stages:sensors", (), ("sensors",)),
         Stage("inductance", f"{_HERE}.stages:inductance", (), ("inductance",)),
-        Stage("judge", f"{_HERE}.stages:judge", ("start_up", "sensors", "inductance"), ("records", "tables")),
-        Stage("sketch mechanism", f"{_HERE}.stages_pictures:sketches", (), ("mechanism_pictures",)),
-        Stage("animate", f"{_HERE}.stages_pictures:animations", (), ("animations",)),
-        Stage("plot", f"{_HERE}.stages_pictures:plots", ("start_up", "sensors", "inductance"), ("plots",)),
+        Stage("assess", f"{_HERE}.stages:assess", ("start_up", "sensors", "inductance"), ("records", "tables")),
+        Stage("sketch mechanism", f"{_HERE}.stages:sketches", (), ("mechanism_pictures",)),
+        Stage("animate", f"{_HERE}.stages:animations", (), ("animations",)),
+        Stage("plot", f"{_HERE}.stages:plots", ("start_up", "sensors", "inductance"), ("plots",)),
         Stage("compare solvers", f"{_HERE}.stages:solvers", (), ("solvers",)),
     ),
-    evidence=plans("graphsynth.systems.braider.evidence", "start-up", "linkage-dynamics", "positions"),
+    evidence=plans(f"{_HERE}.evidence", "start-up", "linkage-dynamics", "positions"),
 )

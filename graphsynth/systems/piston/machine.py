@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import Point, check_fields, check_sizes, checked, finite, finite_array, point, positive
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Element, Force, ForceLaw, JointFriction
-from graphsynth.dynamics.inverse import InverseDynamics, inverse_dynamics
 from graphsynth.dynamics.model import Body, DynamicModel
 from graphsynth.systems.piston.loads import (
     CompressorCycle,
@@ -23,6 +22,9 @@ from graphsynth.systems.piston.loads import (
     PistonMasses,
 )
 from graphsynth.systems.piston.model import CrankSlider, FloatingPiston
+
+if TYPE_CHECKING:
+    from graphsynth.dynamics.inverse import InverseDynamics
 
 Array = NDArray[np.float64]
 #: Kind of the slot.
@@ -235,17 +237,13 @@ class PistonMachine:
 
     @checked
     def inverse_dynamics(self, angle: ArrayLike, slot: Slot = "crowned", refuse: bool = True) -> InverseDynamics:
-        """Find torque and reactions of all joints by the general dynamics, at crank angles of shape (n,).
+        """Find torque and reactions of all joints by the general dynamics, at crank angles (n,) in radians.
 
-        Parameters
-        ----------
-        angle : array_like, shape (n,)
-            Radians.
-        slot : {"sliding", "crowned"}
-            With a sliding slot the couples of guide, slot and wall are found undetermined.
-        refuse : bool
-            False: NaN where friction leaves no loads, or several.
+        With a sliding slot the couples of guide, slot and wall are found undetermined; ``refuse=False`` gives NaN
+        where friction leaves no loads, or several.
         """
+        from graphsynth.dynamics.inverse import inverse_dynamics
+
         motion = self.mechanism.run(angle, slot)
         rate = self.mechanism.motion(motion.inputs).piston.first * self.speed
         rings = self.friction.rings * np.tanh(rate / self.friction.smoothing_velocity)
@@ -278,8 +276,11 @@ class PistonMachine:
         motion, zero = self.mechanism.motion(phi), np.zeros(len(phi))
         pins = {pair: found.reactions.between(*pair).on(pair[1])[0] for pair in ((0, 1), (1, 2), (2, 3))}
         speeds = {
-            "guide": motion.crosshead, "cylinder": motion.piston, "slot": motion.slot, "yoke": motion.follower,
-        }  # fmt: skip
+            "guide": motion.crosshead,
+            "cylinder": motion.piston,
+            "slot": motion.slot,
+            "yoke": motion.follower,
+        }
         normal, lost = dict.fromkeys(speeds, zero), self.friction.rings * self._sliding(motion.piston.first)
         for name, (pair, turn) in self._contacts().items():
             force = found.reactions.between(*pair).on(pair[1])[0]

@@ -179,10 +179,17 @@ def loop_spaces(
         rank = _rank(np.asarray(np.linalg.svd(matrix[: 3 * k + 3], compute_uv=False)))
         fresh = tuple(pair for pair in pairs if pair not in seen)
         seen.update(pairs)
-        found.append(LoopSpace(
-            links, pairs, fresh, own_rank, rank - before, sum(screws[pair].shape[1] for pair in fresh),
-            u[:, own_rank:].T.copy(),
-        ))  # fmt: skip
+        found.append(
+            LoopSpace(
+                links,
+                pairs,
+                fresh,
+                own_rank,
+                rank - before,
+                sum(screws[pair].shape[1] for pair in fresh),
+                u[:, own_rank:].T.copy(),
+            )
+        )
         before = rank
     return LoopSpaces(tuple(found), start, before, report.by_rank)
 

@@ -28,19 +28,9 @@ _POSES = (1.0, 4.0)
 class Turn:
     """One turn of a machine with and without the second group, and how far it can be trusted.
 
-    Attributes
-    ----------
-    kind : str
-    machine : PistonMachine
-    found : PistonComparison
-    difference : float
-        Of the forces with a crowned and with a sliding slot, relative to the largest.
-    power : float
-        Error of the power balance over the largest power in play, with or without the second group.
-    redundant : bool
-        Whether the couples are found undetermined with a sliding slot.
-    square : tuple of (float, PistonComparison)
-        The same with the slot out of square to the cylinder by an angle, radians.
+    ``difference`` is that of the forces with a crowned and with a sliding slot, relative to the largest, ``power`` the
+    error of the power balance over the largest power in play; ``redundant`` tells whether the couples are found
+    undetermined with a sliding slot; ``square`` has the same for a slot that is out of square by an angle, radians.
     """
 
     kind: str

@@ -118,11 +118,6 @@ def piston_turn(machine: PistonMachine, length: float | None = None) -> PistonTu
     length : float, optional
         Of piston and shoe, for the forces at their ends, m; the stroke by default.
 
-    Returns
-    -------
-    PistonTurn
-        Work of gas, friction and crank over one turn, and the peaks of the forces.
-
     Raises
     ------
     GeometryError
@@ -183,11 +178,6 @@ def compare_pistons(machine: PistonMachine, length: float | None = None) -> Pist
     length : float, optional
         Of both pistons and of the crosshead's shoe, m; the stroke by default.
 
-    Returns
-    -------
-    PistonComparison
-        Side loads and losses of both over a turn (estimated).
-
     Raises
     ------
     GeometryError
@@ -210,11 +200,14 @@ def compare_pistons(machine: PistonMachine, length: float | None = None) -> Pist
     some = np.linspace(0.0, 2.0 * math.pi, 91)
     least = 1e-10 * float(np.abs(machine.loads(some).crank_pin).max())
     return PistonComparison(
-        floating, plain, _ratio(floating.peak_wall, plain.peak_wall, least),
-        _ratio(floating.peak_edge, plain.peak_edge, least), _ratio(floating.peak_guide_edge, plain.peak_edge, least),
+        floating,
+        plain,
+        _ratio(floating.peak_wall, plain.peak_wall, least),
+        _ratio(floating.peak_edge, plain.peak_edge, least),
+        _ratio(floating.peak_guide_edge, plain.peak_edge, least),
         _ratio(floating.friction, plain.friction, 0.0),
         drive.steepest if isinstance(drive, CrankSlider) else math.nan,
-    )  # fmt: skip
+    )
 
 
 def _rounding(machine: PistonMachine) -> float:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.driven.closed_form import linear_response
 from graphsynth.dynamics.driven.inertia import EffectiveInertia
 from graphsynth.dynamics.driven.run import run
 from graphsynth.dynamics.driven.setup import Plant
 from graphsynth.dynamics.motors import DCMotor, IdealSpeed, IdealTorque, LinearCharacteristic, SynchronousMotor, Train
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
+from tests.dynamics.motors.linear_response import linear_response
 
 DC = {"torque_constant": 0.1, "emf_constant": 0.1, "gain": 20.0, "speed": 20.0}
 

@@ -78,13 +78,17 @@ def four_bar(theta, P, out):
     f3 = (a * cost2 + b * k2 * k2 - c * k3 * k3 * cos32) / (c * sin32)
     m2, i2, i3 = L[M2], L[I2], L[I3]
     out[0] = (
-        P[BASE] + L[M1] * a * a / 3.0 + m2 * (a * a + 0.25 * b * b * k2 * k2 + a * b * k2 * cost2)
-        + i2 * k2 * k2 + i3 * k3 * k3
-    )  # fmt: skip
+        P[BASE]
+        + L[M1] * a * a / 3.0
+        + m2 * (a * a + 0.25 * b * b * k2 * k2 + a * b * k2 * cost2)
+        + i2 * k2 * k2
+        + i3 * k3 * k3
+    )
     out[1] = (
         0.5 * m2 * (0.5 * b * b * k2 * f2 + a * b * f2 * cost2 - a * b * k2 * sint2 * (1.0 - k2))
-        + i2 * k2 * f2 + i3 * k3 * f3
-    )  # fmt: skip
+        + i2 * k2 * f2
+        + i3 * k3 * f3
+    )
     rx = L[RS] / c * (obx * L[COS_D] - oby * L[SIN_D])
     ry = L[RS] / c * (obx * L[SIN_D] + oby * L[COS_D])
     dx, dy = L[GX] - g - rx, L[GY] - ry

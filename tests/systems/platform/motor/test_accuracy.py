@@ -7,12 +7,12 @@ import math
 import pytest
 
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.driven.closed_form import linear_response
 from graphsynth.dynamics.motors import DCMotor, IdealSpeed
 from graphsynth.evidence.drives import drive_work_precision
 from graphsynth.evidence.rows import RowStatus
 from graphsynth.pipeline.display import work_table
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
+from tests.dynamics.motors.linear_response import linear_response
 
 SOURCE = MotorDrivenPlatform.source
 
