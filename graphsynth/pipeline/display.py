@@ -106,18 +106,10 @@ def chart(
     place: Literal["small", "normal", "wide"] = "normal",
     **options: Any,
 ) -> Picture:
-    """Draw curves of SI values over one axis; what :func:`graphsynth.drawing.plots.line_plot` takes more is passed on.
+    """Draw curves of SI values over one axis; what `graphsynth.drawing.plots.line_plot` takes more is passed on.
 
-    Parameters
-    ----------
-    lines, levels : sequence of Line
-        In SI.
-    x, y : str
-        Labels of the axes, with their units in brackets.
-    bands : sequence of Band
-        In SI of `x`.
-    place : {"small", "normal", "wide"}
-        On the page.
+    Lines, levels and bands are in SI; the labels `x`, `y` of the axes name their units in brackets; `place` is the one
+    on the page.
     """
     import numpy as np
 
@@ -177,16 +169,9 @@ def limit_table(study: ReductionStudy) -> Table:
 
 
 def shown_motion(mechanism: Any, inputs: Any, poses: Any, *, closed: bool) -> Motion:
-    """Poses from a closed form as a motion to be animated; what a picture does not show is NaN.
+    """Poses (n, links, 3) from a closed form as a motion to be animated; what a picture does not show is NaN.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-    inputs : ndarray, shape (n,)
-        Driver coordinates.
-    poses : ndarray, shape (n, links, 3)
-    closed : bool
-        The last pose is the first again.
+    `inputs` (n,) are driver coordinates; `closed` says that the last pose is the first again.
     """
     import numpy as np
 

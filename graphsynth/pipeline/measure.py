@@ -120,10 +120,7 @@ def why_not(stage: Stage) -> str:
 def explain(report: Report) -> str:
     """Return a text for people: the stages that ran, with their costs, and those that did not.
 
-    Parameters
-    ----------
-    report : Report
-        Of a run; its times, memory and imports are those of the process that ran it.
+    Times, memory and imports are those of the process that ran them.
     """
     times = {time.stage: time for time in report.times}
     wanted = report.scene.outputs.products

@@ -40,11 +40,6 @@ def write_report(report: Report, folder: Path) -> Path:
     """Write ``report.html``, ``scene.json`` and, of records and columns, CSV and Parquet; return the folder.
 
     Each file appears whole or not at all: it is written beside its place and then moved there.
-
-    Raises
-    ------
-    SceneError
-        If the folder cannot be written.
     """
     files = {"report.html": report_html(report).encode(), "scene.json": scene_json(report).encode()}
     files |= data_files(report)

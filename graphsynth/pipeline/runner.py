@@ -68,13 +68,7 @@ def run(
 
 
 def has_stream(scene: Scene) -> bool:
-    """Whether what the scene asks for takes candidates one by one, which several processes can share.
-
-    Raises
-    ------
-    SceneError
-        If it asks for something no stage gives.
-    """
+    """Whether what the scene asks for takes candidates one by one, which several processes can share."""
     return any(stage.each for stage in resolve(scene.stages(), scene.outputs.products, _place_of_products(scene)))
 
 
@@ -89,13 +83,7 @@ def execute(
     journal: Path | None = None,
     fresh: bool = False,
 ) -> Report:
-    """Run a scene without writing a report; otherwise like :func:`run`.
-
-    Parameters
-    ----------
-    journal : Path, optional
-        The file where outcomes of candidates are kept as they come.
-    """
+    """Run a scene without writing a report, otherwise like `run`; outcomes of candidates are kept in `journal`."""
     if not isinstance(scene, Scene):
         scene = load_scene(scene)
     check_executor(executor)
@@ -116,31 +104,10 @@ def execute(
 
 
 class Running:
-    """Resolved stages and what they have given so far.
+    """Resolved stages, each behind all it needs, and what they have given so far.
 
-    Parameters
-    ----------
-    stages : sequence of Stage
-        Each behind all it needs.
-    wanted : tuple of str
-        Products to return.
-    context : Context
-        For every stage.
-    progress : callable, optional
-        Told what is under way.
-    journal : Path, optional
-        Where outcomes of candidates are kept.
-    fresh : bool, optional
-        Do not go on from what the journal holds.
-
-    Attributes
-    ----------
-    stages : tuple of Stage
-        In the order of running.
-    times : list of StageTime
-    notes : list of str
-    seconds : float
-        Wall clock of all together.
+    Parameters are those of `execute`. `stages` are in the order of running; `seconds` is the wall clock of all
+    together.
     """
 
     def __init__(

@@ -231,10 +231,7 @@ class Scene:
     def from_mapping(cls, tables: object, source: str = "<mapping>", digest: str = "", text: str = "") -> Scene:
         """Read a scene from the tables of a TOML document.
 
-        Raises
-        ------
-        SceneError
-            With the file, the key, what was expected and the nearest valid key.
+        A `SceneError` names the file, the key, what was expected and the nearest valid key.
         """
         place = Place(source, (), text)
         if not isinstance(tables, Mapping):
@@ -293,14 +290,9 @@ def available_scenes() -> tuple[str, ...]:
 
 
 def find_scene(name_or_path: str | Path) -> Path:
-    """Return the file of a scene given by the name of a shipped one or by a path.
+    """Return the file of a scene given by the name of a shipped one or by a path; a `SceneError` if there is neither.
 
     A path wins if it exists as a file; a bare word is looked up among the shipped scenes.
-
-    Raises
-    ------
-    SceneError
-        If there is neither; the message lists the shipped scenes.
 
     Examples
     --------

@@ -30,10 +30,7 @@ class Context:
 def build(scene: Scene) -> Any:
     """Return the mechanism of a scene, as its system builds it.
 
-    Raises
-    ------
-    SceneError
-        If the numbers of the scene cannot be built, or the scene has many mechanisms.
+    A `SceneError` says that the numbers of the scene cannot be built, or that the scene has many mechanisms.
 
     Examples
     --------
@@ -124,13 +121,7 @@ class Report:
 
 
 def _installed(product: str) -> Stage | None:
-    """Return the stage of another package that gives this product, or None if no package announces one.
-
-    Raises
-    ------
-    SceneError
-        If it cannot be imported, is no stage or does not give the product.
-    """
+    """Return the stage of another package that gives this product, or None; a `SceneError` for one that is none."""
     for point in announced("stages").select(name=product):
         try:
             stage = point.load()
@@ -164,22 +155,9 @@ def resolve(
 ) -> tuple[Stage, ...]:
     """Return the smallest set of stages that yields `outputs`, in an order in which each finds what it needs.
 
-    Backward from the outputs; the order depends on `outputs` and `stages` alone.  A product that none of `stages` gives
-    may come from a stage that another package announces.
-
-    Parameters
-    ----------
-    stages : iterable of Stage
-        The registry.
-    outputs : sequence of str
-        Products wanted.
-    place : Place, optional
-        Where the outputs were named, for the message.
-
-    Raises
-    ------
-    SceneError
-        On an unknown output, a need that no stage gives, or a cycle; the message names the stages.
+    Backward from the outputs; the order depends on `outputs` and `stages` alone. A product that none of `stages` gives
+    may come from a stage that another package announces. `place` is where the outputs were named. A `SceneError` names
+    an unknown output, a need that no stage gives, or the stages of a cycle.
 
     Examples
     --------

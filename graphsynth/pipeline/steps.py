@@ -35,10 +35,7 @@ if TYPE_CHECKING:
 def solve(context: Context) -> tuple[LinkAssortment, ...]:
     """Return every integer solution of the scene's structural question (exact); none if graphs are given instead.
 
-    Raises
-    ------
-    SceneError
-        If graphs are given and the solutions are asked for.
+    A `SceneError` says that graphs are given and the solutions are asked for.
     """
     if _structure(context).graphs:
         if "solutions" in context.scene.outputs.products:
@@ -70,12 +67,7 @@ def _spec(context: Context) -> StructuralSpec:
 def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> Iterator[Candidate]:
     """Yield the mechanisms of the question, each once up to isomorphism, filtered as ``[structure.generate]`` says.
 
-    Raises
-    ------
-    TooLargeError
-        If there are more than ``limit``.
-    SceneError
-        If there is none.
+    A `TooLargeError` says that there are more than ``limit``, a `SceneError` that there is none.
     """
     count = 0
     for graph in _mechanisms(context):
@@ -86,13 +78,7 @@ def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> Iterato
 
 
 def check_count(context: Context, solutions: tuple[LinkAssortment, ...]) -> None:
-    """List the candidates once without keeping them: before much work is put into the first of too many.
-
-    Raises
-    ------
-    TooLargeError, SceneError
-        As `generate` does, but before it gives the first candidate.
-    """
+    """List the candidates once without keeping them, and refuse what `generate` would, before its first candidate."""
     count = 0
     for _ in _mechanisms(context):
         _refuse_more(context, count)
@@ -327,13 +313,7 @@ DIGITS = 12
 
 
 def rank(context: Context, records: tuple[Record, ...]) -> Ranking:
-    """Rank the assessed records by ``[ranking]``.
-
-    Raises
-    ------
-    SceneError
-        If no record has a margin of the name of an objective.
-    """
+    """Rank the assessed records by ``[ranking]``; a `SceneError` if no record has the quantity of an objective."""
     table = context.scene.ranking
     assert table is not None  # a scene without [ranking] has no such stage
     objectives = tuple(

@@ -38,16 +38,8 @@ _CLASSES: dict[str, type] = {
 def encode(value: object) -> str:
     """Return a value as one line of JSON, the same for equal values.
 
-    Parameters
-    ----------
-    value : object
-        Text, numbers, booleans, None, lists, tuples, dictionaries with text keys, numpy scalars, and the frozen
-        dataclasses of :mod:`graphsynth.pipeline.products`; nested.
-
-    Raises
-    ------
-    SceneError
-        For anything else; the message names the type.
+    Text, numbers, booleans, None, lists, tuples, dictionaries with text keys, numpy scalars, and the frozen dataclasses
+    of `graphsynth.pipeline.products`, nested; a `SceneError` names the type of anything else.
 
     Examples
     --------
@@ -78,12 +70,7 @@ def _plain(value: Any) -> Any:
 
 
 def decode(line: str) -> Any:
-    """Return the value of a line; lists come back as tuples.
-
-    Raises
-    ------
-    FormatError
-        If the line is not one that :func:`encode` writes.
+    """Return the value of a line; lists come back as tuples. A `FormatError` refuses what `encode` does not write.
 
     Examples
     --------
@@ -141,30 +128,11 @@ def _work(scene: str, digest: str) -> Work:
 
 
 class Candidates(Journal):
-    """The journal of one run; without a path nothing is kept on disk.
+    """The journal of one run: outcomes of candidates; without a path nothing is kept on disk.
 
-    Parameters
-    ----------
-    path : Path or None
-        The file.
-    scene : str
-        Name of the scene, for people.
-    signature : str
-        Of this run; a file of another unfinished run is refused.
-    fresh : bool
-        Replace whatever is there.
-
-    Attributes
-    ----------
-    done : tuple of Outcome
-        What an interrupted run had written.
-
-    Raises
-    ------
-    SceneError
-        If the file belongs to another unfinished run, or another process writes it.
-    FormatError
-        If it is not a file of results.
+    `scene` is its name, for people; `signature` that of this run: a file of another unfinished run is refused unless
+    `fresh` replaces whatever is there. `done` holds what an interrupted run had written. A `SceneError` says that the
+    file belongs to another unfinished run or another process writes it, a `FormatError` that it is no file of results.
     """
 
     def __init__(self, path: Path | None, scene: str, signature: str, fresh: bool = False) -> None:
@@ -224,13 +192,7 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def check_folder(folder: Path) -> None:
-    """Try whether files can be written into a folder; what is made for that is removed.
-
-    Raises
-    ------
-    SceneError
-        If not.
-    """
+    """Make sure that a report can be written into a folder, and leave everything as it was; a `SceneError` if not."""
     made: list[Path] = []
     try:
         with writing(f"the report into {folder}", REMEDY, SceneError):
@@ -247,13 +209,7 @@ def check_folder(folder: Path) -> None:
 
 
 def split_parts(outcome: Outcome, kinds: Sequence[str]) -> tuple[Outcome, dict[str, bytes]]:
-    """Take the columns out of an outcome: each becomes a `Part`, and the files to be written come besides.
-
-    Parameters
-    ----------
-    kinds : sequence of str
-        "csv", "parquet".
-    """
+    """Take the columns out of an outcome: each becomes a `Part`, and the files to be written come besides."""
     products = dict(outcome.products)
     files: dict[str, bytes] = {}
     for product, value in outcome.products.items():
@@ -270,19 +226,8 @@ def split_parts(outcome: Outcome, kinds: Sequence[str]) -> tuple[Outcome, dict[s
 class PartFolder:
     """The files of one run below its report folder; without a folder nothing is written.
 
-    Parameters
-    ----------
-    folder : Path or None
-        The report folder.
-    done : sequence of Outcome
-        Taken over from an interrupted run; their files must be there and unchanged.
-    kinds : sequence of str
-        "csv", "parquet", as asked for now.
-
-    Raises
-    ------
-    SceneError
-        If one is not.
+    Files of the outcomes `done`, taken over from an interrupted run, must be there, unchanged, and of the kinds ("csv",
+    "parquet") that are asked for now: a `SceneError` if not.
     """
 
     def __init__(self, folder: Path | None, done: Sequence[Outcome], kinds: Sequence[str] = ()) -> None:
@@ -318,13 +263,7 @@ class PartFolder:
         self._kept.add(path)
 
     def write(self, files: Mapping[str, bytes]) -> None:
-        """Write files; the first time in a folder, parts of older runs are removed.
-
-        Raises
-        ------
-        SceneError
-            If the folder cannot be written.
-        """
+        """Write files; the first time in a folder, parts of older runs are removed."""
         if self._folder is None:
             return
         with writing(f"into {self._folder}", REMEDY, SceneError):
@@ -344,13 +283,7 @@ class PartFolder:
 
 
 def check_files(scene: Scene) -> None:
-    """Refuse, before anything runs, kinds of files that this installation cannot write.
-
-    Raises
-    ------
-    SceneError
-        If Parquet is asked for without pyarrow.
-    """
+    """Refuse, before anything runs, Parquet where this installation lacks pyarrow: a `SceneError`."""
     if "parquet" in scene.outputs.files and find_spec("pyarrow") is None:
         raise (scene.place / "outputs" / "files").error(
             "asks for Parquet, which needs pyarrow: install graphsynth[parquet], or take it out"

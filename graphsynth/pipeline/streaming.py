@@ -49,10 +49,7 @@ class Plan:
 def plan_stream(stages: Sequence[Stage], wanted: Sequence[str]) -> Plan | None:
     """Pick the stages for each candidate out of resolved stages; None if there is none.
 
-    Raises
-    ------
-    SceneError
-        If they do not start from exactly one stream, or one of them needs what only all candidates together give.
+    A `SceneError` says that they do not start from exactly one stream, or need what only all candidates together give.
     """
     each = [stage for stage in stages if stage.each]
     if not each:
@@ -144,13 +141,7 @@ def _interrupted(error: BaseException | None) -> bool:
 
 
 def given_by(stage: Stage, result: Any) -> dict[str, Any]:
-    """Name what a stage returned.
-
-    Raises
-    ------
-    SceneError
-        If it is not what the stage says it gives.
-    """
+    """Name what a stage returned; a `SceneError` if it is not what the stage says it gives."""
     values = (result,) if len(stage.gives) == 1 else result
     if not isinstance(values, tuple) or len(values) != len(stage.gives):
         raise SceneError(f"stage {stage.name!r} says it gives {', '.join(stage.gives)} but returned something else")
@@ -190,21 +181,9 @@ def stream(
 ) -> Streamed:
     """Evaluate every item, in order whoever computes it, and write each outcome as it comes.
 
-    Parameters
-    ----------
-    items : iterable
-        The candidates; taken one by one, at most some chunks ahead.
-    journal : Candidates
-        What it has already is not computed again.
-    used_up : callable
-        Says which budget is used up, or nothing; asked after each chunk.
-    progress : callable, optional
-        Told the number of candidates done.
-
-    Raises
-    ------
-    SceneError
-        If the journal was written for other candidates.
+    Items are taken one by one, at most some chunks ahead; what the journal has already is not computed again. `used_up`
+    says after each chunk which budget is used up, or nothing; `progress` is told the number of candidates done. A
+    `SceneError` says that the journal was written for other candidates.
     """
     done = Streamed()
     numbered = enumerate(items, 1)

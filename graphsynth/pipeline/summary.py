@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Hashable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
+from graphsynth.pipeline.display import table
 from graphsynth.pipeline.products import Finding, Quantity, Ranking, Record, Table
 
 if TYPE_CHECKING:
@@ -24,10 +25,7 @@ _MARGINS = 6
 def sentences(report: Report) -> tuple[Finding, ...]:
     """Return the answer in words, the most important sentence first.
 
-    Parameters
-    ----------
-    report : Report
-        Of a run with the products ``records``, ``ranking`` or ``tables``; without them there is nothing to say.
+    Without the products ``records``, ``ranking`` or ``tables`` there is nothing to say.
     """
     records: tuple[Record, ...] = report.products.get("records", ())
     found = [told for ranking in _rankings(report) for told in _best(ranking, records)]
@@ -182,17 +180,15 @@ def _ended(text: str) -> str:
 
 def _rejected(records: Sequence[Record]) -> list[Finding]:
     """Count the reasons of those that were rejected."""
-    causes = Counter(r.cause or r.reason for r in records if r.status in ("rejected", "failed"))
+    causes = _counted(r.cause or r.reason for r in records if r.status in ("rejected", "failed"))
+    total = sum(count for _, count in causes)
     if not causes:
         return []
-    listed = [
-        f"{count} because {cause}" for cause, count in sorted(causes.items(), key=lambda item: (-item[1], item[0]))
-    ]
-    more = f"; {len(listed) - _REASONS} more reasons" if len(listed) > _REASONS else ""
-    total = sum(causes.values())
     if len(causes) == 1 and total > 1:
-        return [Finding(f"Rejected: {total} of {len(records)}, all for the same reason: {_ended(next(iter(causes)))}")]
-    return [Finding(f"Rejected: {total} of {len(records)}: {'; '.join(listed[:_REASONS])}{more}.")]
+        return [Finding(f"Rejected: {total} of {len(records)}, all for the same reason: {_ended(causes[0][0])}")]
+    listed = "; ".join(f"{count} because {cause}" for cause, count in causes[:_REASONS])
+    more = f"; {len(causes) - _REASONS} more reasons" if len(causes) > _REASONS else ""
+    return [Finding(f"Rejected: {total} of {len(records)}: {listed}{more}.")]
 
 
 def _how_sure(ranking: Ranking, records: Sequence[Record]) -> list[Finding]:
@@ -231,43 +227,38 @@ def summary_tables(report: Report) -> tuple[Table, ...]:
 
 
 def _times_table(report: Report) -> Table:
-    rows = [(t.stage, str(t.runs), f"{t.import_seconds:.3f}", f"{t.seconds:.3f}", _mb(t.peak_mb)) for t in report.times]
-    imports, seconds = math.fsum(t.import_seconds for t in report.times), math.fsum(t.seconds for t in report.times)
-    rows.append(("total", "", f"{imports:.3f}", f"{seconds:.3f}", ""))
+    rows: list[tuple[object, ...]] = [
+        (t.stage, t.runs, t.import_seconds, t.seconds, 1e6 * t.peak_mb if math.isfinite(t.peak_mb) else "unknown")
+        for t in report.times
+    ]
+    sums = (math.fsum(getattr(t, name) for t in report.times) for name in ("import_seconds", "seconds"))
+    rows.append(("total", None, *sums, None))
     note = (
         "Wall clock and resident memory, one measurement; of stages for each candidate, the sum over candidates, in "
         f"whichever process. The run took {report.seconds:.1f} s."
     )
-    return Table("Time per stage", ("stage", "runs", "import [s]", "run [s]", "peak [MB]"), tuple(rows), note)
+    columns = ("stage", "runs", "import [s] | .3f", "run [s] | .3f", "peak [MB] | .0f")
+    return table("Time per stage", columns, rows, note)
 
 
-def _mb(value: float) -> str:
-    return f"{value:.0f}" if math.isfinite(value) else "unknown"
+def _counted(found: Iterable[Hashable]) -> list[tuple[Any, int]]:
+    """Count, the most frequent first; those as frequent in their own order."""
+    return sorted(Counter(found).items(), key=lambda item: (-item[1], item[0]))
 
 
 def _reasons_table(records: tuple[Record, ...]) -> Table:
     """Count why candidates were rejected or failed, the most frequent reason first."""
-    counts = Counter((r.status, r.cause or r.reason) for r in records if r.status in ("rejected", "failed"))
-    rows = tuple((str(count), *key) for key, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])))
-    return Table("Rejected and failed candidates, by reason", ("count", "status", "reason"), rows)
+    counts = _counted((r.status, r.cause or r.reason) for r in records if r.status in ("rejected", "failed"))
+    rows = ((count, *key) for key, count in counts)
+    return table("Rejected and failed candidates, by reason", ("count", "status", "reason"), rows)
 
 
 def _ranking_table(ranking: Ranking, report: Report) -> Table:
     """List the best candidates with the values of their objectives."""
     most = report.scene.ranking.show if report.scene.ranking else len(ranking.numbers)
-    rows = tuple(
-        (
-            str(place),
-            str(number),
-            f"{score:.4f}",
-            "yes" if number in ranking.front else "no",
-            *(f"{v:.8g}" for v in row),
-        )
-        for place, (number, score, row) in enumerate(zip(ranking.numbers, ranking.scores, ranking.values), 1)
-    )[:most]
-    goals = tuple(
-        f"{o.quantity} ({o.goal if isinstance(o.goal, str) else f'near {o.goal:g}'})" for o in ranking.objectives
-    )
+    places = list(enumerate(zip(ranking.numbers, ranking.scores, ranking.values), 1))[:most]
+    rows = ((place, number, score, number in ranking.front, *row) for place, (number, score, row) in places)
+    goals = (f"{o.quantity} ({o.goal if isinstance(o.goal, str) else f'near {o.goal:g}'})" for o in ranking.objectives)
     weights = ", ".join(f"{o.weight:g}" for o in ranking.objectives)
     note = (
         f"{ranking.front_size} of {ranking.ranked} ranked candidates are on the Pareto front: no other one is at "
@@ -276,7 +267,8 @@ def _ranking_table(ranking: Ranking, report: Report) -> Table:
     )
     if ranking.unranked:
         note += f" {len(ranking.unranked)} without all objectives are not ranked ({ranking.unranked[0][1]}, ...)."
-    return Table("Ranking", ("place", "candidate", "score", "Pareto front", *goals), rows, note)
+    columns = ("place", "candidate", "score | .4f", "Pareto front", *(f"{goal} | .8g" for goal in goals))
+    return table("Ranking", columns, rows, note)
 
 
 def _solutions_table(solutions: tuple[LinkAssortment, ...]) -> Table:
@@ -287,12 +279,8 @@ def _solutions_table(solutions: tuple[LinkAssortment, ...]) -> Table:
     several = len(rows) > 1
     shown = [i for i, name in enumerate(header) if not several or len({row[i] for row in rows}) > 1]
     common = ", ".join(f"{name} = {rows[0][i]}" for i, name in enumerate(header) if i not in shown) if rows else ""
-    return Table(
-        f"Integer solutions of the structural system: {len(rows)}",
-        tuple(header[i] for i in shown),
-        tuple(tuple(str(row[i]) for i in shown) for row in rows),
-        f"In all of them {common}." if common else "",
-    )
+    title, cells = f"Integer solutions of the structural system: {len(rows)}", ([row[i] for i in shown] for row in rows)
+    return table(title, [header[i] for i in shown], cells, f"In all of them {common}." if common else "")
 
 
 #: Rows of the table of candidates; a search with more kinds of outcomes is read in results.csv.
@@ -306,8 +294,8 @@ def _verdict_table(records: tuple[Record, ...]) -> Table:
         for r in records
     )
     columns = ("count", "assortment", "status", "recognised as", "verdict or reason")
-    rows = [(str(count), *key) for key, count in counts.items()]
+    rows = [(count, *key) for key, count in counts.items()]
     told = [i for i in range(len(columns)) if any(row[i] for row in rows)]
-    shown = tuple(tuple(row[i] for i in told) for row in rows[:_MOST])
+    shown = ([row[i] for i in told] for row in rows[:_MOST])
     note = f"{len(rows) - _MOST} more kinds of outcomes are in results.csv." if len(rows) > _MOST else ""
-    return Table(f"Candidates: {len(records)}", tuple(columns[i] for i in told), shown, note)
+    return table(f"Candidates: {len(records)}", [columns[i] for i in told], shown, note)

@@ -139,19 +139,9 @@ def system_names() -> tuple[str, ...]:
 
 
 def system(name: str, place: Place | None = None) -> System:
-    """Import the system of this name.
+    """Import the system of this name, as in ``[mechanism] module``.
 
-    Parameters
-    ----------
-    name : str
-        As in ``[mechanism] module``.
-    place : Place, optional
-        Where it was named, for the message.
-
-    Raises
-    ------
-    SceneError
-        For an unknown name, and for a module that is missing or is no system.
+    A `SceneError` with the place where it was named says that the name is unknown, or the module missing or no system.
 
     Examples
     --------
@@ -178,12 +168,7 @@ def system(name: str, place: Place | None = None) -> System:
 def plans_of(name: str, *, structure: bool = False) -> tuple[Plan, ...]:
     """Return the problems of a system, those that other packages announce included.
 
-    Parameters
-    ----------
-    name : str
-        As in ``[mechanism] module``.
-    structure : bool
-        Whether the scene has a structural question.
+    `structure` says whether the scene has a structural question.
     """
     found = list(system(name).evidence)
     for point in announced("evidence").select(name=name):

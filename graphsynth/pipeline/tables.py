@@ -163,22 +163,11 @@ def unknown(place: Place, key: str, choices: Iterable[str]) -> SceneError:
 def read_table(schema: type[T], table: object, place: Place) -> T:
     """Read a mapping into the frozen dataclass `schema`.
 
-    Parameters
-    ----------
-    schema : type
-        A dataclass whose fields are ``str``, ``bool``, ``int``, ``float``, ``Literal``, tuples of these,
-        ``X | None``, nested dataclasses or ``Mapping[str, object]`` (kept as it is); numbers may be annotated with
-        `In`. A ``float`` field also takes a fraction, ``"1/30"``, because TOML has no exact way to write it, and a
-        number with a unit, ``"2 deg"``.
-    table : object
-        The value found in the file.
-    place : Place
-        Where it was found.
+    Its fields are ``str``, ``bool``, ``int``, ``float``, ``Literal``, tuples of these, ``X | None``, nested dataclasses
+    or ``Mapping[str, object]`` (kept as it is); numbers may be annotated with `In`. A ``float`` field also takes a
+    fraction, ``"1/30"``, because TOML has no exact way to write it, and a number with a unit, ``"2 deg"``.
 
-    Raises
-    ------
-    SceneError
-        On an unknown or missing key and on a value of a wrong type or unit; the message names the place.
+    A `SceneError` with the place says what is wrong: an unknown or missing key, a value of a wrong type or unit.
 
     Examples
     --------

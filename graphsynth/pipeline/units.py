@@ -41,10 +41,7 @@ class Unit:
     def parse(cls, text: str) -> Unit:
         """Read a unit: symbols with optional powers, joined by space, ``*`` or ``/`` (which divides by the next one).
 
-        Raises
-        ------
-        ValueError
-            For an unknown symbol; its text is the symbol.
+        A `ValueError` whose text is the symbol refuses an unknown one.
         """
         return _parse(text.strip())
 
@@ -186,12 +183,7 @@ _NUMBER = re.compile(
 
 
 def split_value(text: str) -> tuple[Fraction, str]:
-    """Split a written value into its exact number and the text of its unit.
-
-    Raises
-    ------
-    ValueError
-        If it does not begin with a number.
+    """Split a written value into its exact number and the text of its unit; a `ValueError` if it begins with none.
 
     Examples
     --------

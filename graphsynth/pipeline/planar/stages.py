@@ -53,14 +53,9 @@ class Moved:
 def take(context: Context) -> Iterator[Candidate | FileCandidate]:
     """Return the candidates of ``[structure]``, or those of the files, in their order.
 
-    All files are read, and all candidates counted, before work begins on the first.
-
-    Raises
-    ------
-    SceneError
-        A file that cannot be read or is no mechanism; goals nobody can mean; a question without candidates.
-    TooLargeError
-        More candidates than the limit.
+    All files are read, and all candidates counted, before work begins on the first. A `SceneError` refuses a file that
+    is no mechanism, goals that contradict themselves and a question without candidates, a `TooLargeError` more than the
+    limit.
     """
     table: PlanarTable = context.scene.mechanism
     if table.files:
@@ -97,13 +92,7 @@ def _read(context: Context, place: int, name: str) -> FileCandidate:
 
 
 def embody(context: Context, design: Candidate | FileCandidate) -> Built:
-    """Give a graph dimensions that meet the goals; a mechanism of a file keeps its own.
-
-    Raises
-    ------
-    Rejected
-        If the search finds none.
-    """
+    """Give a graph dimensions that meet the goals, or reject it; a mechanism of a file keeps its own."""
     table: PlanarTable = context.scene.mechanism
     if isinstance(design, FileCandidate):
         return Built(design.name, design.mechanism)
@@ -178,13 +167,7 @@ def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
 
 
 def move(context: Context, built: Built) -> Moved:
-    """Move a candidate over the range of ``[mechanism.motion]``.
-
-    Raises
-    ------
-    Rejected
-        If the range is not completed, or the transmission angle is too small.
-    """
+    """Move a candidate over ``[mechanism.motion]``, or reject it: the range, or the transmission angle, is not kept."""
     import numpy as np
 
     from graphsynth.kinematics.dimensional.verify import smallest_transmission
@@ -248,13 +231,7 @@ def mechanisms(context: Context, written: tuple[Outcome, ...]) -> Columns:
 
 
 def restored(outcome: Outcome) -> Mechanism:
-    """Return the mechanism that `write` kept.
-
-    Raises
-    ------
-    GraphsynthError
-        If it keeps none.
-    """
+    """Return the mechanism that `write` kept; a `GraphsynthError` if it keeps none."""
     from graphsynth.mechanism.model import Mechanism
 
     if outcome.status != "assessed":
