@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import astuple, dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -65,16 +65,9 @@ def _move(table: LambdaTable) -> LambdaMotion:
     from graphsynth.core.errors import GeometryError
     from graphsynth.systems.lambda_linkage.model import LambdaLinkage
 
-    lengths = table.lengths
-    linkage = LambdaLinkage(
-        lengths.frame,
-        lengths.crank,
-        lengths.coupler,
-        lengths.rocker,
-        sgn=table.branch,
-        alpha=table.tilt.alpha,
-        axis=table.tilt.axis,
-    )
+    frame, crank, coupler, rocker = astuple(table.lengths)
+    tilt = table.tilt
+    linkage = LambdaLinkage(frame, crank, coupler, rocker, sgn=table.branch, alpha=tilt.alpha, axis=tilt.axis)
     f = np.linspace(0.0, math.tau, table.positions + 1)
     tilted = linkage.positions(f)
     if not tilted.assembled.any():
@@ -201,16 +194,7 @@ def _proof_table(
     rows: list[tuple[str, ...]] = [("statement", *(f.statement for f in found.values()))]
     if not tolerance_box(context).is_point:
         rows.append(("without tolerances", *(_nominal(context, c).statement for c in found)))
-    rows += [
-        (
-            "largest interference, mm",
-            *(_bounds(f.largest_interference.lo, f.largest_interference.hi) for f in found.values()),
-        ),
-        ("binds for certain", *(_spans(f.arcs.inner) for f in found.values())),
-        ("free for certain", *(_spans(f.arcs.free) for f in found.values())),
-        ("neither is proved", *(_total(f.arcs.undecided) for f in found.values())),
-        ("assembled", *(f.assembles for f in found.values())),
-    ]
+    rows += [(title, *(text(f) for f in found.values())) for title, text in _PROVED.items()]
     for name in ("smallest clearance", "largest axis tilt"):
         rows.append((f"{name}: works, fails", *(_works(limits[c][name]) for c in found)))
     box = tolerance_box(context)
@@ -262,6 +246,16 @@ def _works(limit: CertifiedLimit) -> str:
     if limit.works is None or limit.fails is None:
         return limit.reason
     return f"{limit.works!r}, {limit.fails!r} {limit.unit}"
+
+
+#: What a certificate proves: row of the table, and its text.
+_PROVED: dict[str, Callable[[JamCertificate], str]] = {
+    "largest interference, mm": lambda f: _bounds(f.largest_interference.lo, f.largest_interference.hi),
+    "binds for certain": lambda f: _spans(f.arcs.inner),
+    "free for certain": lambda f: _spans(f.arcs.free),
+    "neither is proved": lambda f: _total(f.arcs.undecided),
+    "assembled": lambda f: f.assembles,
+}
 
 
 def _jam_table(

@@ -47,11 +47,9 @@ SYSTEM = System(
         Stage("kinematics", f"{_HERE}.stages:kinematics", ("recognised",), ("motions",)),
         Stage("jamming", f"{_HERE}.stages:jamming", ("motions",), ("assessments",)),
         Stage("assess", f"{_HERE}.stages:assess", ("recognised", "motions", "assessments"), ("records", "tables")),
-        Stage(
-            "sketch mechanism", f"{_HERE}.stages_pictures:sketches", ("motions", "assessments"), ("mechanism_pictures",)
-        ),
-        Stage("animate", f"{_HERE}.stages_pictures:animations", ("motions", "assessments"), ("animations",)),
-        Stage("plot", f"{_HERE}.stages_pictures:plots", ("motions", "assessments"), ("plots",)),
+        Stage("sketch mechanism", f"{_HERE}.pictures:sketches", ("motions", "assessments"), ("mechanism_pictures",)),
+        Stage("animate", f"{_HERE}.pictures:animations", ("motions", "assessments"), ("animations",)),
+        Stage("plot", f"{_HERE}.pictures:plots", ("motions", "assessments"), ("plots",)),
     ),
     evidence=plans(
         f"{_HERE}.evidence",

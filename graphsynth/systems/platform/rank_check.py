@@ -7,16 +7,17 @@ unit twists of the joints around a loop, weighted by their speeds, sum to zero.
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import networkx as nx
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import checked, finite, finite_array, triple
 from graphsynth.core.errors import GeometryError
-from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, Prismatic, Revolute
+from graphsynth.mechanism.equations import FLOATS, Gradient, derivatives, seen
+from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
@@ -193,56 +194,53 @@ def platform_loop_closure(platform: SingleMotorPlatform, psi: float, pose: Array
     return loop_closure(as_mechanism(platform, psi, pose))
 
 
+#: Names of the freedoms of a joint, the turning one first.
+_FREEDOMS = {
+    Revolute: ("R",),
+    Prismatic: ("P",),
+    Gear: ("roll", "slide"),
+    Cam: ("turn", "slide"),
+    PinSlot: ("turn", "slide"),
+}
+
+
 def _twists(joint: JointGeometry, X: Array, Lc: float) -> list[tuple[str, Array]]:
-    """List the unit twists ``(turn, v_x / Lc, v_y / Lc)`` of link b against link a, velocities taken at the origin."""
-    P = complex(X[joint.a, 0], X[joint.a, 1]) + complex(np.exp(1j * X[joint.a, 2])) * complex(*joint.at_a)
-    Q = complex(X[joint.b, 0], X[joint.b, 1]) + complex(np.exp(1j * X[joint.b, 2])) * complex(*joint.at_b)
+    """List the unit twists ``(turn, v_x / Lc, v_y / Lc)`` of link b against link a, velocities taken at the origin.
 
-    def about(point: complex) -> Array:
-        return np.array([1.0, point.imag / Lc, -point.real / Lc])
+    They are what the equations of the joint leave free.  A joint with one freedom has its coordinate as speed; one with
+    two turns about the point at which the pin, the roller or the other wheel's centre does not slide, and slides.
+    """
+    at = seen(FLOATS, joint, X[joint.a], X[joint.b])
+    x, y, _ = X[joint.b]
 
-    def along(direction: complex) -> Array:
-        return np.array([0.0, direction.real, direction.imag])
+    def row(gradient: Gradient) -> Array:
+        by_x, by_y, by_angle = (0.0 if v is None else float(v) for v in derivatives(at, [gradient])[0][1])
+        return np.array([by_angle - by_x * y + by_y * x, Lc * by_x, Lc * by_y])
 
-    if isinstance(joint, Revolute):
-        return [("R", about(P))]
-    if isinstance(joint, Gear):
-        between = Q - P
-        outer = joint.radius_a + (-joint.radius_b if joint.internal else joint.radius_b)
-        pitch = P + between * (joint.radius_a / outer)
-        return [("roll", about(pitch)), ("slide", along(between / abs(between)))]
-    if isinstance(joint, Cam):
-        radial = (Q - P) / abs(Q - P)
-        rho, slope, _ = joint.pitch_radius(float(np.angle(radial)) - X[joint.a, 2] - joint.angle_a)
-        return [("turn", about(Q)), ("slide", along(radial * complex(slope, rho) / abs(complex(slope, rho))))]
-    line = complex(np.exp(1j * (X[joint.a, 2] + joint.angle_a)))
-    if isinstance(joint, Prismatic):
-        return [("P", along(line))]
-    return [("turn", about(Q)), ("slide", along(line))]
+    names, held = _FREEDOMS[type(joint)], [row(gradient) for gradient in joint.gradients(at)]
+    if isinstance(joint, Revolute | Prismatic):
+        free = np.linalg.solve(np.array([*held, row(joint.coordinate(at)[1])]), [0.0, 0.0, 1.0])
+        return [(names[0], free / (1.0 if names == ("R",) else np.hypot(free[1], free[2])))]
+    across, along = held[0][1:] / np.hypot(*held[0][1:])
+    slide = np.array([0.0, along, -across]) * (1.0 if isinstance(joint, PinSlot) else -1.0)  # along the guide, outward
+    px, py = x + float(at.arm_b.x), y + float(at.arm_b.y)
+    still = np.array([(slide[2] * px - slide[1] * py) / Lc, slide[1], slide[2]])  # speed of that point along the slide
+    turn = np.linalg.solve(np.array([held[0] / np.linalg.norm(held[0]), still, [1.0, 0.0, 0.0]]), [0.0, 0.0, 1.0])
+    return [(names[0], turn), (names[1], slide)]
 
 
 def _cycles(mechanism: Mechanism) -> Array:
     """Fundamental cycles, shape (loops, joints): +1 where a loop passes a joint from a to b, -1 the other way."""
-    parent: dict[int, tuple[int, int, int]] = {mechanism.frame: (-1, -1, 0)}  # link -> (previous link, joint, sense)
-    queue, tree = deque([mechanism.frame]), set()
-    while queue:
-        here = queue.popleft()
-        for number, joint in enumerate(mechanism.joints):
-            for a, b, sense in ((joint.a, joint.b, 1), (joint.b, joint.a, -1)):
-                if a == here and b not in parent:
-                    parent[b] = (here, number, sense)
-                    tree.add(number)
-                    queue.append(b)
-    rows = []
-    for number, joint in enumerate(mechanism.joints):
-        if number in tree:
-            continue
-        row = np.zeros(len(mechanism.joints))
-        row[number] = 1.0
-        for end, sign in ((joint.a, 1.0), (joint.b, -1.0)):
-            link = end
-            while parent[link][1] >= 0:
-                row[parent[link][1]] += sign * parent[link][2]
-                link = parent[link][0]
-        rows.append(row)
-    return np.array(rows).reshape(-1, len(mechanism.joints))
+    joints = mechanism.joints
+    number = {frozenset((joint.a, joint.b)): k for k, joint in enumerate(joints)}
+    graph = nx.Graph((joint.a, joint.b) for joint in joints)
+    tree = [number[frozenset(edge)] for edge in nx.bfs_edges(graph, mechanism.frame)]
+    rest = sorted(set(range(len(joints))) - set(tree))
+    incidence = np.zeros((mechanism.graph.links, len(joints)))
+    for k, joint in enumerate(joints):
+        incidence[joint.a, k], incidence[joint.b, k] = -1.0, 1.0
+    moving = np.delete(incidence, mechanism.frame, axis=0)
+    cycles = np.zeros((len(rest), len(joints)))
+    cycles[range(len(rest)), rest] = 1.0
+    cycles[:, tree] = -np.rint(np.linalg.solve(moving[:, tree], moving[:, rest])).T
+    return cycles
