@@ -37,11 +37,14 @@ def drive_curves(runs: Mapping[str, DriveRun], *, size: tuple[float, float] = (7
 
     `runs`: label and run, for example two armature resistances. `size`: inches. Raises `SpecError` without any run.
 
-    >>> from graphsynth.dynamics.motors import DCMotor
-    >>> from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
+    >>> from graphsynth.dynamics.driven.inertia import EffectiveInertia
+    >>> from graphsynth.dynamics.driven.run import run
+    >>> from graphsynth.dynamics.driven.setup import Plant
+    >>> from graphsynth.dynamics.motors import DCMotor, Train
+    >>> plant = Plant(EffectiveInertia.of_slider(2.0, 0.05).rows, 0.002)
     >>> motor = DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0)
-    >>> run = MotorDrivenPlatform.source(motor).simulate(np.linspace(0.0, 1.0, 101))
-    >>> drive_curves({"1 ohm": run}).axes[1].get_ylabel()
+    >>> found = run(plant, motor, Train(), np.linspace(0.0, 1.0, 101))
+    >>> drive_curves({"1 ohm": found}).axes[1].get_ylabel()
     'crank speed [rad/s]'
     """
     if not runs:

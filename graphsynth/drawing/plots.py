@@ -65,24 +65,9 @@ class Mark:
 class Chart:
     """Curves over one axis, as data: written as themed SVG, drawn on axes of a user's figure, or saved.
 
-    Parameters
-    ----------
-    lines : sequence of Line
-    xlabel, ylabel : str
-        With units.
-    bands : sequence of Band
-        Shaded ranges of x.
-    marks : sequence of Mark
-        Events.
-    levels : sequence of Line
-        Horizontal thresholds; only the first value of `y` is used, `x` is ignored.
-    xticks : sequence of float, optional
-    equal : bool
-        The same scale on both axes, for paths.
-    in_pi : bool
-        Mark the x axis in quarters of a turn: 0, pi/2, pi, ...
-    size : tuple of float
-        Inches; an SVG scales with the page.
+    `xlabel`, `ylabel`: with units. `bands`: shaded ranges of x. `marks`: events. `levels`: horizontal thresholds; only
+    the first value of `y` is used, `x` is ignored. `equal`: the same scale on both axes, for paths. `in_pi`: mark the x
+    axis in quarters of a turn: 0, pi/2, pi, ... `size`: inches; an SVG scales with the page.
     """
 
     lines: Sequence[Line]

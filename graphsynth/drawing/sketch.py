@@ -25,26 +25,11 @@ _CHAIN = (8.0, 3.0, 2.0, 3.0)  # dash-dotted: pitch circles
 class Sketch:
     """A list of shapes, and the part of the plane they are shown in.
 
-    Parameters
-    ----------
-    lower, upper : complex
-        Opposite corners of the part of the plane shown, in the units of the mechanism.
-    width : float
-        Width of the picture in pixels; the height follows from the aspect ratio.
-    margin : float
-        Free space around, in pixels, for symbols and labels.
-    title : str
-        Read out by screen readers.
-    symbol : float
-        Scale of symbols and line widths; below 1 for small pictures.
+    `lower`, `upper`: opposite corners of the part of the plane shown, in the units of the mechanism. `width`: width of
+    the picture in pixels; the height follows from the aspect ratio. `margin`: free space around, in pixels, for symbols
+    and labels. `title`: read out by screen readers. `symbol`: scale of symbols and line widths; below 1 for small
+    pictures. Raises `ValueError` if the box is empty or not finite.
 
-    Raises
-    ------
-    ValueError
-        If the box is empty or not finite.
-
-    Examples
-    --------
     >>> s = Sketch(0j, 2 + 1j, width=200)
     >>> s.bar(0j, 2 + 1j); s.ground(0j); s.joint(2 + 1j)
     >>> s.svg().startswith("<svg")
@@ -224,10 +209,7 @@ class Sketch:
     def svg(self, pose: Sequence[Sequence[float]] | None = None) -> str:
         """Return the picture as one ``<svg>`` element that needs nothing else.
 
-        Parameters
-        ----------
-        pose : sequence of (x, y, theta), optional
-            Where every link is; needed if any shape is fixed to a link.
+        `pose`: where every link is; needed if any shape is fixed to a link.
         """
         place = placement(pose)
         body = [self._element(shape, place) for shape in self.ordered()]

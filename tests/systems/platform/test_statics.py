@@ -13,8 +13,7 @@ from graphsynth.systems.platform.maps import platform_map, quality
 from graphsynth.systems.platform.parallel_platform import WORKING_MODES, ParallelPlatform
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 from graphsynth.systems.platform.singular_loci import type_two_curves
-from graphsynth.systems.platform.singularity import singularity, singularity_distance
-from graphsynth.systems.platform.statics import crank_statics, statics
+from graphsynth.systems.platform.singularity import crank_statics, singularity, singularity_distance, statics
 from graphsynth.systems.platform.workspace import constant_orientation_workspace
 
 G1, MOCK = ParallelPlatform.g1(), ParallelPlatform.mock()
