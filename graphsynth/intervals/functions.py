@@ -270,7 +270,7 @@ def pi() -> Interval:
     >>> pi()
     Interval([3.141592653589793, 3.1415926535897936])
     """
-    from graphsynth.intervals.constants import PI
+    from graphsynth.intervals.kernels.double_double import PI
 
     return _make(*PI)
 

@@ -18,9 +18,9 @@ Array = NDArray[np.float64]
 @cache
 def _loop(name: str) -> Callable[..., None]:
     """Return a compiled loop; it is loaded when the first operation asks."""
-    from graphsynth.intervals.kernels import elementary, loops
+    from graphsynth.intervals.kernels import loops
 
-    found: Callable[..., None] = getattr(loops, name, None) or getattr(elementary, name)
+    found: Callable[..., None] = getattr(loops, name)
     return found
 
 

@@ -225,8 +225,8 @@ def _arrays(tracker: Tracker, trace: Trace) -> tuple[Array, Array, Array, Array,
     """Poses with continuous angles, derivatives, margins and modes by group; NaN beyond the samples reached."""
     program, n = tracker.program, trace.done
     angle = np.arctan2(trace.X[:, :, 3], trace.X[:, :, 2])
-    kept = np.where(program.need_angle, trace.TH, angle)
-    kept[:n] = np.where(program.need_angle, kept[:n], np.unwrap(kept[:n], axis=0) if n else kept[:n])
+    kept = np.where(program.tables.need_angle, trace.TH, angle)
+    kept[:n] = np.where(program.tables.need_angle, kept[:n], np.unwrap(kept[:n], axis=0) if n else kept[:n])
     if n and tracker.turned is not None:
         kept[:n] += math.tau * np.round((tracker.turned - kept[0]) / math.tau)
     poses = np.concatenate([trace.X[:, :, :2], kept[:, :, None]], axis=2)

@@ -11,7 +11,8 @@ equations for the kernels stand in ``ROWS`` of `graphsynth.kinematics.engine.pro
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
 from graphsynth.core.checks import Point, checked, finite, link_number, point, positive
@@ -25,6 +26,7 @@ COLUMNS = ("ax", "ay", "a_angle", "bx", "by", "b_angle", "radius_a", "radius_b",
 
 
 _HARMONICS_MAX = 1024
+_CHECKS: dict[str, Callable[[str, Any], Any]] = {"at_": point, "angle": finite, "offset": finite, "radius": positive}
 
 
 @dataclass(frozen=True)
@@ -37,15 +39,16 @@ class PlanarJoint:
     mobility: ClassVar[int] = 1
     kind: ClassVar[str] = ""
 
-    def _check(self, points: tuple[str, ...], angles: tuple[str, ...]) -> None:
+    def __post_init__(self) -> None:
         for name in ("a", "b"):
             object.__setattr__(self, name, link_number(f"link {name} of a joint", getattr(self, name)))
         if self.a == self.b:
             raise GeometryError(f"link {self.a} cannot be jointed to itself; name two links")
-        for name in points:
-            object.__setattr__(self, name, point(f"{name} of joint {self.a}-{self.b}", getattr(self, name)))
-        for name in angles:
-            object.__setattr__(self, name, finite(f"{name} of joint {self.a}-{self.b}", getattr(self, name)))
+        for item in fields(self):  # points, angles and radii are told by their names
+            check = next((_CHECKS[start] for start in _CHECKS if item.name.startswith(start)), None)
+            if check is not None:
+                value = check(f"{item.name} of joint {self.a}-{self.b}", getattr(self, item.name))
+                object.__setattr__(self, item.name, value)
 
     def values(self, at: Seen) -> list[Any]:
         """Left sides of the equations, in the arithmetic of ``at``."""
@@ -59,6 +62,12 @@ class PlanarJoint:
         """Return what a whole turn of the angle in each equation adds to it, in turns; empty where there is none."""
         return [()] * (3 - self.mobility)
 
+    def row(self) -> tuple[float, ...]:
+        """Numbers in the order of `COLUMNS`, zeros where the joint has none."""
+        places = dict(zip(("ax", "ay", "bx", "by"), (*vars(self)["at_a"], *vars(self)["at_b"])))
+        own = {"a_angle": "angle_a", "b_angle": "angle_b"}
+        return tuple(places.get(name, getattr(self, own.get(name, name), 0.0)) for name in COLUMNS)
+
     @property
     def pair(self) -> tuple[int, int]:
         """The two links, ascending."""
@@ -67,15 +76,12 @@ class PlanarJoint:
 
 @dataclass(frozen=True)
 class Revolute(PlanarJoint):
-    """Turning pair: the point ``at_a`` of link a and the point ``at_b`` of link b coincide (two equations)."""
+    """Revolute joint: the point ``at_a`` of link a and the point ``at_b`` of link b coincide (two equations)."""
 
     at_a: Point = (0.0, 0.0)
     at_b: Point = (0.0, 0.0)
 
     kind: ClassVar[str] = "R"
-
-    def __post_init__(self) -> None:
-        self._check(("at_a", "at_b"), ())
 
     def values(self, at: Seen) -> list[Any]:
         """``d = 0``."""
@@ -91,14 +97,10 @@ class Revolute(PlanarJoint):
         """Angle of link b against link a, up to whole turns."""
         return at.angle_b - at.angle_a, Gradient(None, -1.0, 1.0)
 
-    def row(self) -> tuple[float, ...]:
-        """Numbers in the order of `COLUMNS`."""
-        return (*self.at_a, 0.0, *self.at_b, 0.0, 0.0, 0.0, 0.0, 0.0)
-
 
 @dataclass(frozen=True)
 class Prismatic(PlanarJoint):
-    """Sliding pair: ``at_b`` stays on the line of link a, and the two directions stay parallel (two equations).
+    """Prismatic joint: ``at_b`` stays on the line of link a, and the two directions stay parallel (two equations).
 
     The line passes through ``at_a`` in the direction ``angle_a``; ``theta_a + angle_a = theta_b + angle_b``.  The
     displacement is that of ``at_b`` from ``at_a`` along the direction.
@@ -110,9 +112,6 @@ class Prismatic(PlanarJoint):
     angle_b: float = 0.0
 
     kind: ClassVar[str] = "P"
-
-    def __post_init__(self) -> None:
-        self._check(("at_a", "at_b"), ("angle_a", "angle_b"))
 
     def values(self, at: Seen) -> list[Any]:
         """``t x d = 0`` and ``theta_b + angle_b - theta_a - angle_a = 0``."""
@@ -134,10 +133,6 @@ class Prismatic(PlanarJoint):
         t = at.line(self.angle_a)
         return at.plane.dot(t, at.d), Gradient(t, at.plane.cross(t, at.d))
 
-    def row(self) -> tuple[float, ...]:
-        """Numbers in the order of `COLUMNS`."""
-        return (*self.at_a, self.angle_a, *self.at_b, self.angle_b, 0.0, 0.0, 0.0, 0.0)
-
 
 @dataclass(frozen=True)
 class PinSlot(PlanarJoint):
@@ -150,9 +145,6 @@ class PinSlot(PlanarJoint):
     mobility: ClassVar[int] = 2
     kind: ClassVar[str] = "pin-slot"
 
-    def __post_init__(self) -> None:
-        self._check(("at_a", "at_b"), ("angle_a",))
-
     def values(self, at: Seen) -> list[Any]:
         """``t x d = 0``."""
         return [at.plane.cross(at.line(self.angle_a), at.d)]
@@ -160,10 +152,6 @@ class PinSlot(PlanarJoint):
     def gradients(self, at: Seen) -> list[Gradient]:
         """Return the derivatives; the line turns with link a."""
         return [_across(at, self.angle_a)]
-
-    def row(self) -> tuple[float, ...]:
-        """Numbers in the order of `COLUMNS`."""
-        return (*self.at_a, self.angle_a, *self.at_b, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -188,10 +176,7 @@ class Gear(PlanarJoint):
     kind: ClassVar[str] = "gear"
 
     def __post_init__(self) -> None:
-        self._check(("at_a", "at_b"), ("offset",))
-        for name in ("radius_a", "radius_b"):
-            value = positive(f"{name} of gear {self.a}-{self.b}", getattr(self, name))
-            object.__setattr__(self, name, value)
+        super().__post_init__()
         if not isinstance(self.internal, bool):
             raise GeometryError(f"internal = {self.internal!r} of gear {self.a}-{self.b} must be true or false")
         if self.internal and self.radius_a == self.radius_b:
@@ -224,10 +209,6 @@ class Gear(PlanarJoint):
         """Return what a turn of the line of centres adds."""
         return [(self.radius_a, self.sign * self.radius_b)]
 
-    def row(self) -> tuple[float, ...]:
-        """Numbers in the order of `COLUMNS`."""
-        return (*self.at_a, 0.0, *self.at_b, 0.0, self.radius_a, self.radius_b, self.sign, self.offset)
-
 
 @dataclass(frozen=True)
 class Cam(PlanarJoint):
@@ -249,15 +230,19 @@ class Cam(PlanarJoint):
     kind: ClassVar[str] = "cam"
 
     def __post_init__(self) -> None:
-        self._check(("at_a", "at_b"), ("angle_a",))
+        super().__post_init__()
         name = f"of cam {self.a}-{self.b}"
-        object.__setattr__(self, "radius", positive(f"radius {name}", self.radius))
         object.__setattr__(self, "harmonics", _harmonics(self.harmonics, name))
         least = self._least_radius()
         if not least > 0.0:
             raise GeometryError(
                 f"the pitch curve {name} has the radius {least:.6g} somewhere; make it positive everywhere"
             )
+
+    @property
+    def radius_a(self) -> float:
+        """The mean radius, in the column of the first radius; harmonics are the joint's own."""
+        return self.radius
 
     def _least_radius(self) -> float:
         """Return a bound of the radius if that is positive, else the least value at many angles (estimated)."""
@@ -304,10 +289,6 @@ class Cam(PlanarJoint):
             first += k * (s * cosine - c * sine)
             second -= k * k * (c * cosine + s * sine)
         return value, first, second
-
-    def row(self) -> tuple[float, ...]:
-        """Numbers in the order of `COLUMNS` (the mean radius as the first; harmonics are the joint's own)."""
-        return (*self.at_a, self.angle_a, *self.at_b, 0.0, self.radius, 0.0, 0.0, 0.0)
 
 
 def _harmonics(given: Any, name: str) -> tuple[Point, ...]:

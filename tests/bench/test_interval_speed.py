@@ -103,7 +103,7 @@ def test_operation(benchmark, name):
 
 @pytest.mark.parametrize("name", ["sin", "cos", "tan", "atan", "asin", "acos", "exp", "log"])
 def test_function(benchmark, name):
-    from graphsynth.intervals.kernels import elementary
+    from graphsynth.intervals.kernels import loops
 
     count = 20_000 if benchmark.enabled else 500
     (lo, _), _ = operands(count)
@@ -117,7 +117,7 @@ def test_function(benchmark, name):
         others["flint"] = (lambda: [getattr(v, name)() for v in balls], SMALL)
         numpy_name = {"atan": "arctan", "asin": "arcsin", "acos": "arccos"}.get(name, name)
         others["plain numpy"] = (lambda: getattr(np, numpy_name)(x), count)
-    timed(benchmark, lambda: getattr(elementary, name)(x, x, low, high), count, **others)
+    timed(benchmark, lambda: getattr(loops, name)(x, x, low, high), count, **others)
     assert (low <= high).all()
 
 
@@ -211,7 +211,7 @@ def own_times(count, seconds):
     import interval_peers as same
 
     from graphsynth.intervals import krawczyk, pave_compiled
-    from graphsynth.intervals.kernels import arithmetic as ia, elementary, krawczyk as compiled, loops
+    from graphsynth.intervals.kernels import arithmetic as ia, krawczyk as compiled, loops
     from graphsynth.jamming.intersection.boxes import krawczyk_boxes
     from graphsynth.jamming.intersection.hull import circle_ellipse
 
@@ -247,7 +247,7 @@ def own_times(count, seconds):
     rows = [
         ("add", "kernel", lambda: loops.add(*a, *b, lo, hi), count),
         ("multiply", "kernel", lambda: loops.multiply(*a, *b, lo, hi), count),
-        ("sin", "kernel", lambda: elementary.sin(*a, lo, hi), count),
+        ("sin", "kernel", lambda: loops.sin(*a, lo, hi), count),
         ("krawczyk", "kernel", lambda: compiled.krawczyk_boxes(
             crossing, low, high, pl, ph, out_lo, out_hi, status), many),
         ("krawczyk", "image of many boxes", lambda: image(general, boxes, p), many),

@@ -261,7 +261,7 @@ def test_a_dyad_that_cannot_be_assembled_on_a_stretch_in_the_first_step() -> Non
 def test_rates_of_a_link_that_slides_on_two_others_that_move(seed: int, link: int) -> None:
     """Velocities and accelerations are the differences of the poses, to the second order of their step."""
     mechanism = random_mechanism(np.random.default_rng(seed))
-    eliminated = compile_program(mechanism).eliminated
+    eliminated = compile_program(mechanism).tables.eliminated
     assert (E_PP, link) in {(int(kind), int(e)) for kind, e in eliminated[:, :2]}
     h = 1e-4
     motion = simulate(mechanism, h * np.arange(5.0), events=False)

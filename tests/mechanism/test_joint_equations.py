@@ -41,7 +41,7 @@ class Rod(joints.PlanarJoint):
     kind: ClassVar[str] = "rod"
 
     def __post_init__(self):
-        self._check(("at_a", "at_b"), ())
+        super().__post_init__()
         object.__setattr__(self, "length", positive("length", self.length))
 
     def row(self):

@@ -161,7 +161,7 @@ class OneCoordinateForm:
             target[...] = source
         self.S.u[0] = theta
         for link in self.compiled.moving:
-            if not self.program.need_angle[link]:
+            if not self.program.tables.need_angle[link]:
                 self.trace.TH[0, link] = poses[link, 2]
 
     def begin(self) -> Array:
@@ -335,16 +335,7 @@ def engine_tables(tracker: Tracker) -> EngineTables:
     p = tracker.program
     empty4, empty3, none = np.empty((0, 0, 0, 0)), np.empty((0, 0, 0)), np.empty(0, np.int64)
     return EngineTables(
-        p.step_table,
-        p.touched,
-        p.rows,
-        p.row_table,
-        p.core,
-        p.eliminated,
-        p.eliminated_table,
-        p.drives,
-        p.drive_table,
-        p.need_angle,
+        *p.tables,
         np.ones(p.mechanism.graph.links, dtype=np.bool_),
         tracker.modes,
         empty3,

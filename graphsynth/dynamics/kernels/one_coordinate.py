@@ -4,6 +4,7 @@ import math
 
 from graphsynth.core.compilation import kernel
 from graphsynth.dynamics.kernels.systems import combined, finish, load_vector, state_rows
+from graphsynth.kinematics.engine.codes import Delivery, State, Tables
 from graphsynth.kinematics.engine.kernels.rows import nearest_turn
 from graphsynth.kinematics.engine.kernels.running import run
 
@@ -52,9 +53,10 @@ def one_coordinate_stages(T, E, S, centres, applied, y, h, A, K, low, high, out)
         S.q[0, 3, 1], S.q[0, 4, 1] = math.cos(theta), math.sin(theta)
         S.done[0] = 0
         # E.first and E.derivs are data: literal numbers would make a second copy of the whole engine
-        run(E.steps, E.touched, E.rows, E.RP, E.core, E.elim, E.EP, E.drv, E.DP, E.need, E.wanted, S.q, S.u, E.modes,
-            E.poses, E.centres, S.X, S.TH, S.V, S.W, S.PHI, S.M, E.kept, E.groups, E.OX, E.OV, E.OW, E.OM,
-            S.done, S.why, E.first, E.Lc, E.far, E.derivs)  # fmt: skip
+        tables = Tables(E.steps, E.touched, E.rows, E.RP, E.core, E.elim, E.EP, E.drv, E.DP, E.need)
+        found = State(S.X, S.TH, S.V, S.W, S.PHI, S.M)
+        kept = Delivery(E.poses, E.centres, E.kept, E.groups, E.OX, E.OV, E.OW, E.OM)
+        run(tables, E.wanted, S.q, S.u, E.modes, found, kept, S.done, S.why, E.first, (E.Lc, E.far), E.derivs)
         # no rates where the engine does not reach
         for i in range(K.shape[1]):
             K[s, i] = math.nan

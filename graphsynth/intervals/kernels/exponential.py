@@ -7,16 +7,15 @@ import numpy as np
 
 from graphsynth.core.compilation import kernel
 from graphsynth.core.intrinsics import fma
-from graphsynth.intervals import constants
 from graphsynth.intervals.kernels import double_double as dd
 from graphsynth.intervals.kernels.rounding import ETA, INF, MAX, add_down, add_up, multiply_both, root_down, root_up, up
 
-_LOG2 = Fraction(constants.log2_fixed(300), 2**300)
+_LOG2 = Fraction(dd.log2_fixed(300), 2**300)
 _TOP = float(Fraction(int(_LOG2 * 2**40), 2**40))  # 40 bits: its products with exponents are exact
-_MID, _LOW = constants.split(_LOG2 - Fraction(_TOP))
-_LOG2_H, _LOG2_L = constants.split(_LOG2)
-_EXP = np.array([constants.split(Fraction(1, factorial(k))) for k in range(21)])
-_ODD = np.array([constants.split(Fraction(2, 2 * k + 1)) for k in range(20)])
+_MID, _LOW = dd.split(_LOG2 - Fraction(_TOP))
+_LOG2_H, _LOG2_L = dd.split(_LOG2)
+_EXP = np.array([dd.split(Fraction(1, factorial(k))) for k in range(21)])
+_ODD = np.array([dd.split(Fraction(2, 2 * k + 1)) for k in range(20)])
 _EXP_EXACT, _LOG_EXACT = 10, 7
 RELATIVE = 2.0**-66
 

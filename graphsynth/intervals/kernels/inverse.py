@@ -9,15 +9,14 @@ from fractions import Fraction
 import numpy as np
 
 from graphsynth.core.compilation import kernel
-from graphsynth.intervals import constants
 from graphsynth.intervals.kernels import double_double as dd
 from graphsynth.intervals.kernels.rounding import INF, divide_both, down, up
 
-_TABLE = np.array([constants.split(Fraction(constants.atan_fixed(k, 16, 256), 2**256)) for k in range(17)])
-_ODD = np.array([constants.split(Fraction((-1) ** k, 2 * k + 1)) for k in range(12)])
-_PI_H, _PI_L = constants.split(Fraction(constants.pi_fixed(256), 2**256))
+_TABLE = np.array([dd.split(Fraction(dd.atan_fixed(k, 16, 256), 2**256)) for k in range(17)])
+_ODD = np.array([dd.split(Fraction((-1) ** k, 2 * k + 1)) for k in range(12)])
+_PI_H, _PI_L = dd.split(Fraction(dd.pi_fixed(256), 2**256))
 _HALF_H, _HALF_L = 0.5 * _PI_H, 0.5 * _PI_L
-PI_DOWN, PI_UP = constants.PI
+PI_DOWN, PI_UP = dd.PI
 RELATIVE = 2.0**-68
 _SMALL = 2.0**-27
 

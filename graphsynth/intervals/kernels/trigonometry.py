@@ -11,23 +11,22 @@ from math import factorial, frexp
 import numpy as np
 
 from graphsynth.core.compilation import kernel
-from graphsynth.intervals import constants
 from graphsynth.intervals.kernels import double_double as dd
 from graphsynth.intervals.kernels.rounding import INF, down, up
 
-_WORDS = np.array(constants.two_over_pi_words(42), dtype=np.uint64)
-_HALF_PI_H, _HALF_PI_L = constants.split(Fraction(constants.pi_fixed(256), 2**257))
+_WORDS = np.array(dd.two_over_pi_words(42), dtype=np.uint64)
+_HALF_PI_H, _HALF_PI_L = dd.split(Fraction(dd.pi_fixed(256), 2**257))
 #: pi/2 cut into three pieces of 33 bits, whose products with integers below 2^20 are exact, and the rest.
 _FIRST, _SECOND, _THIRD = (
-    float(Fraction((constants.pi_fixed(256) >> (225 - 33 * k)) % 2**33, 2 ** (32 + 33 * k))) for k in range(3)
+    float(Fraction((dd.pi_fixed(256) >> (225 - 33 * k)) % 2**33, 2 ** (32 + 33 * k))) for k in range(3)
 )
-_REST_H, _REST_L = constants.split(
-    Fraction(constants.pi_fixed(256), 2**257) - Fraction(_FIRST) - Fraction(_SECOND) - Fraction(_THIRD)
+_REST_H, _REST_L = dd.split(
+    Fraction(dd.pi_fixed(256), 2**257) - Fraction(_FIRST) - Fraction(_SECOND) - Fraction(_THIRD)
 )
 _MODERATE = 1e6
 #: Taylor coefficients by rows: high and low part; the first ones are used in double-double, the others as doubles.
-_SIN = np.array([constants.split(Fraction((-1) ** k, factorial(2 * k + 1))) for k in range(13)])
-_COS = np.array([constants.split(Fraction((-1) ** k, factorial(2 * k))) for k in range(14)])
+_SIN = np.array([dd.split(Fraction((-1) ** k, factorial(2 * k + 1))) for k in range(13)])
+_COS = np.array([dd.split(Fraction((-1) ** k, factorial(2 * k))) for k in range(14)])
 _SIN_EXACT, _COS_EXACT = 5, 6
 RELATIVE, ABSOLUTE = 2.0**-68, 2.0**-140
 _SMALL = 2.0**-27
@@ -57,6 +56,7 @@ def reduce(x):
         return 0, 0, 0.0, 0.0
     if abs(x) <= _MODERATE:
         return reduce_moderate(x)
+    # the integer of 53 bits times eight words of 2/pi: those before add whole turns, those after nothing that counts
     fraction, exponent = frexp(abs(x))
     m = np.uint64(np.int64(fraction * 9007199254740992.0))
     e = exponent - 53
@@ -72,6 +72,7 @@ def reduce(x):
         carry = product[j + 1] + m1 * w + (carry >> _32)
         product[j + 1] = carry & _MASK
         product[j + 2] += carry >> _32
+    # shift so that the binary point lies between two words: quadrant before it, fraction after it
     shift = np.uint64((32 - point % 32) % 32)
     unit = (point + 31) // 32
     if shift:

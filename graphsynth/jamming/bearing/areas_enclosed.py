@@ -122,7 +122,7 @@ def _root(x: Interval) -> Interval:
 
 
 def _pi() -> Interval:
-    from graphsynth.intervals.constants import PI
+    from graphsynth.intervals.kernels.double_double import PI
 
     return _bounds(*PI)
 

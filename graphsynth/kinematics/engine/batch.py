@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import finite_array, link_number
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.engine import codes
-from graphsynth.kinematics.engine.follow import Delivery, Tracker, run_program, workspace
+from graphsynth.kinematics.engine.follow import Trace, Tracker, run_program, workspace
 from graphsynth.kinematics.engine.inputs import monotonic, warn_of_degrees
 from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.start import initial, lines_of_centres, sign_table, started, with_turns
@@ -214,7 +214,7 @@ def _starts(
     program: Program, signs: Array, u0: float, modes: Mapping[int, int], start: ArrayLike | None
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Start poses by set, and whether they were found."""
-    sets, links = len(program.row_table), program.mechanism.graph.links
+    sets, links = len(program.tables.row_table), program.mechanism.graph.links
     poses, found = np.zeros((sets, links, 3)), np.ones(sets, dtype=np.bool_)
     given = start if start is not None else program.mechanism.pose
     if given is not None:
@@ -230,9 +230,9 @@ def _starts(
 
 
 def _one_set(program: Program, b: int) -> Program:
-    tables = (program.row_table, program.eliminated_table, program.drive_table)
-    rows, eliminated, drives = (table[b : b + 1] for table in tables)
-    return replace(program, row_table=rows, eliminated_table=eliminated, drive_table=drives)
+    names = ("row_table", "eliminated_table", "drive_table")
+    own = {name: getattr(program.tables, name)[b : b + 1] for name in names}
+    return replace(program, tables=program.tables._replace(**own))
 
 
 def _run(
@@ -251,7 +251,7 @@ def _run(
     groups = np.array([k for k, step in enumerate(program.steps) if step.group >= 0], dtype=np.int64)
     width = n if rates else 0
     links = kept or [program.mechanism.frame]  # the kernel delivers margins with links only
-    out = Delivery(
+    out = codes.Delivery(
         poses,
         centres,
         np.array(links, dtype=np.int64),
@@ -261,8 +261,8 @@ def _run(
         np.empty((sets, len(links), 3, width)),
         np.empty((sets, len(groups), n)),
     )
-    q, memory = Tracker(program, signs).values(u), workspace(program, n, needed)
-    done, why = run_program(program, signs, u, q, memory, 0, needed, _wanted(program, kept), out)
+    trace = Trace(u, Tracker(program, signs).values(u), workspace(program, n, needed))
+    done, why = run_program(program, signs, trace, 0, needed, _wanted(program, kept), out)
     done[~found], why[~found, 0] = 0, codes.UNREACHABLE
     for array in (out.frames, out.velocities, out.accelerations, out.margins):
         array[~found] = np.nan
@@ -277,7 +277,7 @@ def _run(
 def _wanted(program: Program, kept: list[int]) -> NDArray[np.bool_]:
     """Eliminated links that must be placed: those kept, and those that carry something else."""
     wanted = np.zeros(program.mechanism.graph.links, dtype=np.bool_)
-    wanted[kept] = wanted[program.touched] = wanted[program.eliminated[:, 2:4].ravel()] = True
+    wanted[kept] = wanted[program.tables.touched] = wanted[program.tables.eliminated[:, 2:4].ravel()] = True
     return wanted
 
 

@@ -171,10 +171,10 @@ def centres_that_meet(program: Program, stop: Stop) -> Iterator[MotionEvent]:
         return
     trace, k = stop.way.last
     for s, step in enumerate(program.steps[: stop.step + 1]):
-        row0, count = program.step_table[s, 1:3]
+        row0, count = program.tables.steps[s, 1:3]
         for r in range(row0, row0 + count if step.group >= 0 else row0):
-            kind, a, b, _, _ = program.rows[r]
-            p = program.row_table[0, r]
+            kind, a, b, _, _ = program.tables.rows[r]
+            p = program.tables.row_table[0, r]
             A, A1 = _moving(trace, k, a, complex(*p[codes.PAX : codes.PAY + 1]))
             B, B1 = _moving(trace, k, b, complex(*p[codes.PBX : codes.PBY + 1]))
             d, d1 = B - A, B1 - A1

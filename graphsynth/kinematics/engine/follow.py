@@ -75,7 +75,7 @@ class Trace:
 
     u: Array
     q: Array
-    memory: tuple[Array, ...]
+    memory: codes.State
     done: int = 0
     stop: Stop | None = field(default=None)
 
@@ -90,7 +90,8 @@ class Trace:
 
     def angles(self, program: Program, k: int) -> Array:
         """Angle of every link at sample k: with its turns where gears count them."""
-        return np.where(program.need_angle, self.TH[k], np.arctan2(self.X[k, :, 3], self.X[k, :, 2]))
+        angle: Array = np.where(program.tables.need_angle, self.TH[k], np.arctan2(self.X[k, :, 3], self.X[k, :, 2]))
+        return angle
 
 
 class Tracker:
@@ -127,7 +128,7 @@ class Tracker:
 
     def run(self, trace: Trace, first: int, derivs: bool = True) -> tuple[int, int, int]:
         """Run the kernel from sample ``first``."""
-        found = run_program(self.program, self.modes, trace.u, trace.q, trace.memory, first, derivs)
+        found = run_program(self.program, self.modes, trace, first, derivs)
         return int(found[0][0]), int(found[1][0, 0]), int(found[1][0, 1])
 
     def follow(self, u: Array, poses: Array, phi: Array | None = None) -> Trace:
@@ -199,7 +200,7 @@ class Tracker:
             new = [part[..., 1:] for part in parts]
             return np.concatenate([whole[..., : k + 1], *new, whole[..., k + 1 :]], axis=-1)
 
-        memory = tuple(joined(*parts) for parts in zip(trace.memory, *(pair.memory for pair in pairs)))
+        memory = codes.State(*(joined(*parts) for parts in zip(trace.memory, *(pair.memory for pair in pairs))))
         u, q = joined(trace.u, *(pair.u for pair in pairs)), joined(trace.q, *(pair.q for pair in pairs))
         return Trace(u, q, memory, trace.done + len(pairs), trace.stop)
 
@@ -236,100 +237,35 @@ class Tracker:
         return Stop(why, where, here, abs(2.0 * step), Way(u, M, np.hypot(X[:, :, 0], X[:, :, 1]), (source, at)))
 
 
-def workspace(program: Program, n: int, derivs: bool = True) -> tuple[Array, ...]:
-    """State of every link over n samples, at the origin: X, TH, V, W, PHI, M, with the sample as last axis."""
+def workspace(program: Program, n: int, derivs: bool = True) -> codes.State:
+    """State of every link over n samples, at the origin."""
     links = program.mechanism.graph.links
-    X = np.zeros((links, 4, n))
+    X, TH, PHI = np.zeros((links, 4, n)), np.zeros((links, n)), np.zeros((max(1, len(program.gears)), n))
     X[:, 2] = 1.0
     V, W = (np.zeros((links, 3, n if derivs else 0)) for _ in range(2))
-    return (
-        X,
-        np.zeros((links, n)),
-        V,
-        W,
-        np.zeros((max(1, len(program.gears)), n)),
-        np.full((len(program.steps), n), np.nan),
-    )
+    return codes.State(X, TH, V, W, PHI, np.full((len(program.steps), n), np.nan))
 
 
-@dataclass(frozen=True)
-class Delivery:
-    """What a run keeps of every dimension set: links, steps, where the arrays go.
-
-    It starts from poses (sets, links, 3) and directions of lines of centres (sets, gears).
-    """
-
-    poses: Array
-    centres: Array
-    links: NDArray[np.int64]
-    steps: NDArray[np.int64]
-    frames: Array
-    velocities: Array
-    accelerations: Array
-    margins: Array
-
-
-_NOWHERE = np.empty((0, 0, 0, 0))
-_NOTHING = Delivery(
-    np.empty((0, 0, 0)),
-    np.empty((0, 0)),
-    np.empty(0, np.int64),
-    np.empty(0, np.int64),
-    _NOWHERE,
-    _NOWHERE,
-    _NOWHERE,
-    np.empty((0, 0, 0)),
-)
+_NOWHERE, _NOTHING = np.empty((0, 0, 0)), np.empty(0, np.int64)
+_FRAMES = np.empty((0, 0, 0, 0))
+_KEPT = codes.Delivery(_NOWHERE, np.empty((0, 0)), _NOTHING, _NOTHING, _FRAMES, _FRAMES, _FRAMES, _NOWHERE)
 
 
 def run_program(
     program: Program,
     modes: Array,
-    u: Array,
-    q: Array,
-    memory: tuple[Array, ...],
+    trace: Trace,
     first: int,
     derivs: bool,
     wanted: NDArray[np.bool_] | None = None,
-    delivery: Delivery = _NOTHING,
+    delivery: codes.Delivery = _KEPT,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Run the kernel for every dimension set; returns samples reached, and code and step of the stop."""
     from graphsynth.kinematics.engine import kernels
 
-    sets = len(program.row_table)
+    sets, sizes = len(program.tables.row_table), (program.Lc, program.far)
     done, why = np.zeros(sets, dtype=np.int64), np.zeros((sets, 2), dtype=np.int64)
-    if wanted is None:
-        wanted = np.ones(program.mechanism.graph.links, dtype=np.bool_)
-    out = delivery
-    kernels.run(
-        program.step_table,
-        program.touched,
-        program.rows,
-        program.row_table,
-        program.core,
-        program.eliminated,
-        program.eliminated_table,
-        program.drives,
-        program.drive_table,
-        program.need_angle,
-        wanted,
-        q,
-        u,
-        modes,
-        out.poses,
-        out.centres,
-        *memory,
-        out.links,
-        out.steps,
-        out.frames,
-        out.velocities,
-        out.accelerations,
-        out.margins,
-        done,
-        why,
-        first,
-        program.Lc,
-        program.far,
-        derivs,
-    )
+    every = np.ones(program.mechanism.graph.links, dtype=np.bool_) if wanted is None else wanted
+    q, u, state = trace.q, trace.u, trace.memory
+    kernels.run(program.tables, every, q, u, modes, state, delivery, done, why, first, sizes, derivs)
     return done, why

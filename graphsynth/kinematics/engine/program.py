@@ -98,24 +98,14 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """Flat tables that the kernels run, and what they mean; parameter tables have the dimension sets as first axis.
+    """Flat tables that the kernels run, and what they mean; ``gears`` are the rows of gear pairs.
 
     ``Lc`` is the characteristic length; an origin farther out than ``far`` belongs to a link that has gone away.
     """
 
     mechanism: Mechanism
-    decomposition: Decomposition
     steps: tuple[Step, ...]
-    step_table: IntArray
-    touched: IntArray
-    rows: IntArray
-    row_table: Array
-    core: IntArray
-    eliminated: IntArray
-    eliminated_table: Array
-    drives: IntArray
-    drive_table: Array
-    need_angle: NDArray[np.bool_]
+    tables: codes.Tables
     gears: IntArray
     Lc: float
     far: float
@@ -183,11 +173,8 @@ class _Compiler:
             if isinstance(joint, Gear):
                 need[[joint.a, joint.b]] = True
         Lc, drawn = characteristic_length(self.mechanism), np.abs(self.mechanism.dimensions[:, _LENGTHS])
-        return Program(
-            mechanism=self.mechanism,
-            decomposition=self.found,
-            steps=tuple(self.steps),
-            step_table=_ints(self.table, 10),
+        tables = codes.Tables(
+            steps=_ints(self.table, 10),
             touched=np.array(self.touched or [0], dtype=np.int64),
             rows=_ints(self.rows, 5),
             row_table=self._floats(self.row_parameters, codes.ROW_WIDTH),
@@ -197,10 +184,9 @@ class _Compiler:
             drives=_ints(self.drives, 4),
             drive_table=self._floats(self.drive_parameters, codes.DRIVE_WIDTH),
             need_angle=need,
-            gears=np.array(self.gears, dtype=np.int64),
-            Lc=Lc,
-            far=links * Lc + 4.0 * float(drawn.max(initial=0.0)),
         )
+        gears, far = np.array(self.gears, dtype=np.int64), links * Lc + 4.0 * float(drawn.max(initial=0.0))
+        return Program(self.mechanism, tuple(self.steps), tables, gears, Lc, far)
 
     def _place_driven(self, placed: set[int]) -> None:
         """Place the links that drivers hang on the frame, one after another."""

@@ -92,8 +92,8 @@ def lines_of_centres(program: Program, poses: Array) -> Array:
     """
     if not len(program.gears):
         return np.zeros((len(poses), 1))
-    _, a, b, _, _ = program.rows[program.gears].T
-    p, theta = program.row_table[:, program.gears], poses[..., 2]
+    _, a, b, _, _ = program.tables.rows[program.gears].T
+    p, theta = program.tables.row_table[:, program.gears], poses[..., 2]
     place, turn = poses[..., 0] + 1j * poses[..., 1], np.exp(1j * theta)
     on_a = place[:, a] + turn[:, a] * (p[..., codes.PAX] + 1j * p[..., codes.PAY])
     on_b = place[:, b] + turn[:, b] * (p[..., codes.PBX] + 1j * p[..., codes.PBY])
@@ -109,11 +109,11 @@ def with_turns(program: Program, poses: Array, q: Array) -> Program:
     """
     if not len(program.gears) or not np.isfinite(q).all():
         return program
-    table = program.drive_table.copy()
-    for k, (code, base, link, driver) in enumerate(program.drives):
+    table = program.tables.drive_table.copy()
+    for k, (code, base, link, driver) in enumerate(program.tables.drives):
         angle = table[:, k, 7] + (table[:, k, 6] * q[driver] if code == codes.DRIVE_R else 0.0)
         table[:, k, 7] += math.tau * np.round((poses[:, link, 2] - poses[:, base, 2] - angle) / math.tau)
-    return replace(program, drive_table=table)
+    return replace(program, tables=program.tables._replace(drive_table=table))
 
 
 def initial(tracker: Tracker, u0: float, modes: Mapping[int, int], guess: Array | None) -> tuple[Array, int, int]:
@@ -160,8 +160,8 @@ def group_modes(tracker: Tracker, trace: Trace, k: int) -> Array | None:
     group has a continuum of poses: special dimensions let it move by itself.
     """
     program = tracker.program
-    row0, count = program.step_table[k, 1:3]
-    kinds = program.rows[row0 : row0 + count, 0]
+    row0, count = program.tables.steps[k, 1:3]
+    kinds = program.tables.rows[row0 : row0 + count, 0]
     step = program.steps[k]
     if len(step.core) == 1 and (kinds == codes.DIST).all():
         return _platform_modes(program, trace, k)
@@ -175,16 +175,16 @@ def _platform_modes(program: Program, trace: Trace, k: int) -> Array | None:
     from graphsynth.kinematics.triad.assembly_modes import assembly_modes
 
     own = program.steps[k].core[0]
-    row0, count = program.step_table[k, 1:3]
+    row0, count = program.tables.steps[k, 1:3]
     anchors, vertices, lengths = [], [], []
     for r in range(row0, row0 + count):
-        _, a, b, _, _ = program.rows[r]
-        pa, pb = complex(*program.row_table[0, r, 0:2]), complex(*program.row_table[0, r, 2:4])
+        _, a, b, _, _ = program.tables.rows[r]
+        pa, pb = complex(*program.tables.row_table[0, r, 0:2]), complex(*program.tables.row_table[0, r, 2:4])
         other, far, near = (b, pb, pa) if a == own else (a, pa, pb)
         x, y, c, s = trace.X[0, other]
         anchors.append(complex(x, y) + complex(c, s) * far)
         vertices.append(near)
-        lengths.append(program.row_table[0, r, codes.H])
+        lengths.append(program.tables.row_table[0, r, codes.H])
     found = assembly_modes(anchors, vertices, lengths)
     return None if found.self_motion else np.asarray(found.poses)[:, None, :]
 
@@ -192,17 +192,14 @@ def _platform_modes(program: Program, trace: Trace, k: int) -> Array | None:
 def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
     from graphsynth.kinematics.engine import kernels
 
-    p = tracker.program
-    row0, count, core0, cores = (int(v) for v in p.step_table[k, 1:5])
-    step = p.steps[k]
+    p, t = tracker.program, tracker.program.tables
+    row0, count, core0, cores = (int(v) for v in t.steps[k, 1:5])
+    step, group = p.steps[k], codes.Group(t.rows, t.row_table[0], row0, count, t.core, core0, cores)
     random = np.random.default_rng(20190 + k)
     reached = trace.X[0, sorted({link for s in p.steps[:k] for link in s.links} | {p.mechanism.frame}), :2]
     centre, size = reached.mean(axis=0), 2.0 * max(p.Lc, float(np.ptp(reached, axis=0).max()))
-    J, f, g, out = np.empty((count, count)), np.empty(count), np.empty(6), np.zeros(4)
-    G = np.empty((count, 6))
-    pivots = np.empty(count, dtype=np.int64)
-    state = np.zeros((p.mechanism.graph.links, 11))
-    phi, q = trace.PHI[0].copy(), np.ascontiguousarray(trace.q[:, :3, 0])
+    room = kernels.make_room(count, p.mechanism.graph.links, len(trace.PHI[0]), len(p.steps), len(trace.q), 1)
+    state, room.phi[:], room.ql[:] = room.x, trace.PHI[0], trace.q[:, :3, 0]
     found: list[Array] = []
     for _ in range(_STARTS * cores):
         state[:, :4], state[:, 4] = trace.X[0], trace.TH[0]
@@ -210,25 +207,7 @@ def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
             angle = random.uniform(-np.pi, np.pi)
             where = centre + random.uniform(-size, size, 2)
             state[link, :5] = (*where, np.cos(angle), np.sin(angle), angle)
-        code = kernels.newton(
-            p.rows,
-            p.row_table[0],
-            row0,
-            count,
-            p.core,
-            core0,
-            cores,
-            state,
-            phi,
-            q,
-            J,
-            f,
-            g,
-            G,
-            pivots,
-            p.Lc,
-            out,
-        )
+        code = kernels.newton(group, state, room.phi, room.ql, room, p.Lc)
         if code:
             continue
         core = state[list(step.core), :4]

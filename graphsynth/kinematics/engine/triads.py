@@ -61,13 +61,13 @@ class Condition(NamedTuple):
 
 def conditions(program: Program, step: int, frames: Array) -> list[Condition] | None:
     """Conditions on the one kept link of a group, from the frames (links, 4) already placed; None if others occur."""
-    row0, count, core0, cores = (int(v) for v in program.step_table[step, 1:5])
+    row0, count, core0, cores = (int(v) for v in program.tables.steps[step, 1:5])
     if cores != 1:
         return None
-    own, found = int(program.core[core0]), []
+    own, found = int(program.tables.core[core0]), []
     for r in range(row0, row0 + count):
-        kind, a, b, _, _ = (int(v) for v in program.rows[r])
-        p = program.row_table[0, r]
+        kind, a, b, _, _ = (int(v) for v in program.tables.rows[r])
+        p = program.tables.row_table[0, r]
         if kind not in (codes.DIST, codes.LINE, codes.ANGLE):
             return None
         pa, pb, line, h = complex(*p[0:2]), complex(*p[2:4]), complex(p[codes.TX], p[codes.TY]), float(p[codes.H])

@@ -7,6 +7,6 @@ arrays with the sample as last axis.
 
 from graphsynth.kinematics.engine.kernels.loops import rrr
 from graphsynth.kinematics.engine.kernels.newton import newton
-from graphsynth.kinematics.engine.kernels.running import run
+from graphsynth.kinematics.engine.kernels.running import make_room, run
 
-__all__ = ["newton", "rrr", "run"]
+__all__ = ["make_room", "newton", "rrr", "run"]

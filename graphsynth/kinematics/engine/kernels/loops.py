@@ -7,22 +7,16 @@ instructions.  ``X[link]`` has the rows x, y, cos theta, sin theta; ``V`` and ``
 import math
 
 from graphsynth.core.compilation import kernel
-from graphsynth.kinematics.engine.codes import DRIVE_R, PAX, PAY, PBX, PBY, H
+from graphsynth.kinematics.engine.codes import DRIVE_R, H
+from graphsynth.kinematics.engine.kernels.rows import ends
 
 
 @kernel
 def dyad_ends(rows, rp, r0, own):
     """Of an RRR dyad: links and points of A and B, the kept link's point at A and its arm to C, the other length."""
-    if rows[r0, 1] == own:
-        la, ax, ay, hx, hy = rows[r0, 2], rp[r0, PBX], rp[r0, PBY], rp[r0, PAX], rp[r0, PAY]
-    else:
-        la, ax, ay, hx, hy = rows[r0, 1], rp[r0, PAX], rp[r0, PAY], rp[r0, PBX], rp[r0, PBY]
-    k = r0 + 2
-    if rows[k, 1] == own:
-        lb, bx, by, ex, ey = rows[k, 2], rp[k, PBX], rp[k, PBY], rp[k, PAX], rp[k, PAY]
-    else:
-        lb, bx, by, ex, ey = rows[k, 1], rp[k, PAX], rp[k, PAY], rp[k, PBX], rp[k, PBY]
-    return la, ax, ay, lb, bx, by, hx, hy, ex - hx, ey - hy, rp[k, H]
+    la, ax, ay, hx, hy = ends(rows, rp, r0, own)
+    lb, bx, by, ex, ey = ends(rows, rp, r0 + 2, own)
+    return la, ax, ay, lb, bx, by, hx, hy, ex - hx, ey - hy, rp[r0 + 2, H]
 
 
 @kernel
@@ -66,11 +60,12 @@ def pinned_rates(L, V, W, vx, vy, wx, wy, hx, hy, i0, i1):
 
 
 @kernel
-def apex(px, py, qx, qy, gx, gy, l2, sign, M, c, s, i0, i1):
+def apex(T, gx, gy, l2, sign, M, c, s, i0, i1):
     """Direction of the link with the arm (gx, gy) from P to the third joint C; ``M`` is sin^2 of the angle at C.
 
-    |CQ| = l2; ``M`` is negative where the circles do not meet.
+    T has P (rows 0, 1) and Q (2, 3); |CQ| = l2; ``M`` is negative where the circles do not meet.
     """
+    px, py, qx, qy = T[0], T[1], T[2], T[3]
     l1 = math.sqrt(gx * gx + gy * gy)
     total, difference, scale = l1 + l2, l1 - l2, 1.0 / (4.0 * l1 * l1 * l2 * l2)
     both = total * difference
@@ -90,8 +85,9 @@ def apex(px, py, qx, qy, gx, gy, l2, sign, M, c, s, i0, i1):
 
 
 @kernel
-def apex_rates(px, py, qx, qy, gx, gy, T, c, s, o, al, i0, i1):
+def apex_rates(T, gx, gy, c, s, o, al, i0, i1):
     """Rates of the angle of that link; T has the velocities and accelerations of P (rows 4..7) and Q (8..11)."""
+    px, py, qx, qy = T[0], T[1], T[2], T[3]
     vx, vy, wx, wy, ux, uy, zx, zy = T[4], T[5], T[6], T[7], T[8], T[9], T[10], T[11]
     for i in range(i0, i1):
         kx, ky = c[i] * gx - s[i] * gy, s[i] * gx + c[i] * gy  # from P to C
@@ -105,8 +101,9 @@ def apex_rates(px, py, qx, qy, gx, gy, T, c, s, o, al, i0, i1):
 
 
 @kernel
-def towards(px, py, qx, qy, gx, gy, c, s, i0, i1):
-    """Direction of a link whose vector (gx, gy) points from P to Q."""
+def towards(T, gx, gy, c, s, i0, i1):
+    """Direction of a link whose vector (gx, gy) points from P to Q; T as for `apex`."""
+    px, py, qx, qy = T[0], T[1], T[2], T[3]
     for i in range(i0, i1):
         dx, dy = qx[i] - px[i], qy[i] - py[i]
         re, im = gx * dx + gy * dy, gx * dy - gy * dx
@@ -115,8 +112,9 @@ def towards(px, py, qx, qy, gx, gy, c, s, i0, i1):
 
 
 @kernel
-def towards_rates(px, py, qx, qy, T, o, al, i0, i1):
+def towards_rates(T, o, al, i0, i1):
     """Rates of the angle of the way from P to Q, of constant length; T as for `apex_rates`."""
+    px, py, qx, qy = T[0], T[1], T[2], T[3]
     vx, vy, wx, wy, ux, uy, zx, zy = T[4], T[5], T[6], T[7], T[8], T[9], T[10], T[11]
     for i in range(i0, i1):
         dx, dy = qx[i] - px[i], qy[i] - py[i]
@@ -156,8 +154,9 @@ def slid_rates(L, V, W, Q, px, py, tx, ty, T, i0, i1):
 
 
 @kernel
-def drive_loop(d, p, r, q, X, TH, V, W, T, i0, i1, derivs, angles):
+def drive_loop(d, p, r, q, state, T, i0, i1, derivs, angles):
     """Place a driven link from the link it is driven on; T is room for twelve rows."""
+    X, TH, V, W = state.X, state.TH, state.V, state.W
     base, link, k = d[r, 1], d[r, 2], d[r, 3]
     px, py, sign, angle = p[r, 0], p[r, 1], p[r, 6], p[r, 7]
     ca, sa = math.cos(angle), math.sin(angle)
@@ -186,34 +185,36 @@ def drive_loop(d, p, r, q, X, TH, V, W, T, i0, i1, derivs, angles):
 
 
 @kernel
-def rrr_loop(rows, rp, r0, own, sign, X, V, W, M, T, i0, i1, derivs):
+def rrr_loop(group, sign, state, M, T, i0, i1, derivs):
     """Place the kept link of an RRR dyad; T is room for twelve rows."""
-    la, ax, ay, lb, bx, by, hx, hy, gx, gy, l2 = dyad_ends(rows, rp, r0, own)
+    X, V, W, own = state.X, state.V, state.W, group.core[group.c0]
+    la, ax, ay, lb, bx, by, hx, hy, gx, gy, l2 = dyad_ends(group.rows, group.rp, group.r0, own)
     L = X[own]
     carried(X[la], ax, ay, T[0], T[1], i0, i1)
     carried(X[lb], bx, by, T[2], T[3], i0, i1)
-    apex(T[0], T[1], T[2], T[3], gx, gy, l2, sign, M, L[2], L[3], i0, i1)
+    apex(T, gx, gy, l2, sign, M, L[2], L[3], i0, i1)
     pinned(L, T[0], T[1], hx, hy, i0, i1)
     if derivs:
         carried_rates(X[la], V[la], W[la], ax, ay, T[4], T[5], T[6], T[7], i0, i1)
         carried_rates(X[lb], V[lb], W[lb], bx, by, T[8], T[9], T[10], T[11], i0, i1)
-        apex_rates(T[0], T[1], T[2], T[3], gx, gy, T, L[2], L[3], V[own, 2], W[own, 2], i0, i1)
+        apex_rates(T, gx, gy, L[2], L[3], V[own, 2], W[own, 2], i0, i1)
         pinned_rates(L, V[own], W[own], T[4], T[5], T[6], T[7], hx, hy, i0, i1)
 
 
 @kernel
-def bar_loop(e, a, b, p, r, X, V, W, T, i0, i1, derivs):
+def bar_loop(e, a, b, p, r, state, T, i0, i1, derivs):
     """Place a link with two turning pairs between placed links a and b; T is room for twelve rows."""
+    X, V, W = state.X, state.V, state.W
     L = X[e]
     ax, ay, hx, hy, bx, by = p[r, 0], p[r, 1], p[r, 2], p[r, 3], p[r, 4], p[r, 5]
     carried(X[a], ax, ay, T[0], T[1], i0, i1)
     carried(X[b], bx, by, T[2], T[3], i0, i1)
-    towards(T[0], T[1], T[2], T[3], p[r, 6] - hx, p[r, 7] - hy, L[2], L[3], i0, i1)
+    towards(T, p[r, 6] - hx, p[r, 7] - hy, L[2], L[3], i0, i1)
     pinned(L, T[0], T[1], hx, hy, i0, i1)
     if derivs:
         carried_rates(X[a], V[a], W[a], ax, ay, T[4], T[5], T[6], T[7], i0, i1)
         carried_rates(X[b], V[b], W[b], bx, by, T[8], T[9], T[10], T[11], i0, i1)
-        towards_rates(T[0], T[1], T[2], T[3], T, V[e, 2], W[e, 2], i0, i1)
+        towards_rates(T, V[e, 2], W[e, 2], i0, i1)
         pinned_rates(L, V[e], W[e], T[4], T[5], T[6], T[7], hx, hy, i0, i1)
 
 

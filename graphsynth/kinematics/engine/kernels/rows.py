@@ -39,6 +39,22 @@ def world(x, link, px, py):
     return x[link, 0] + c * px - s * py, x[link, 1] + s * px + c * py
 
 
+@kernel
+def ends(rows, rp, k, own):
+    """Of a row: the link that is not ``own`` and its point, and the point of ``own``."""
+    if rows[k, 1] == own:
+        return rows[k, 2], rp[k, PBX], rp[k, PBY], rp[k, PAX], rp[k, PAY]
+    return rows[k, 1], rp[k, PAX], rp[k, PAY], rp[k, PBX], rp[k, PBY]
+
+
+@kernel
+def far_point(rows, rp, k, own, x):
+    """Of a row: where the point of the placed link lies, and the local point of ``own``."""
+    far, fx, fy, hx, hy = ends(rows, rp, k, own)
+    px, py = world(x, far, fx, fy)
+    return px, py, hx, hy
+
+
 @kernel(inline="always")
 def upper_half(a):
     """Return the upper 26 bits of a number [Veltkamp 1968]: products of such halves are exact."""
@@ -99,13 +115,14 @@ def row(kind, p, k, a, b, x, phi, q, g):
     dx, dy = x[b, 0] + wx - x[a, 0] - ux, x[b, 1] + wy - x[a, 1] - uy
     for c in range(6):
         g[c] = 0.0
+    # both components of Q - P
     if kind == RX:
         g[0], g[2], g[3], g[5] = -1.0, uy, 1.0, -wy
         return dx
     if kind == RY:
         g[1], g[2], g[4], g[5] = -1.0, -ux, 1.0, wx
         return dy
-    if kind == DIST:
+    if kind == DIST:  # (|d|^2 / h - h) / 2: linear in |d| where it is h
         h = p[k, H]
         ex, ey = dx * p[k, INVERSE], dy * p[k, INVERSE]
         g[0], g[1], g[2] = -ex, -ey, -(ux * ey - uy * ex)
@@ -123,7 +140,7 @@ def row(kind, p, k, a, b, x, phi, q, g):
         g[0], g[1], g[2] = -tx, -ty, across - (ux * ty - uy * tx)
         g[3], g[4], g[5] = tx, ty, wx * ty - wy * tx
         return along - p[k, SIGN] * q[int(p[k, SLOT]), 0]
-    if kind in (ANGLE, DRIVE_ANGLE):
+    if kind in (ANGLE, DRIVE_ANGLE):  # from cosines and sines: no turns are counted
         h = p[k, H] if kind == ANGLE else p[k, SIGN] * q[int(p[k, SLOT]), 0]
         g[2], g[5] = -1.0, 1.0
         ch, sh = math.cos(h), math.sin(h)
@@ -175,15 +192,15 @@ def gamma(kind, p, k, a, b, x, q):
         tx, ty = ca * p[k, TX] - sa * p[k, TY], sa * p[k, TX] + ca * p[k, TY]
         if kind == LINE:
             return oa * oa * (ty * dx - tx * dy) - 2.0 * oa * (tx * ex + ty * ey) - ty * cx + tx * cy
-        return (-oa * oa * (tx * dx + ty * dy) + 2.0 * oa * (tx * ey - ty * ex) + tx * cx + ty * cy
-                - p[k, SIGN] * q[int(p[k, SLOT]), 2])  # fmt: skip
+        along = -oa * oa * (tx * dx + ty * dy) + 2.0 * oa * (tx * ey - ty * ex) + tx * cx + ty * cy
+        return along - p[k, SIGN] * q[int(p[k, SLOT]), 2]
     square = dx * dx + dy * dy
     if kind == CAM:
         _, first, second = pitch(p, k, math.atan2(dy, dx) - math.atan2(sa, ca) - p[k, RA])
         far, along, across = math.sqrt(square), dx * ex + dy * ey, dx * ey - dy * ex
         rate = across / square - oa
         curved = (dx * cy - dy * cx) / square - 2.0 * along * across / (square * square)
-        return ((ex * ex + ey * ey + dx * cx + dy * cy) / far - along * along / (square * far)
-                - second * rate * rate - first * curved)  # fmt: skip
+        straight = (ex * ex + ey * ey + dx * cx + dy * cy) / far - along * along / (square * far)
+        return straight - second * rate * rate - first * curved
     turn = (dx * cy - dy * cx) / square - 2.0 * (dx * ex + dy * ey) * (dx * ey - dy * ex) / (square * square)
     return -(p[k, RA] + p[k, SIGN] * p[k, RB]) / (p[k, RA] + p[k, RB]) * turn

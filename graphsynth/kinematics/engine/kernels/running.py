@@ -22,13 +22,16 @@ from graphsynth.kinematics.engine.codes import (
     SLOT,
     STEP_TOO_LONG,
     UNREACHABLE,
-)  # fmt: skip
-from graphsynth.kinematics.engine.kernels.linear import factor
+    At,
+    Group,
+    Room,
+)
 from graphsynth.kinematics.engine.kernels.loops import bar_loop, drive_loop, first_bad, rrr_loop
 from graphsynth.kinematics.engine.kernels.newton import (
     ROUNDED,
     anchors,
     assemble,
+    factor,
     newton,
     noise,
     platform,
@@ -44,70 +47,93 @@ BACKWARD = 2.0
 
 
 @kernel
-def load(link, i, x, X, TH, V, W, derivs):
+def make_room(size, links, gears, steps, drivers, n):
+    """Make the workspace of a run over n samples; ``size`` is the largest number of rows of a group."""
+    return Room(
+        np.empty((size, size)),
+        np.empty(size),
+        np.empty(6),
+        np.empty((size, 6)),
+        np.empty(size, np.int64),
+        np.zeros(4 + size),
+        np.empty((3, 10)),
+        np.empty((3, 6)),
+        np.zeros((links, 11)),
+        np.empty((12, n)),
+        np.empty(gears),
+        np.empty(steps),
+        np.empty((drivers, 3)),
+        np.empty(n),
+    )
+
+
+@kernel
+def load(link, i, x, state, derivs):
     """Copy one link's state at sample i to its row of x."""
     for c in range(4):
-        x[link, c] = X[link, c, i]
-    x[link, 4] = TH[link, i]
+        x[link, c] = state.X[link, c, i]
+    x[link, 4] = state.TH[link, i]
     if derivs:
         for c in range(3):
-            x[link, 5 + c], x[link, 8 + c] = V[link, c, i], W[link, c, i]
+            x[link, 5 + c], x[link, 8 + c] = state.V[link, c, i], state.W[link, c, i]
 
 
 @kernel
-def store(link, i, x, X, TH, V, W, derivs):
+def store(link, i, x, state, derivs):
     """Copy a row of x to the link's state at sample i."""
     for c in range(4):
-        X[link, c, i] = x[link, c]
-    TH[link, i] = x[link, 4]
+        state.X[link, c, i] = x[link, c]
+    state.TH[link, i] = x[link, 4]
     if derivs:
         for c in range(3):
-            V[link, c, i], W[link, c, i] = x[link, 5 + c], x[link, 8 + c]
+            state.V[link, c, i], state.W[link, c, i] = x[link, 5 + c], x[link, 8 + c]
 
 
 @kernel
-def unwrap(link, u, X, TH, V, i0, i1, derivs):
+def unwrap(link, u, state, i0, i1, derivs):
     """Angle of a link placed by a loop, without jumps."""
+    X, TH = state.X, state.TH
     for i in range(i0, i1):
         near = TH[link, i]
         if i > 0:
-            near = TH[link, i - 1] + ((u[i] - u[i - 1]) * V[link, 2, i - 1] if derivs else 0.0)
+            near = TH[link, i - 1] + ((u[i] - u[i - 1]) * state.V[link, 2, i - 1] if derivs else 0.0)
         raw = math.atan2(X[link, 3, i], X[link, 2, i])
         TH[link, i] = nearest_turn(raw, near)
 
 
 @kernel
-def bars(elim, e0, ne, ep, wanted, need, u, X, TH, V, W, T, i0, i1, derivs):
+def bars(elim, e0, ne, ep, wanted, need, u, state, T, i0, i1, derivs):
     """Place the eliminated links with two turning pairs, those that are wanted."""
     for k in range(e0, e0 + ne):
         e = elim[k, 1]
         if elim[k, 0] == E_RR and wanted[e]:
-            bar_loop(e, elim[k, 2], elim[k, 3], ep, k, X, V, W, T, i0, i1, derivs)
+            bar_loop(e, elim[k, 2], elim[k, 3], ep, k, state, T, i0, i1, derivs)
             if need[e]:
-                unwrap(e, u, X, TH, V, i0, i1, derivs)
+                unwrap(e, u, state, i0, i1, derivs)
 
 
 @kernel
-def carry_centres(rows, rp, r0, nr, i, x, phi, PHI):
+def carry_centres(group, i, x, phi, PHI):
     """Follow the direction of the line of centres of every gear pair of a step."""
-    for k in range(r0, r0 + nr):
+    rows, rp = group.rows, group.rp
+    for k in range(group.r0, group.r0 + group.nr):
         if rows[k, 0] == GEAR:
             slot = int(rp[k, SLOT])
             ax, ay = world(x, rows[k, 1], rp[k, 0], rp[k, 1])
             bx, by = world(x, rows[k, 2], rp[k, 2], rp[k, 3])
-            raw = math.atan2(by - ay, bx - ax)
-            phi[slot] = nearest_turn(raw, phi[slot])
+            phi[slot] = nearest_turn(math.atan2(by - ay, bx - ax), phi[slot])
             PHI[slot, i] = phi[slot]
 
 
 @kernel
-def centres_pass(rows, rp, r0, nr, x, phi, h, derivs):
+def centres_pass(group, x, phi, h, derivs):
     """Whether the line of centres of a gear pair turns in a way that nobody can know from both ends of a step.
 
     Centres that come close to each other turn their line by up to half a turn, in a sense that the ends of a long step
     do not tell.  So the turn must be what the angular speed at its end says, and the distance must not change much.
     """
-    for k in range(r0, r0 + nr):
+    rows, rp = group.rows, group.rp
+    for k in range(group.r0, group.r0 + group.nr):
         if rows[k, 0] != GEAR:
             continue
         a, b = rows[k, 1], rows[k, 2]
@@ -130,74 +156,88 @@ def centres_pass(rows, rp, r0, nr, x, phi, h, derivs):
 
 
 @kernel
-def place(code, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, sign, before, h, warm, need, M, s, J, f, g, G, pivots,
-          out, P, Q, Lc, far, derivs, blur, i):  # fmt: skip
-    """Place the kept links of one group at one sample i; returns why it failed, or 0.
-
-    ``blur[i]`` is how far rounding moved the links of the groups before; rounding of this group is added to it.
-    """
-    why = 0
+def place(code, group, room, need, s, at, sizes):
+    """Place the kept links of one group at one sample; returns why it failed, or 0.  ``sizes`` are Lc and far."""
     if code >= ITERATIVE_FROM:
-        reach = Lc  # a link that goes far away moves far: its travel is measured by its distance
-        for k in range(c0, c0 + nc):
-            reach = max(reach, abs(x[core[k], 0]) + abs(x[core[k], 1]) - far)
-        travel = predict(core, c0, nc, x, h, reach, out) if warm else 0.0
-        if not travel <= 0.5:
-            return STEP_TOO_LONG
-        if warm and nc == 1 and rows[r0, 0] == RX and rows[r0 + 1, 0] == RY:
-            pin_to_neighbour(rows, rp, r0, own, x)  # far from the origin the predicted place is rough, its turn is not
-        if code == PLATFORM:
-            anchors(rows, rp, r0, own, x, P)
-            why = platform(P, x, own, Q, Lc, reach, out, M, s)
-        if code == NEWTON or (why == NO_CONVERGENCE and out[1] <= ROUNDED):
-            first, rate = out[0], out[2]
-            why = newton(rows, rp, r0, nr, core, c0, nc, x, phi, ql, J, f, g, G, pivots, reach, out)
-            if code == PLATFORM:
-                code, out[0], out[2] = NEWTON, first, rate
-        if why:
-            return why
-        for k in range(c0, c0 + nc):
-            if need[core[k]]:  # the angle that gears count and its cosine and sine must not drift apart
-                follow_angle(core[k], x, x[core[k], 4])
-        if warm:
-            second = out[0] * out[2]
-            if out[2] > 0.1 and second <= ROUNDED and out[3] == 0.0:
-                assemble(rows, rp, r0, nr, x, phi, ql, J, f, g, G, False)
-                factor(J, nr, pivots)
-                out[3] = noise(rows, rp, r0, nr, x, ql, J, f, G, pivots, reach)
-            out[3] += blur[i] / reach
-            blur[i] = out[3] * reach
-            if out[0] > 0.1 * travel + 1e-9 + out[3] or (out[2] > 0.1 and second > out[3]):
-                return STEP_TOO_LONG
-        if code == NEWTON:
-            M[s] = rates(rows, rp, r0, nr, core, c0, nc, x, phi, ql, J, f, g, G, pivots) / Lc**nc
-        if M[s] == 0.0:
-            return SINGULAR
-        if warm and not (M[s] * before > 0.0 and abs(M[s]) > 0.5 * abs(before)):
-            return STEP_TOO_LONG
-        # another branch has other speeds, even where its pose is met by chance
-        if warm and surprise(core, c0, nc, x, h, reach, out) > 0.3 * travel + 1e-9 + out[3]:
-            return STEP_TOO_LONG
-        if warm and centres_pass(rows, rp, r0, nr, x, phi, h, True):
-            return STEP_TOO_LONG
-        return 0
-    near = x[own, 4] + (h * x[own, 7] if warm and derivs else 0.0)
-    M[s] = closed_form(code, rows, rp, r0, own, sign, x, phi, g)
+        return solved(code, group, room, need, s, at, sizes)
+    x, m, own = room.x, room.m, group.core[group.c0]
+    near = x[own, 4] + (at.h * x[own, 7] if at.warm and at.derivs else 0.0)
+    m[s] = closed_form(code, group, at.sign, x, room.phi)
     if code == P_LINE:  # one mode; its determinant keeps its sign
-        if M[s] == 0.0 or (warm and not M[s] * before > 0.0):
+        if m[s] == 0.0 or (at.warm and not m[s] * at.before > 0.0):
             return UNREACHABLE
-    elif M[s] < 0.0:
+    elif m[s] < 0.0:
         return UNREACHABLE
-    if not math.isfinite(M[s]):
+    if not math.isfinite(m[s]):
         return NO_CONVERGENCE
     if need[own] and code != R_GEAR:
         follow_angle(own, x, near)
-    if derivs:
+    if at.derivs:
         if code <= R_GEAR:
-            pivot_rates(rows, rp, r0, own, x, phi, ql, g)
+            pivot_rates(group, x, room.phi, room.ql, room.g)
         else:
-            rates(rows, rp, r0, nr, core, c0, nc, x, phi, ql, J, f, g, G, pivots)
-    if code == R_GEAR and warm and centres_pass(rows, rp, r0, nr, x, phi, h, derivs):
+            rates(group, x, room.phi, room.ql, room)
+    if code == R_GEAR and at.warm and centres_pass(group, x, room.phi, at.h, at.derivs):
+        return STEP_TOO_LONG
+    return 0
+
+
+@kernel
+def solved(code, group, room, need, s, at, sizes):
+    """Place a group by Newton's method; a step that may have left the branch is too long.
+
+    ``room.blur[i]`` is how far rounding moved the links of the groups before; that of this group is added to it.
+    """
+    x, phi, ql, m, out = room.x, room.phi, room.ql, room.m, room.out
+    rows, core, c0, nc, warm = group.rows, group.core, group.c0, group.nc, at.warm
+    Lc, far = sizes
+    reach = Lc  # a link that goes far away moves far: its travel is measured by its distance
+    for k in range(c0, c0 + nc):
+        reach = max(reach, abs(x[core[k], 0]) + abs(x[core[k], 1]) - far)
+    # predict
+    travel = predict(group, x, at.h, reach, out) if warm else 0.0
+    if not travel <= 0.5:
+        return STEP_TOO_LONG
+    if warm and nc == 1 and rows[group.r0, 0] == RX and rows[group.r0 + 1, 0] == RY:
+        # far from the origin the predicted place is rough, its turn is not
+        pin_to_neighbour(rows, group.rp, group.r0, core[c0], x)
+    # correct
+    why = 0
+    if code == PLATFORM:
+        anchors(group, x, room.P)
+        why = platform(room.P, x, core[c0], room.Q, Lc, reach, out, m, s)
+    if code == NEWTON or (why == NO_CONVERGENCE and out[1] <= ROUNDED):
+        first, rate = out[0], out[2]
+        why = newton(group, x, phi, ql, room, reach)
+        if code == PLATFORM:
+            code, out[0], out[2] = NEWTON, first, rate
+    if why:
+        return why
+    for k in range(c0, c0 + nc):
+        if need[core[k]]:  # the angle that gears count and its cosine and sine must not drift apart
+            follow_angle(core[k], x, x[core[k], 4])
+    # is the correction small for the travel, or explained by rounding?
+    if warm:
+        second = out[0] * out[2]
+        if out[2] > 0.1 and second <= ROUNDED and out[3] == 0.0:
+            assemble(group, x, phi, ql, room, False)
+            factor(room.J, group.nr, room.pivots)
+            out[3] = noise(group, x, ql, room, reach)
+        out[3] += room.blur[at.i] / reach
+        room.blur[at.i] = out[3] * reach
+        if out[0] > 0.1 * travel + 1e-9 + out[3] or (out[2] > 0.1 and second > out[3]):
+            return STEP_TOO_LONG
+    # does the determinant keep its sign and half of its size?
+    if code == NEWTON:
+        m[s] = rates(group, x, phi, ql, room) / Lc**nc
+    if m[s] == 0.0:
+        return SINGULAR
+    if warm and not (m[s] * at.before > 0.0 and abs(m[s]) > 0.5 * abs(at.before)):
+        return STEP_TOO_LONG
+    # another branch has other speeds, even where its pose is met by chance
+    if warm and surprise(group, x, at.h, reach, out) > 0.3 * travel + 1e-9 + out[3]:
+        return STEP_TOO_LONG
+    if warm and centres_pass(group, x, phi, at.h, True):
         return STEP_TOO_LONG
     return 0
 
@@ -225,98 +265,113 @@ def deliver(source, rows, done, target):
 
 
 @kernel
-def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, modes, poses, centres, X, TH, V, W, PHI,
-        M, kept, groups, OX, OV, OW, OM, done, why, first, Lc, far, derivs):  # fmt: skip
+def walk(tables, ep, group, s, q, u, sign, room, state, span, sizes, derivs):
+    """Place a group at one sample after another, each from the one before; returns where and why it stopped."""
+    steps, elim, need, x, phi = tables.steps, tables.eliminated, tables.need_angle, room.x, room.phi
+    e0, ne, t0, nt = steps[s, 5], steps[s, 6], steps[s, 7], steps[s, 8]
+    first, stop = span
+    # begin with the sample before the first
+    j = max(first - 1, 0)
+    for k in range(group.c0, group.c0 + group.nc):
+        load(group.core[k], j, x, state, derivs)
+    for k in range(e0, e0 + ne):
+        load(elim[k, 1], j, x, state, derivs)
+    for k in range(phi.shape[0]):
+        phi[k] = state.PHI[k, j]
+    for i in range(first, stop):
+        # what was placed before, and the coordinates of the drivers
+        for k in range(t0, t0 + nt):
+            load(tables.touched[k], i, x, state, derivs)
+        for k in range(room.ql.shape[0]):
+            room.ql[k, 0], room.ql[k, 1], room.ql[k, 2] = q[k, 0, i], q[k, 1, i], q[k, 2, i]
+        h, before = (u[i] - u[i - 1], state.M[s, i - 1]) if i > 0 else (0.0, 0.0)
+        reason = place(steps[s, 0], group, room, need, s, At(i, h, before, i > 0, sign, derivs), sizes)
+        state.M[s, i] = room.m[s]
+        if reason:
+            return i, reason
+        # keep the core links, and the eliminated ones that slide
+        for k in range(group.c0, group.c0 + group.nc):
+            store(group.core[k], i, x, state, derivs)
+        for k in range(e0, e0 + ne):
+            e = elim[k, 1]
+            if elim[k, 0] != E_RR:
+                near = x[e, 4] + (h * x[e, 7] if i > 0 and derivs else 0.0)
+                place_eliminated(elim[k, 0], e, elim[k, 2], elim[k, 3], ep, k, x, derivs)
+                if need[e]:
+                    follow_angle(e, x, near)
+                store(e, i, x, state, derivs)
+        carry_centres(group, i, x, phi, state.PHI)
+    return stop, 0
+
+
+@kernel
+def run_set(tables, b, wanted, q, u, modes, state, room, limits, first, sizes, derivs):
+    """Run a program for one dimension set; returns the samples reached, and the code and the step of the stop.
+
+    ``limits`` are the first samples at which the driver of a step has no value.
+    """
+    rp, ep, dp = tables.row_table[b], tables.eliminated_table[b], tables.drive_table[b]
+    steps, need = tables.steps, tables.need_angle
+    stop, code, at = u.shape[0], 0, -1
+    room.blur[:] = 0.0
+    for s in range(steps.shape[0]):
+        kind, r0 = steps[s, 0], steps[s, 1]
+        if kind < R_DIST:  # a driven link
+            if limits[s] < stop:
+                stop, code, at = limits[s], BAD_INPUT, s
+            drive_loop(tables.drives, dp, r0, q, state, room.T, first, stop, derivs, need.any())
+            continue
+        # a group: an RRR dyad in loops over the samples, any other sample by sample
+        group = Group(tables.rows, rp, r0, steps[s, 2], tables.core, steps[s, 3], steps[s, 4])
+        if kind == R_DIST:
+            rrr_loop(group, modes[s], state, state.M[s], room.T, first, stop, derivs)
+            end, reason = first_bad(state.M[s], first, stop)
+        else:
+            end, reason = walk(tables, ep, group, s, q, u, modes[s], room, state, (first, stop), sizes, derivs)
+        if reason:
+            stop, code, at = end, reason, s
+        own = tables.core[steps[s, 3]]
+        if kind == R_DIST and need[own]:
+            unwrap(own, u, state, first, stop, derivs)
+        # the links eliminated from it, as far as it goes
+        e0, ne = steps[s, 5], steps[s, 6]
+        bars(tables.eliminated, e0, ne, ep, wanted, need, u, state, room.T, first, stop, derivs)
+    return stop, code, at
+
+
+@kernel
+def run(tables, wanted, q, u, modes, state, out, done, why, first, sizes, derivs):
     """Run a program for every dimension set over the samples first..n-1.
 
-    RP, EP, DP have the dimension set as first axis.  The state is that of one set: X (links, 4, n), TH (links, n), V
-    and W (links, 3, n), PHI (gears, n), M (steps, n); it stays in the cache of the core and what is asked for (``kept``
-    links, ``groups`` of steps) is copied to OX (sets, kept, 4, n), OV, OW (sets, kept, 3, n) and OM (sets, groups, n).
-    q (drivers, 5, n) holds the driver coordinate, its two derivatives, cosine and sine.  Sample ``first`` starts from
-    ``first - 1`` if there is one; else cold, from ``poses`` (sets, links, 3) and
-    ``centres`` (sets, gears), or without them from sample 0 as it is.
-    ``done`` gets the samples reached, ``why`` the code and the step at which it stopped.  Eliminated links are placed
-    if ``wanted``.
+    The state is that of one set: it stays in the cache of the core, and what ``out`` asks for is copied there.  q
+    (drivers, 5, n) holds the driver coordinate, its two derivatives, cosine and sine.  Sample ``first`` starts from
+    ``first - 1`` if there is one, else cold.  ``done`` gets the samples reached, ``why`` the code and the step at which
+    it stopped.  Eliminated links are placed if ``wanted``.  ``sizes`` are the characteristic length and the distance
+    from which on a link has gone away.
     """
-    n, links, size = u.shape[0], X.shape[0], 3
+    steps, n, size = tables.steps, u.shape[0], 3
     for s in range(steps.shape[0]):
         size = max(size, steps[s, 2])
-    J, f, g, out = np.empty((size, size)), np.empty(size), np.empty(6), np.zeros(4 + size)
-    G, pivots = np.empty((size, 6)), np.empty(size, np.int64)
-    P, Q = np.empty((3, 10)), np.empty((3, 6))
-    x, T = np.zeros((links, 11)), np.empty((12, n))
-    phi, m, ql = np.empty(PHI.shape[0]), np.empty(steps.shape[0]), np.empty((q.shape[0], 3))
-    blur = np.empty(n)
-    limits, angles = np.empty(steps.shape[0], np.int64), need[0]
-    for k in range(1, links):
-        angles = angles or need[k]
+    room = make_room(size, state.X.shape[0], state.PHI.shape[0], steps.shape[0], q.shape[0], n)
+    # up to which sample every driver has a value
+    limits = np.empty(steps.shape[0], np.int64)
     for s in range(steps.shape[0]):
         limits[s] = n
         for i in range(first, n if steps[s, 0] < R_DIST else first):
-            if not math.isfinite(q[drv[steps[s, 1], 3], 0, i]):
+            if not math.isfinite(q[tables.drives[steps[s, 1], 3], 0, i]):
                 limits[s] = i
                 break
     for b in range(done.shape[0]):
-        rp, ep, dp = RP[b], EP[b], DP[b]
-        if poses.shape[0] > 0:
-            seat(poses[b], centres[b], X, TH, PHI)
-        stop, code, at = n, 0, -1
-        blur[:] = 0.0
-        for s in range(steps.shape[0]):
-            kind, r0, nr, c0, nc = steps[s, 0], steps[s, 1], steps[s, 2], steps[s, 3], steps[s, 4]
-            e0, ne, t0, nt = steps[s, 5], steps[s, 6], steps[s, 7], steps[s, 8]
-            own = core[c0]
-            if kind < R_DIST:
-                if limits[s] < stop:
-                    stop, code, at = limits[s], BAD_INPUT, s
-                drive_loop(drv, dp, r0, q, X, TH, V, W, T, first, stop, derivs, angles)
-                continue
-            if kind == R_DIST:
-                rrr_loop(rows, rp, r0, own, modes[s], X, V, W, M[s], T, first, stop, derivs)
-                end, reason = first_bad(M[s], first, stop)
-                if reason:
-                    stop, code, at = end, reason, s
-                if need[own]:
-                    unwrap(own, u, X, TH, V, first, stop, derivs)
-                bars(elim, e0, ne, ep, wanted, need, u, X, TH, V, W, T, first, stop, derivs)
-                continue
-            # one sample after another: each starts from the one before
-            j = max(first - 1, 0)
-            for k in range(c0, c0 + nc):
-                load(core[k], j, x, X, TH, V, W, derivs)
-            for k in range(e0, e0 + ne):
-                load(elim[k, 1], j, x, X, TH, V, W, derivs)
-            for k in range(phi.shape[0]):
-                phi[k] = PHI[k, j]
-            for i in range(first, stop):
-                for k in range(t0, t0 + nt):
-                    load(touched[k], i, x, X, TH, V, W, derivs)
-                for k in range(ql.shape[0]):
-                    ql[k, 0], ql[k, 1], ql[k, 2] = q[k, 0, i], q[k, 1, i], q[k, 2, i]
-                h, before = (u[i] - u[i - 1], M[s, i - 1]) if i > 0 else (0.0, 0.0)
-                reason = place(kind, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, modes[s], before, h, i > 0, need,
-                               m, s, J, f, g, G, pivots, out, P, Q, Lc, far, derivs, blur, i)  # fmt: skip
-                M[s, i] = m[s]
-                if reason:
-                    stop, code, at = i, reason, s
-                    break
-                for k in range(c0, c0 + nc):
-                    store(core[k], i, x, X, TH, V, W, derivs)
-                for k in range(e0, e0 + ne):
-                    e = elim[k, 1]
-                    if elim[k, 0] != E_RR:
-                        near = x[e, 4] + (h * x[e, 7] if i > 0 and derivs else 0.0)
-                        place_eliminated(elim[k, 0], e, elim[k, 2], elim[k, 3], ep, k, x, derivs)
-                        if need[e]:
-                            follow_angle(e, x, near)
-                        store(e, i, x, X, TH, V, W, derivs)
-                carry_centres(rows, rp, r0, nr, i, x, phi, PHI)
-            bars(elim, e0, ne, ep, wanted, need, u, X, TH, V, W, T, first, stop, derivs)
-        done[b], why[b, 0], why[b, 1] = stop, code, at
-        if kept.shape[0] > 0:
-            deliver(X, kept, stop, OX[b])
-            deliver(V, kept, stop, OV[b])
-            deliver(W, kept, stop, OW[b])
-            for r in range(groups.shape[0]):
+        if out.poses.shape[0] > 0:
+            seat(out.poses[b], out.centres[b], state.X, state.TH, state.PHI)
+        done[b], why[b, 0], why[b, 1] = run_set(
+            tables, b, wanted, q, u, modes, state, room, limits, first, sizes, derivs
+        )
+        # deliver what is asked for
+        if out.links.shape[0] > 0:
+            deliver(state.X, out.links, done[b], out.frames[b])
+            deliver(state.V, out.links, done[b], out.velocities[b])
+            deliver(state.W, out.links, done[b], out.accelerations[b])
+            for r in range(out.steps.shape[0]):
                 for i in range(n):
-                    OM[b, r, i] = M[groups[r], i] if i < stop else math.nan
+                    out.margins[b, r, i] = state.M[out.steps[r], i] if i < done[b] else math.nan

@@ -23,7 +23,7 @@ from graphsynth.kinematics.engine.codes import (
     TY,
     H,
 )
-from graphsynth.kinematics.engine.kernels.rows import cross, gamma, nearest_turn, row, world
+from graphsynth.kinematics.engine.kernels.rows import cross, ends, far_point, gamma, nearest_turn, row, world
 
 
 @kernel
@@ -44,13 +44,7 @@ def pin_to(x, link, lx, ly, wx, wy):
 @kernel
 def pin_to_neighbour(rows, rp, k, own, x):
     """Move an oriented link to the turning pair of rows k and k + 1; returns that point and its local one."""
-    a, b = rows[k, 1], rows[k, 2]
-    if own == a:
-        ax, ay = world(x, b, rp[k, PBX], rp[k, PBY])
-        hx, hy = rp[k, PAX], rp[k, PAY]
-    else:
-        ax, ay = world(x, a, rp[k, PAX], rp[k, PAY])
-        hx, hy = rp[k, PBX], rp[k, PBY]
+    ax, ay, hx, hy = far_point(rows, rp, k, own, x)
     pin_to(x, own, hx, hy, ax, ay)
     return ax, ay, hx, hy
 
@@ -81,43 +75,49 @@ def line_of(rows, rp, k, x, own):
 
 
 @kernel
-def closed_form(code, rows, rp, r0, own, sign, x, phi, g):
+def closed_form(code, group, sign, x, phi):
     """Place the one core link of a group; returns its margin, negative where it cannot be assembled."""
-    if code in (P_DIST, P_LINE):  # a sliding pair orients the link: rows LINE, ANGLE, then DIST or LINE
-        orient(rows, rp, r0 + 1, x, own)
-        tx, ty, kappa = line_of(rows, rp, r0, x, own)
-        k = r0 + 2
-        if code == P_LINE:
-            sx, sy, other = line_of(rows, rp, k, x, own)
-            det = cross(tx, ty, sx, sy)
-            if abs(det) <= PARALLEL:
-                return 0.0
-            x[own, 0], x[own, 1] = (kappa * sx - other * tx) / det, (kappa * sy - other * ty) / det
-            return det
-        a, b, l = rows[k, 1], rows[k, 2], rp[k, H]
-        if own == a:
-            bx, by = world(x, b, rp[k, PBX], rp[k, PBY])
-            lx, ly = rp[k, PAX], rp[k, PAY]
-        else:
-            bx, by = world(x, a, rp[k, PAX], rp[k, PAY])
-            lx, ly = rp[k, PBX], rp[k, PBY]
-        ox, oy = x[own, 2] * lx - x[own, 3] * ly, x[own, 3] * lx + x[own, 2] * ly
-        e = kappa - ty * (ox - bx) + tx * (oy - by)
-        margin = (l - e) * (l + e) / (l * l)
-        if margin < 0.0:
-            return margin
-        along = sign * math.sqrt((l - e) * (l + e))
-        pin_to(x, own, lx, ly, bx - e * ty + along * tx, by + e * tx + along * ty)
-        return margin
-    # a turning pair holds the point A; rows RX, RY, then one more
+    if code in (P_DIST, P_LINE):
+        return slid_form(code, group, sign, x)
+    return turned_form(code, group, sign, x, phi)
+
+
+@kernel
+def slid_form(code, group, sign, x):
+    """Place a link that a sliding pair orients: rows LINE, ANGLE, then DIST or LINE."""
+    rows, rp, r0, own = group.rows, group.rp, group.r0, group.core[group.c0]
+    orient(rows, rp, r0 + 1, x, own)
+    tx, ty, kappa = line_of(rows, rp, r0, x, own)
     k = r0 + 2
-    ax, ay, hx, hy = pin_to_neighbour(rows, rp, r0, own, x)
+    if code == P_LINE:
+        sx, sy, other = line_of(rows, rp, k, x, own)
+        det = cross(tx, ty, sx, sy)
+        if abs(det) <= PARALLEL:
+            return 0.0
+        x[own, 0], x[own, 1] = (kappa * sx - other * tx) / det, (kappa * sy - other * ty) / det
+        return det
+    # the circle about the point of the placed link meets the line
+    l = rp[k, H]
+    bx, by, lx, ly = far_point(rows, rp, k, own, x)
+    ox, oy = x[own, 2] * lx - x[own, 3] * ly, x[own, 3] * lx + x[own, 2] * ly
+    e = kappa - ty * (ox - bx) + tx * (oy - by)
+    margin = (l - e) * (l + e) / (l * l)
+    if margin < 0.0:
+        return margin
+    along = sign * math.sqrt((l - e) * (l + e))
+    pin_to(x, own, lx, ly, bx - e * ty + along * tx, by + e * tx + along * ty)
+    return margin
+
+
+@kernel
+def turned_form(code, group, sign, x, phi):
+    """Place a link that a turning pair holds at the point A: rows RX, RY, then one more."""
+    rows, rp, own, k = group.rows, group.rp, group.core[group.c0], group.r0 + 2
+    ax, ay, hx, hy = pin_to_neighbour(rows, rp, group.r0, own, x)
     margin = 1.0
     a, b = rows[k, 1], rows[k, 2]
-    if own == a:
-        lx, ly = rp[k, PAX] - hx, rp[k, PAY] - hy
-    else:
-        lx, ly = rp[k, PBX] - hx, rp[k, PBY] - hy
+    far, fx, fy, lx, ly = ends(rows, rp, k, own)
+    lx, ly = lx - hx, ly - hy
     if code == R_LINE_PIN:  # the pin of this link runs on a line
         px, py = world(x, a, rp[k, PAX], rp[k, PAY])
         c, s = x[a, 2], x[a, 3]
@@ -147,23 +147,16 @@ def closed_form(code, rows, rp, r0, own, sign, x, phi, g):
     elif code == R_ANGLE:
         orient(rows, rp, k, x, own)
     else:  # gear with its centre on the turning pair
-        other = b if own == a else a
-        if own == a:
-            ox, oy = world(x, b, rp[k, PBX], rp[k, PBY])
-            dx, dy = ox - ax, oy - ay
-        else:
-            ox, oy = world(x, a, rp[k, PAX], rp[k, PAY])
-            dx, dy = ax - ox, ay - oy
+        ox, oy = world(x, far, fx, fy)
+        dx, dy = (ox - ax, oy - ay) if own == a else (ax - ox, ay - oy)
         if dx == 0.0 and dy == 0.0:  # no line of centres
             return -5e-324
-        raw = math.atan2(dy, dx)
-        slot = int(rp[k, SLOT])
-        here = nearest_turn(raw, phi[slot])
+        here = nearest_turn(math.atan2(dy, dx), phi[int(rp[k, SLOT])])
         ra, rb = rp[k, RA], rp[k, SIGN] * rp[k, RB]
         if own == a:
-            x[own, 4] = here - rb * (x[other, 4] - here - rp[k, H]) / ra
+            x[own, 4] = here - rb * (x[far, 4] - here - rp[k, H]) / ra
         else:
-            x[own, 4] = here + rp[k, H] - ra * (x[other, 4] - here) / rb
+            x[own, 4] = here + rp[k, H] - ra * (x[far, 4] - here) / rb
         x[own, 2], x[own, 3] = math.cos(x[own, 4]), math.sin(x[own, 4])
     pin_to(x, own, hx, hy, ax, ay)
     return margin
@@ -213,27 +206,24 @@ def place_eliminated(kind, e, a, b, p, r, x, derivs):
     p1x, p1y = x[e, 5] - o * fy - vax, x[e, 6] + o * fx - vay
     p2x, p2y = x[e, 5] - o * hy - vbx, x[e, 6] + o * hx - vby
     # n'' = -alpha t - omega^2 n, and n . X = 0
-    k1 = (-ty * (aax + l * fy + o * o * fx) + tx * (aay - l * fx + o * o * fy)
-          + 2.0 * o * (tx * p1x + ty * p1y) + l * (tx * X1 + ty * Y1))  # fmt: skip
-    k2 = (-sy * (abx + l * hy + o * o * hx) + sx * (aby - l * hx + o * o * hy)
-          + 2.0 * o * (sx * p2x + sy * p2y) + l * (sx * X2 + sy * Y2))  # fmt: skip
+    k1 = -ty * (aax + l * fy + o * o * fx) + tx * (aay - l * fx + o * o * fy)
+    k1 = k1 + 2.0 * o * (tx * p1x + ty * p1y) + l * (tx * X1 + ty * Y1)
+    k2 = -sy * (abx + l * hy + o * o * hx) + sx * (aby - l * hx + o * o * hy)
+    k2 = k2 + 2.0 * o * (sx * p2x + sy * p2y) + l * (sx * X2 + sy * Y2)
     x[e, 8], x[e, 9], x[e, 10] = (k1 * sx - k2 * tx) / det, (k1 * sy - k2 * ty) / det, l
 
 
 @kernel
-def pivot_rates(rows, rp, r0, own, x, phi, q, g):
+def pivot_rates(group, x, phi, q, g):
     """Rates of a link that turns about a point of a placed link: one unknown, from the third row."""
-    if rows[r0, 1] == own:
-        far, ax, ay = rows[r0, 2], rp[r0, PBX], rp[r0, PBY]
-    else:
-        far, ax, ay = rows[r0, 1], rp[r0, PAX], rp[r0, PAY]
+    rows, rp, own, k = group.rows, group.rp, group.core[group.c0], group.r0 + 2
+    far, ax, ay, _, _ = ends(rows, rp, group.r0, own)
     ax, ay = world(x, far, ax, ay)
     ux, uy = ax - x[far, 0], ay - x[far, 1]
     o, l = x[far, 7], x[far, 10]
     vx, vy = x[far, 5] - o * uy, x[far, 6] + o * ux
     bx, by = x[far, 8] - l * uy - o * o * ux, x[far, 9] + l * ux - o * o * uy
     px, py = x[own, 0] - ax, x[own, 1] - ay
-    k = r0 + 2
     kind, a, b = rows[k, 0], rows[k, 1], rows[k, 2]
     row(kind, rp, k, a, b, x, phi, q, g)
     other, i, j = (b, 0, 3) if a == own else (a, 3, 0)

@@ -157,12 +157,13 @@ def inverse(pose, D, b, consts, sigma, theta, status, S, deficit):
     n, modes = pose.shape[0], theta.shape[1]
     extra = S.shape[0] > 0
     step = 1 if modes == 1 and sigma.shape[0] > 1 else 0
-    u, v, cs, sn, sg, r, C, P1, P2, mark, plus, minus = (np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK),
-        np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK),
-        np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK))  # fmt: skip
+    rows = np.empty((12, BLOCK))
+    u, v, cs, sn, sg, r = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]
+    C, P1, P2, mark, plus, minus = rows[6], rows[7], rows[8], rows[9], rows[10], rows[11]
     hard = 0
     for start in range(0, n, BLOCK):
         m = min(BLOCK, n - start)
+        # a block of poses at a time: directions of the platform, then leg by leg
         for i in range(m):
             sg[i] = pose[start + i, 2]
         directions(sg, start - start, m, cs, sn)
@@ -173,6 +174,7 @@ def inverse(pose, D, b, consts, sigma, theta, status, S, deficit):
                 v[i] = pose[start + i, 1] + (cs[i] * by + sn[i] * bx) - dy
                 sg[i] = sigma[(start + i) * step, k]
             reach(u, v, k, m, consts, r, C, P1, P2, mark)
+            # the angle on one branch, or on both
             for side in range(2 if modes > 1 else 1):
                 chosen = minus if side == 1 else plus
                 for i in range(m):
@@ -180,6 +182,7 @@ def inverse(pose, D, b, consts, sigma, theta, status, S, deficit):
                     turn = -1.0 if side == 1 else sg[i]
                     a, c = turn * u[i], turn * v[i]
                     chosen[i] = angle_of(cross_sum(v[i], C[i], a, s), cross_sum(u[i], C[i], -c, s))
+            # deliver
             for i in range(m):
                 status[start + i, k] = np.int8(mark[i])
                 hard += 1 if mark[i] == 9.0 else 0

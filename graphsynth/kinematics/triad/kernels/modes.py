@@ -30,9 +30,7 @@ def elbows(theta, D, l1, out):
     """Anchors ``D_k + l1_k exp(i theta_k)``, complex (n, 3)."""
     for i in range(theta.shape[0]):
         for k in range(3):
-            out[i, k] = complex(
-                D[k].real + l1[k] * math.cos(theta[i, k]), D[k].imag + l1[k] * math.sin(theta[i, k])
-            )  # fmt: skip
+            out[i, k] = complex(D[k].real + l1[k] * math.cos(theta[i, k]), D[k].imag + l1[k] * math.sin(theta[i, k]))
 
 
 @kernel
@@ -78,9 +76,7 @@ def sample(g, eta, third, value, kind):
     T = TABLE
     g0, p1, m1, p2, m2, p3, m3 = g[0], 2.0 * g[1], -2.0 * g[2], 2.0 * g[3], -2.0 * g[4], 2.0 * g[5], -2.0 * g[6]
     for j in range(NODES):
-        value[j] = g0 + (
-            p1 * T[0, j] + m1 * T[1, j] + (p2 * T[2, j] + m2 * T[3, j]) + (p3 * T[4, j] + m3 * T[5, j])
-        )  # fmt: skip
+        value[j] = g0 + (p1 * T[0, j] + m1 * T[1, j] + (p2 * T[2, j] + m2 * T[3, j]) + (p3 * T[4, j] + m3 * T[5, j]))
     value[NODES] = value[0]
     for j in range(NODES):
         r1 = p1 * T[6, j] + m1 * T[7, j]
@@ -199,6 +195,36 @@ def polish(a, b, l, x, y, alpha, out):
 
 
 @kernel
+def isolate(g, eta, third, value, kind, stack, roots):
+    """Write the real roots of G; returns how many, and a flag if double precision does not decide."""
+    sample(g, eta, third, value, kind)
+    count, work, flag = np.int64(0), np.int64(0), np.int64(0)
+    for j in range(NODES):
+        if kind[j] == 0:
+            continue
+        low = -math.pi + 2.0 * HALF * j
+        count, work, stuck = search(
+            g, low, low + 2.0 * HALF, value[j], value[j + 1], eta, third, stack, roots, count, work
+        )
+        if stuck:
+            flag |= NEAR_DOUBLE
+        if work > LARGEST_WORK:
+            break
+    return count, flag
+
+
+@kernel
+def insert(pose, determinant, first, total, x, y, alpha, det):
+    """Put a mode among those from ``first`` on, so that they stay sorted by alpha."""
+    at = total
+    while at > first and pose[at - 1, 2] > alpha:
+        pose[at, 0], pose[at, 1], pose[at, 2] = pose[at - 1, 0], pose[at - 1, 1], pose[at - 1, 2]
+        determinant[at] = determinant[at - 1]
+        at -= 1
+    pose[at, 0], pose[at, 1], pose[at, 2], determinant[at] = x, y, alpha, det
+
+
+@kernel
 def modes(anchors, vertices, legs, problem, pose, determinant, counts, flags):
     """All assembly modes of n problems: anchors (n, 3), vertices and legs (1, 3) or (n, 3); returns how many modes.
 
@@ -213,6 +239,7 @@ def modes(anchors, vertices, legs, problem, pose, determinant, counts, flags):
     a, b, l, out = np.empty(2, np.complex128), np.empty(3, np.complex128), np.empty(3), np.empty(4)
     total = 0
     for i in range(n):
+        # the problem, scaled by a power of two to about one
         origin = anchors[i, 0]
         a2, a3 = anchors[i, 1] - origin, anchors[i, 2] - origin
         bi, li = i * bstep, i * lstep
@@ -230,6 +257,7 @@ def modes(anchors, vertices, legs, problem, pose, determinant, counts, flags):
         # the platform is turned about its first vertex: its frame may lie anywhere
         b[0], b[1], b[2] = 0.0, (b2 - b1) * inverse, (b3 - b1) * inverse
         coefficients(a[0], a[1], b[1], b[2], l[0], l[1], l[2], g, q)
+        # sizes of the terms of G; eta bounds its rounding
         h1, h2, h3 = (
             math.sqrt(g[1] ** 2 + g[2] ** 2),
             math.sqrt(g[3] ** 2 + g[4] ** 2),
@@ -242,31 +270,18 @@ def modes(anchors, vertices, legs, problem, pose, determinant, counts, flags):
         if abs(g[0]) + sum0 < 1e-13:
             flags[i] = NEAR_DOUBLE
             continue
-        third = 2.0 * (h1 + 8.0 * h2 + 27.0 * h3)
-        sample(g, eta, third, value, kind)
-        count, work, flag = np.int64(0), np.int64(0), np.int64(0)
-        for j in range(NODES):
-            if kind[j] == 0:
-                continue
-            low = -math.pi + 2.0 * HALF * j
-            count, work, stuck = search(
-                g, low, low + 2.0 * HALF, value[j], value[j + 1], eta, third, stack, roots, count, work
-            )
-            if stuck:
-                flag |= NEAR_DOUBLE
-            if work > LARGEST_WORK:
-                break
+        count, flag = isolate(g, eta, 2.0 * (h1 + 8.0 * h2 + 27.0 * h3), value, kind, stack, roots)
+        # a pose for every root: p from the linear system, then Newton's method on the closures
         first, balance = total, np.int64(0)
         for j in range(count):
             alpha = roots[j]
             z = complex(math.cos(alpha), math.sin(alpha))
-            w = z.conjugate()
             delta = q[4] + (q[5] * z - (q[5] * z).conjugate())
             power = norm2(delta)
             if power < 1e-20:
                 flag |= DEGENERATE
                 continue
-            Q = ((q[0] * z + q[1]) * z + q[2] + q[3] * w) * delta.conjugate() / power
+            Q = ((q[0] * z + q[1]) * z + q[2] + q[3] * z.conjugate()) * delta.conjugate() / power
             settled = polish(a, b, l, Q.real, Q.imag, alpha, out)
             if not settled or abs(out[2] - alpha) > 1e-6:
                 flag |= NEAR_DOUBLE
@@ -277,22 +292,11 @@ def modes(anchors, vertices, legs, problem, pose, determinant, counts, flags):
                 alpha -= TAU
             elif alpha <= -math.pi:
                 alpha += TAU
-            at = total  # insertion keeps the modes sorted
-            while at > first and pose[at - 1, 2] > alpha:
-                pose[at, 0], pose[at, 1], pose[at, 2] = pose[at - 1, 0], pose[at - 1, 1], pose[at - 1, 2]
-                determinant[at] = determinant[at - 1]
-                at -= 1
-            pose[at, 0] = origin.real + (out[0] * unit - turn.real)
-            pose[at, 1] = origin.imag + (out[1] * unit - turn.imag)
-            pose[at, 2] = alpha
-            determinant[at] = out[3]
+            x, y = origin.real + (out[0] * unit - turn.real), origin.imag + (out[1] * unit - turn.imag)
+            insert(pose, determinant, first, total, x, y, alpha, out[3] * (unit * unit) * (unit * unit))
             problem[total] = i
             total += 1
+        # modes come in pairs of opposite sign of the determinant
         counts[i] = total - first
-        if counts[i] % 2 == 1 or balance != 0:
-            flag |= INCONSISTENT
-        square = unit * unit
-        for j in range(first, total):
-            determinant[j] = determinant[j] * square * square
-        flags[i] = flag
+        flags[i] = flag | (INCONSISTENT if counts[i] % 2 == 1 or balance != 0 else 0)
     return total
