@@ -141,7 +141,7 @@ def json_value(text: str, place: str = "") -> Any:
         where = f"line {error.lineno}, column {error.colno}"
         raise FormatError(f"not JSON ({error.msg})", f"{place}, {where}" if place else where) from None
     except FormatError as error:
-        raise FormatError(str(error), place) from None
+        raise FormatError(str(error), place or "text") from None
     except (RecursionError, ValueError) as error:
         raise FormatError(f"not JSON that can be read ({_brief(error)})", place or "text") from None
 

@@ -19,6 +19,7 @@ An interval that fails is halved; where that does not help it stays undecided.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import reduce
 from time import perf_counter
@@ -144,8 +145,13 @@ class Cover:
     exhausted: bool = False
 
 
-def _apply(Y: Array, v: Array) -> Array:
-    return np.asarray(np.matmul(Y, v[..., None])[..., 0])
+def _solved(J: Array, f: Array) -> Array:
+    """Solutions of ``J x = f``; zero where the matrix has no inverse."""
+    with suppress(np.linalg.LinAlgError):
+        x = np.linalg.solve(J, f[..., None])
+        if np.isfinite(x).all():
+            return np.asarray(x[..., 0])
+    return np.asarray(np.matmul(inverses(J)[0], f[..., None])[..., 0])
 
 
 def correct(system: MovingSystem, x: Array, u: Array, steps: int = 40) -> tuple[Array, Array]:
@@ -155,13 +161,13 @@ def correct(system: MovingSystem, x: Array, u: Array, steps: int = 40) -> tuple[
             units = system.units(x, u, checked=False)
             f = system.residual(exact(x), exact(u), units)
             J, _ = system.derivatives(exact(x), exact(u), units)
-            step = _apply(inverses(J.mid)[0], f.mid)
+            step = _solved(J.mid, f.mid)
             x = x - step
             size = np.abs(step / system.weights).max(axis=1, initial=0.0)
             if not (size > 1e-14 * (1.0 + np.abs(x / system.weights).max(axis=1, initial=0.0))).any():
                 break
         J, fu = system.derivatives(exact(x), exact(u), system.units(x, u, checked=False))
-        return x, -_apply(inverses(J.mid)[0], fu.mid)
+        return x, -_solved(J.mid, fu.mid)
 
 
 def prove(system: MovingSystem, boxes: Boxes, radii: tuple[float, ...] = ()) -> Proof:
@@ -186,15 +192,15 @@ class _Test:
             self.Y, _ = inverses(J.mid)
             # the change of f along the moving centre: (J V + f_u) times the half width of U
             along = (J.times(exact(boxes.V)) + fu).size * boxes.u.rad[:, None]
-            self.at = f.wider(along * UP + TINY)
-            self.first = exact(self.Y).times(self.at).size
+            self.newton = -exact(self.Y).times(f.wider(along * UP + TINY))
+            self.first = self.newton.size
 
     def image(self, which: Index, radius: Array) -> Array:
         """Radius of the Krawczyk image around the moving centres of some boxes; infinite where it is undefined."""
         boxes = self.boxes.take(which)
         J, _ = self.system.derivatives(boxes.hull(radius), boxes.u, self.units[which])
-        zero = np.zeros_like(radius)
-        K, _ = krawczyk_image(exact, self.Y[which], exact(zero), self.at[which], J, Balls(zero, radius))
+        spread = Balls(np.zeros_like(radius), radius)
+        K, _ = krawczyk_image(exact(np.eye(radius.shape[-1])), exact(self.Y[which]), self.newton[which], J, spread)
         return np.where(np.isfinite(K.size), K.size, np.inf)
 
     def proof(self, radii: tuple[float, ...]) -> Proof:

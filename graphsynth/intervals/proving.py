@@ -108,16 +108,16 @@ class KrawczykResult:
 def inverses(matrices: Array) -> tuple[Array, Mask]:
     """Return inverses (zero where there is none) and where there is none."""
     fine: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
-    guarded = np.where(fine[:, None, None], matrices, np.eye(matrices.shape[-1]))
+    guarded = matrices if fine.all() else np.where(fine[:, None, None], matrices, np.eye(matrices.shape[-1]))
     try:
-        inverse = np.linalg.inv(guarded)
+        inverse: Array = np.linalg.inv(guarded).astype(np.float64, copy=False)
     except np.linalg.LinAlgError:
         inverse = np.full_like(guarded, np.nan)
         for k, matrix in enumerate(guarded):
             with suppress(np.linalg.LinAlgError):
                 inverse[k] = np.linalg.inv(matrix)
     fine = np.asarray(fine & np.isfinite(inverse).all(axis=(1, 2)))
-    return np.where(fine[:, None, None], inverse, 0.0), ~fine
+    return (inverse if fine.all() else np.where(fine[:, None, None], inverse, 0.0)), ~fine
 
 
 class Enclosures(Protocol):
@@ -136,15 +136,14 @@ class Enclosures(Protocol):
 E = TypeVar("E", bound=Enclosures)
 
 
-def krawczyk_image(point: Callable[[Array], E], Y: Array, z: E, at: E, slopes: E, box: E) -> tuple[E, E]:
+def krawczyk_image(identity: E, Y: E, newton: E, slopes: E, spread: E) -> tuple[E, E]:
     """Krawczyk's operator ``K(X) = z - Y F(z) + (I - Y L) (X - z)`` in any arithmetic of enclosures, and ``I - Y L``.
 
-    ``point`` encloses real numbers.  Any ``Y`` is allowed: if K(X) lies in the interior of X, then X holds exactly one
-    solution, it lies in K(X), and the Jacobian is regular everywhere in X.
+    ``newton`` is ``z - Y F(z)`` and ``spread`` is ``X - z``.  Any ``Y`` is allowed: if K(X) lies in the interior of X,
+    then X holds exactly one solution, it lies in K(X), and the Jacobian is regular everywhere in X.
     """
-    real = point(Y)
-    rest = point(np.eye(Y.shape[-1])) - real.times(slopes)
-    return z - real.times(at) + rest.times(box - z), rest
+    rest = identity - Y.times(slopes)
+    return newton + rest.times(spread), rest
 
 
 def points(values: Array) -> Interval:
@@ -202,7 +201,9 @@ def image(f: System, boxes: Interval, parameters: Interval | None = None) -> Ima
         centre = points(z)
         at = values_of(_square(f, [centre[:, i] for i in range(n)], parameters, shape), shape)
         Y, singular = inverses(slopes.mid)
-        K, rest = krawczyk_image(points, Y, centre, at, slopes, boxes)
+        real = points(Y)
+        newton = centre - real.times(at)
+        K, rest = krawczyk_image(points(np.eye(n)), real, newton, slopes, boxes - centre)
     void: Mask = np.asarray(boxes.is_empty.any(axis=1))
     smooth = _all_guaranteed(over, 1) & _all_guaranteed(slopes, 2) & _all_guaranteed(at, 1)
     smooth = np.asarray(smooth & boxes.is_bounded.all(axis=1) & ~singular)

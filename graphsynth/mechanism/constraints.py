@@ -84,7 +84,7 @@ def residual(joints: Sequence[JointGeometry], poses: ArrayLike) -> Array:
 def jacobian(joints: Sequence[JointGeometry], poses: ArrayLike) -> Array:
     """Return the derivatives of the constraints by the poses, shape (..., rows, 3 links).
 
-    Angular rows (sliding pairs) are those of the plain angle equation, in radians.
+    Angular rows (prismatic joints) are those of the plain angle equation, in radians.
     """
     joints, pose = _read(joints, poses)
     count = sum(3 - joint.mobility for joint in joints)

@@ -19,6 +19,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import work
 from graphsynth.mechanism.joints import JointGeometry, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.rotatability import start_angle
 from graphsynth.structure.graph import MechanismGraph
 
 Pose = tuple[float, float, float]
@@ -402,20 +403,11 @@ def _four_bar(
             f"the longest link, {longest:g}, is longer than the other three together, {total - longest:g}: "
             "the four-bar cannot be assembled; give other lengths"
         )
-    phi = _middle(l1, l2, l3, l4) if crank_angle is None else angle("crank_angle", crank_angle)
+    phi = start_angle(l1, l2, l3, l4) if crank_angle is None else angle("crank_angle", crank_angle)
     A, D = cmath.rect(l2, phi), complex(l1, 0.0)
     B = meeting(A, l3, D, l4, branch, "coupler and rocker")
     joints = [*_arms(l2, l3, l4), Revolute(0, 3, (l1, 0.0))]
     return joints, ((0.0, 0.0, 0.0), (0.0, 0.0, phi), _at(A, B), _at(D, B))
-
-
-def _middle(l1: float, l2: float, l3: float, l4: float) -> float:
-    """Crank angle to start from: 0 if it is reached, else the middle of the reached angles in (0, pi)."""
-    if abs(l3 - l4) < abs(l1 - l2) < l3 + l4:
-        return 0.0
-    # cosines of the angles at which the crank pin is farthest from the rocker's pivot, and nearest to it
-    cosines = ((l1 * l1 + l2 * l2 - reach * reach) / (2.0 * l1 * l2) for reach in (abs(l3 - l4), l3 + l4))
-    return 0.5 * sum(math.acos(min(1.0, max(-1.0, cosine))) for cosine in cosines)
 
 
 def _is_pair(value: Any) -> bool:

@@ -168,7 +168,7 @@ class Driver:
     ----------
     base, link : int
         The two links of the joint; the coordinate is that of ``link`` relative to ``base``: the angle
-        ``theta_link - theta_base`` of a turning pair, the displacement along the line of a sliding pair.
+        ``theta_link - theta_base`` of a revolute joint, the displacement along the line of a prismatic joint.
     law : Law
         Coordinate as a function of the input; the input itself by default.
 

@@ -7,6 +7,7 @@ between ``|g - a|`` and ``g + a``, and the bounds are ``|b - c|`` and ``b + c`` 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -155,3 +156,12 @@ def type_of(*lengths: Fraction) -> str:
     'immovable'
     """
     return TYPES[int(grashof_type(np.array([lengths], dtype=object))[0])]
+
+
+def start_angle(l1: float, l2: float, l3: float, l4: float) -> float:
+    """Crank angle to start from: 0 if it is reached, else the middle of the reached angles in (0, pi)."""
+    if abs(l3 - l4) < abs(l1 - l2) < l3 + l4:
+        return 0.0
+    # cosines of the angles at which the crank pin is farthest from the rocker's pivot, and nearest to it
+    cosines = ((l1 * l1 + l2 * l2 - reach * reach) / (2.0 * l1 * l2) for reach in (abs(l3 - l4), l3 + l4))
+    return 0.5 * sum(math.acos(min(1.0, max(-1.0, cosine))) for cosine in cosines)

@@ -258,6 +258,7 @@ def damaged() -> list[tuple[str, str]]:
         (changed(points={"M": {"link": "a", "at": [0, 0]}}), "mechanism"),
         (changed(pose=[[1]]), "mechanism"), (changed(pose=3), "pose"), ("[" * 100_000, "text|line"),
         ('{"format": 1e999}', "top level"),
+        ('{"format": 1, "format": 1}', "^text"),
     ]  # fmt: skip
 
 

@@ -154,7 +154,7 @@ class MechanismSystem:
         return stack(rows)
 
     def branch(self, x: Balls, u: Array) -> tuple[NDArray[np.int64], Balls]:
-        """Return turns of sliding pairs and drivers in order, and directions of lines of centres of gears."""
+        """Return turns of prismatic joints and drivers in order, and directions of lines of centres of gears."""
         units = self.units(x.mid, u)
         centre, place = _Place(self, exact(x.mid), units), _Place(self, x, units)
         turns, directions = [], []

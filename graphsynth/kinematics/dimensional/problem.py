@@ -11,9 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.kinematics.dimensional.design import Design
-from graphsynth.kinematics.dimensional.goals import Goals, LineGoal
+from graphsynth.kinematics.dimensional.goals import (
+    Goals,
+    LineGoal,
+    PathFit,
+    Placed,
+    Sampled,
+    TargetFit,
+    make_fit,
+    target_link,
+)
 from graphsynth.kinematics.dimensional.sketch import layout
-from graphsynth.kinematics.dimensional.targets import PathFit, Placed, Sampled, TargetFit, make_fit, target_link
 from graphsynth.kinematics.dimensional.verify import group_forms, transmission_sines
 from graphsynth.kinematics.engine.batch import simulate_batch
 from graphsynth.kinematics.simulation import simulate

@@ -135,7 +135,7 @@ def smallest_transmission(motion: Motion) -> float:
 
 
 def length_ratio(mechanism: Mechanism) -> float:
-    """Longest over shortest distance of two turning joints on one link; named points count among the long ones."""
+    """Longest over shortest distance of two revolute joints on one link; named points count among the long ones."""
     lengths, arms = [], []
     for link in range(mechanism.graph.links):
         at = [

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 #: Largest step of a turning driver on the internal grid, radians: events between samples are looked for on it.
 _FINE = math.tau / 360.0
-#: Parts of the whole range for a sliding driver.
+#: Parts of the whole range for a prismatic driver.
 _PARTS = 200.0
 #: Most poses of links on the internal grid: about 2 GB of state.
 _MOST = 2e7

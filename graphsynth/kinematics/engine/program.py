@@ -307,7 +307,7 @@ class _Compiler:
         return KernelRow(codes.ANGLE, a, b, [*_parts(pa, pb), 1.0, 0.0, da - dea + deb - db, *[0.0] * 5])
 
     def _seen(self, joint: JointGeometry, link: int) -> tuple[int, Complex, Complex, Array, Array]:
-        """Other link, its point, the link's point, and the directions there (0 for a turning pair)."""
+        """Other link, its point, the link's point, and the directions there (0 for a revolute joint)."""
         size = self.sizes[joint.pair].T
         on_a, on_b = size[0] + 1j * size[1], size[3] + 1j * size[4]
         if link == joint.b:
@@ -358,7 +358,7 @@ def _closed(core: tuple[int, ...], rows: list[KernelRow]) -> tuple[int, list[Ker
     if kinds == [codes.LINE, codes.LINE, codes.ANGLE]:
         return codes.P_LINE, order(codes.LINE, codes.ANGLE, codes.LINE)
     if kinds.count(codes.ANGLE) > 1:
-        raise GeometryError(f"link {own} has its direction fixed twice by sliding pairs; its place is not defined")
+        raise GeometryError(f"link {own} has its direction fixed twice by prismatic joints; its place is not defined")
     return codes.NEWTON, rows
 
 

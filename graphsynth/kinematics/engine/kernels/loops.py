@@ -1,4 +1,4 @@
-"""Steps in closed form over a range of samples: drivers, RRR dyads, links between two turning pairs.
+"""Steps in closed form over a range of samples: drivers, RRR dyads, links between two revolute joints.
 
 Inner loops run over samples that lie side by side in memory and do not branch, so the compiler may use vector
 instructions.  ``X[link]`` has the rows x, y, cos theta, sin theta; ``V`` and ``W`` the rows of (x, y, theta).
@@ -203,7 +203,7 @@ def rrr_loop(group, sign, state, M, T, i0, i1, derivs):
 
 @kernel
 def bar_loop(e, a, b, p, r, state, T, i0, i1, derivs):
-    """Place a link with two turning pairs between placed links a and b; T is room for twelve rows."""
+    """Place a link with two revolute joints between placed links a and b; T is room for twelve rows."""
     X, V, W = state.X, state.V, state.W
     L = X[e]
     ax, ay, hx, hy, bx, by = p[r, 0], p[r, 1], p[r, 2], p[r, 3], p[r, 4], p[r, 5]

@@ -5,27 +5,7 @@ import math
 import numpy as np
 
 from graphsynth.core.compilation import kernel
-from graphsynth.kinematics.engine.codes import (
-    BAD_INPUT,
-    E_RR,
-    GEAR,
-    ITERATIVE_FROM,
-    NEWTON,
-    NO_CONVERGENCE,
-    P_LINE,
-    PLATFORM,
-    R_DIST,
-    R_GEAR,
-    RX,
-    RY,
-    SINGULAR,
-    SLOT,
-    STEP_TOO_LONG,
-    UNREACHABLE,
-    At,
-    Group,
-    Room,
-)
+from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.kernels.loops import bar_loop, drive_loop, first_bad, rrr_loop
 from graphsynth.kinematics.engine.kernels.newton import (
     ROUNDED,
@@ -49,7 +29,7 @@ BACKWARD = 2.0
 @kernel
 def make_room(size, links, gears, steps, drivers, n):
     """Make the workspace of a run over n samples; ``size`` is the largest number of rows of a group."""
-    return Room(
+    return codes.Room(
         np.empty((size, size)),
         np.empty(size),
         np.empty(6),
@@ -103,10 +83,10 @@ def unwrap(link, u, state, i0, i1, derivs):
 
 @kernel
 def bars(elim, e0, ne, ep, wanted, need, u, state, T, i0, i1, derivs):
-    """Place the eliminated links with two turning pairs, those that are wanted."""
+    """Place the eliminated links with two revolute joints, those that are wanted."""
     for k in range(e0, e0 + ne):
         e = elim[k, 1]
-        if elim[k, 0] == E_RR and wanted[e]:
+        if elim[k, 0] == codes.E_RR and wanted[e]:
             bar_loop(e, elim[k, 2], elim[k, 3], ep, k, state, T, i0, i1, derivs)
             if need[e]:
                 unwrap(e, u, state, i0, i1, derivs)
@@ -117,8 +97,8 @@ def carry_centres(group, i, x, phi, PHI):
     """Follow the direction of the line of centres of every gear pair of a step."""
     rows, rp = group.rows, group.rp
     for k in range(group.r0, group.r0 + group.nr):
-        if rows[k, 0] == GEAR:
-            slot = int(rp[k, SLOT])
+        if rows[k, 0] == codes.GEAR:
+            slot = int(rp[k, codes.SLOT])
             ax, ay = world(x, rows[k, 1], rp[k, 0], rp[k, 1])
             bx, by = world(x, rows[k, 2], rp[k, 2], rp[k, 3])
             phi[slot] = nearest_turn(math.atan2(by - ay, bx - ax), phi[slot])
@@ -134,13 +114,13 @@ def centres_pass(group, x, phi, h, derivs):
     """
     rows, rp = group.rows, group.rp
     for k in range(group.r0, group.r0 + group.nr):
-        if rows[k, 0] != GEAR:
+        if rows[k, 0] != codes.GEAR:
             continue
         a, b = rows[k, 1], rows[k, 2]
         ax, ay = world(x, a, rp[k, 0], rp[k, 1])
         bx, by = world(x, b, rp[k, 2], rp[k, 3])
         dx, dy = bx - ax, by - ay
-        slot = int(rp[k, SLOT])
+        slot = int(rp[k, codes.SLOT])
         turn = nearest_turn(math.atan2(dy, dx), phi[slot]) - phi[slot]
         if not derivs:
             if abs(turn) > BACKWARD:
@@ -158,27 +138,27 @@ def centres_pass(group, x, phi, h, derivs):
 @kernel
 def place(code, group, room, need, s, at, sizes):
     """Place the kept links of one group at one sample; returns why it failed, or 0.  ``sizes`` are Lc and far."""
-    if code >= ITERATIVE_FROM:
+    if code >= codes.ITERATIVE_FROM:
         return solved(code, group, room, need, s, at, sizes)
     x, m, own = room.x, room.m, group.core[group.c0]
     near = x[own, 4] + (at.h * x[own, 7] if at.warm and at.derivs else 0.0)
     m[s] = closed_form(code, group, at.sign, x, room.phi)
-    if code == P_LINE:  # one mode; its determinant keeps its sign
+    if code == codes.P_LINE:  # one mode; its determinant keeps its sign
         if m[s] == 0.0 or (at.warm and not m[s] * at.before > 0.0):
-            return UNREACHABLE
+            return codes.UNREACHABLE
     elif m[s] < 0.0:
-        return UNREACHABLE
+        return codes.UNREACHABLE
     if not math.isfinite(m[s]):
-        return NO_CONVERGENCE
-    if need[own] and code != R_GEAR:
+        return codes.NO_CONVERGENCE
+    if need[own] and code != codes.R_GEAR:
         follow_angle(own, x, near)
     if at.derivs:
-        if code <= R_GEAR:
+        if code <= codes.R_GEAR:
             pivot_rates(group, x, room.phi, room.ql, room.g)
         else:
             rates(group, x, room.phi, room.ql, room)
-    if code == R_GEAR and at.warm and centres_pass(group, x, room.phi, at.h, at.derivs):
-        return STEP_TOO_LONG
+    if code == codes.R_GEAR and at.warm and centres_pass(group, x, room.phi, at.h, at.derivs):
+        return codes.STEP_TOO_LONG
     return 0
 
 
@@ -197,20 +177,20 @@ def solved(code, group, room, need, s, at, sizes):
     # predict
     travel = predict(group, x, at.h, reach, out) if warm else 0.0
     if not travel <= 0.5:
-        return STEP_TOO_LONG
-    if warm and nc == 1 and rows[group.r0, 0] == RX and rows[group.r0 + 1, 0] == RY:
+        return codes.STEP_TOO_LONG
+    if warm and nc == 1 and rows[group.r0, 0] == codes.RX and rows[group.r0 + 1, 0] == codes.RY:
         # far from the origin the predicted place is rough, its turn is not
         pin_to_neighbour(rows, group.rp, group.r0, core[c0], x)
     # correct
     why = 0
-    if code == PLATFORM:
+    if code == codes.PLATFORM:
         anchors(group, x, room.P)
         why = platform(room.P, x, core[c0], room.Q, Lc, reach, out, m, s)
-    if code == NEWTON or (why == NO_CONVERGENCE and out[1] <= ROUNDED):
+    if code == codes.NEWTON or (why == codes.NO_CONVERGENCE and out[1] <= ROUNDED):
         first, rate = out[0], out[2]
         why = newton(group, x, phi, ql, room, reach)
-        if code == PLATFORM:
-            code, out[0], out[2] = NEWTON, first, rate
+        if code == codes.PLATFORM:
+            code, out[0], out[2] = codes.NEWTON, first, rate
     if why:
         return why
     for k in range(c0, c0 + nc):
@@ -226,19 +206,19 @@ def solved(code, group, room, need, s, at, sizes):
         out[3] += room.blur[at.i] / reach
         room.blur[at.i] = out[3] * reach
         if out[0] > 0.1 * travel + 1e-9 + out[3] or (out[2] > 0.1 and second > out[3]):
-            return STEP_TOO_LONG
+            return codes.STEP_TOO_LONG
     # does the determinant keep its sign and half of its size?
-    if code == NEWTON:
+    if code == codes.NEWTON:
         m[s] = rates(group, x, phi, ql, room) / Lc**nc
     if m[s] == 0.0:
-        return SINGULAR
+        return codes.SINGULAR
     if warm and not (m[s] * at.before > 0.0 and abs(m[s]) > 0.5 * abs(at.before)):
-        return STEP_TOO_LONG
+        return codes.STEP_TOO_LONG
     # another branch has other speeds, even where its pose is met by chance
     if warm and surprise(group, x, at.h, reach, out) > 0.3 * travel + 1e-9 + out[3]:
-        return STEP_TOO_LONG
+        return codes.STEP_TOO_LONG
     if warm and centres_pass(group, x, phi, at.h, True):
-        return STEP_TOO_LONG
+        return codes.STEP_TOO_LONG
     return 0
 
 
@@ -285,7 +265,7 @@ def walk(tables, ep, group, s, q, u, sign, room, state, span, sizes, derivs):
         for k in range(room.ql.shape[0]):
             room.ql[k, 0], room.ql[k, 1], room.ql[k, 2] = q[k, 0, i], q[k, 1, i], q[k, 2, i]
         h, before = (u[i] - u[i - 1], state.M[s, i - 1]) if i > 0 else (0.0, 0.0)
-        reason = place(steps[s, 0], group, room, need, s, At(i, h, before, i > 0, sign, derivs), sizes)
+        reason = place(steps[s, 0], group, room, need, s, codes.At(i, h, before, i > 0, sign, derivs), sizes)
         state.M[s, i] = room.m[s]
         if reason:
             return i, reason
@@ -294,7 +274,7 @@ def walk(tables, ep, group, s, q, u, sign, room, state, span, sizes, derivs):
             store(group.core[k], i, x, state, derivs)
         for k in range(e0, e0 + ne):
             e = elim[k, 1]
-            if elim[k, 0] != E_RR:
+            if elim[k, 0] != codes.E_RR:
                 near = x[e, 4] + (h * x[e, 7] if i > 0 and derivs else 0.0)
                 place_eliminated(elim[k, 0], e, elim[k, 2], elim[k, 3], ep, k, x, derivs)
                 if need[e]:
@@ -316,14 +296,14 @@ def run_set(tables, b, wanted, q, u, modes, state, room, limits, first, sizes, d
     room.blur[:] = 0.0
     for s in range(steps.shape[0]):
         kind, r0 = steps[s, 0], steps[s, 1]
-        if kind < R_DIST:  # a driven link
+        if kind < codes.R_DIST:  # a driven link
             if limits[s] < stop:
-                stop, code, at = limits[s], BAD_INPUT, s
+                stop, code, at = limits[s], codes.BAD_INPUT, s
             drive_loop(tables.drives, dp, r0, q, state, room.T, first, stop, derivs, need.any())
             continue
         # a group: an RRR dyad in loops over the samples, any other sample by sample
-        group = Group(tables.rows, rp, r0, steps[s, 2], tables.core, steps[s, 3], steps[s, 4])
-        if kind == R_DIST:
+        group = codes.Group(tables.rows, rp, r0, steps[s, 2], tables.core, steps[s, 3], steps[s, 4])
+        if kind == codes.R_DIST:
             rrr_loop(group, modes[s], state, state.M[s], room.T, first, stop, derivs)
             end, reason = first_bad(state.M[s], first, stop)
         else:
@@ -331,7 +311,7 @@ def run_set(tables, b, wanted, q, u, modes, state, room, limits, first, sizes, d
         if reason:
             stop, code, at = end, reason, s
         own = tables.core[steps[s, 3]]
-        if kind == R_DIST and need[own]:
+        if kind == codes.R_DIST and need[own]:
             unwrap(own, u, state, first, stop, derivs)
         # the links eliminated from it, as far as it goes
         e0, ne = steps[s, 5], steps[s, 6]
@@ -357,7 +337,7 @@ def run(tables, wanted, q, u, modes, state, out, done, why, first, sizes, derivs
     limits = np.empty(steps.shape[0], np.int64)
     for s in range(steps.shape[0]):
         limits[s] = n
-        for i in range(first, n if steps[s, 0] < R_DIST else first):
+        for i in range(first, n if steps[s, 0] < codes.R_DIST else first):
             if not math.isfinite(q[tables.drives[steps[s, 1], 3], 0, i]):
                 limits[s] = i
                 break

@@ -43,7 +43,7 @@ def pin_to(x, link, lx, ly, wx, wy):
 
 @kernel
 def pin_to_neighbour(rows, rp, k, own, x):
-    """Move an oriented link to the turning pair of rows k and k + 1; returns that point and its local one."""
+    """Move an oriented link to the revolute joint of rows k and k + 1; returns that point and its local one."""
     ax, ay, hx, hy = far_point(rows, rp, k, own, x)
     pin_to(x, own, hx, hy, ax, ay)
     return ax, ay, hx, hy
@@ -84,7 +84,7 @@ def closed_form(code, group, sign, x, phi):
 
 @kernel
 def slid_form(code, group, sign, x):
-    """Place a link that a sliding pair orients: rows LINE, ANGLE, then DIST or LINE."""
+    """Place a link that a prismatic joint orients: rows LINE, ANGLE, then DIST or LINE."""
     rows, rp, r0, own = group.rows, group.rp, group.r0, group.core[group.c0]
     orient(rows, rp, r0 + 1, x, own)
     tx, ty, kappa = line_of(rows, rp, r0, x, own)
@@ -111,7 +111,7 @@ def slid_form(code, group, sign, x):
 
 @kernel
 def turned_form(code, group, sign, x, phi):
-    """Place a link that a turning pair holds at the point A: rows RX, RY, then one more."""
+    """Place a link that a revolute joint holds at the point A: rows RX, RY, then one more."""
     rows, rp, own, k = group.rows, group.rp, group.core[group.c0], group.r0 + 2
     ax, ay, hx, hy = pin_to_neighbour(rows, rp, group.r0, own, x)
     margin = 1.0
@@ -146,7 +146,7 @@ def turned_form(code, group, sign, x, phi):
         turn_to(x, own, along * tx - e * ty, along * ty + e * tx, dx, dy)
     elif code == R_ANGLE:
         orient(rows, rp, k, x, own)
-    else:  # gear with its centre on the turning pair
+    else:  # gear with its centre on the revolute joint
         ox, oy = world(x, far, fx, fy)
         dx, dy = (ox - ax, oy - ay) if own == a else (ax - ox, ay - oy)
         if dx == 0.0 and dy == 0.0:  # no line of centres
@@ -187,7 +187,7 @@ def place_eliminated(kind, e, a, b, p, r, x, derivs):
         x[e, 5], x[e, 6], x[e, 7] = vax + o * fy, vay - o * fx, o
         x[e, 8], x[e, 9], x[e, 10] = aax + l * fy + o * o * fx, aay - l * fx + o * o * fy, l
         return
-    # two sliding pairs: the origin lies on two lines of known directions
+    # two prismatic joints: the origin lies on two lines of known directions
     hx, hy = c * p[r, 6] - s * p[r, 7], s * p[r, 6] + c * p[r, 7]
     tx, ty = x[a, 2] * p[r, 8] - x[a, 3] * p[r, 9], x[a, 3] * p[r, 8] + x[a, 2] * p[r, 9]
     sx, sy = x[b, 2] * p[r, 10] - x[b, 3] * p[r, 11], x[b, 3] * p[r, 10] + x[b, 2] * p[r, 11]
