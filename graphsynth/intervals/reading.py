@@ -125,15 +125,8 @@ def _text(text: str) -> tuple[float, float]:
 def read_one(value: Any) -> tuple[float, float, bool]:
     """Return bounds of one number or text, and whether they are guaranteed (False for a float).
 
-    Raises
-    ------
-    FormatError
-        For text that is no number, or an object of another kind.
-    IntervalError
-        For NaN, infinities, and bounds in the wrong order.
+    `FormatError` for what is no number or text of one, `IntervalError` for NaN, infinities, bounds in the wrong order.
 
-    Examples
-    --------
     >>> read_one("0.5"), read_one(0.5)
     ((0.5, 0.5, True), (0.5, 0.5, False))
     """
@@ -303,15 +296,8 @@ class Gaussian:
 
 
 def rational(name: str, value: Any) -> Fraction:
-    """Return the exact value of an int, float, Fraction, Decimal, or text such as "0.1" or "1/3".
+    """Exact value of an int, float, Fraction, Decimal, or text such as "0.1" or "1/3"; else `GeometryError`.
 
-    Raises
-    ------
-    GeometryError
-        For anything that is not a finite rational number.
-
-    Examples
-    --------
     >>> rational("l", "0.1"), rational("l", 0.5)
     (Fraction(1, 10), Fraction(1, 2))
     """

@@ -92,17 +92,8 @@ FLOATS = Plane(np.sin, np.cos, np.hypot, np.arctan2)
 class Seen:
     """The two links of a joint in some arithmetic: what its equations are written in.
 
-    Attributes
-    ----------
-    plane : Plane
-    angle_a, angle_b : number
-        Angles of the links.
-    axis_a : vector
-        Direction of the x axis of link a.
-    arm_a, arm_b : vector
-        From the origin of each link to the joint's point of it.
-    d : vector
-        From the joint's point of a to that of b.
+    The angles of the links; ``axis_a``, the direction of the x axis of link a; the arms, from the origin of each link
+    to the joint's point of it; ``d``, from the joint's point of a to that of b.
     """
 
     plane: Plane

@@ -105,11 +105,8 @@ class _Place:
 class MechanismSystem:
     """Equations of a mechanism as a `MovingSystem` of the Krawczyk test.
 
-    Raises
-    ------
-    GeometryError
-        If equations and unknowns differ in number: the certificate is for mechanisms with one driver per freedom; or
-        if there is a cam.
+    `GeometryError` for a cam, and if equations and unknowns differ in number: the certificate is for mechanisms with
+    one driver per freedom.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:

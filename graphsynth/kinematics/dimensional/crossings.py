@@ -37,19 +37,9 @@ _TRIALS = 500
 
 
 def crossing_pairs(graph: MechanismGraph, most: int = 2) -> list[tuple[int, int]]:
-    """Return pairs of binary links that may cross so that the rest of the drawing is plane.
+    """Pairs of binary links that may cross so that the rest of the drawing is plane: as few as possible.
 
-    Parameters
-    ----------
-    graph : MechanismGraph
-        Not planar.
-    most : int
-        Largest number of crossings looked for.
-
-    Returns
-    -------
-    list of (int, int)
-        As few pairs as possible, none with the frame if that can be avoided; empty if none were found.
+    None is with the frame if that can be avoided; without pairs if there are none up to ``most``.
     """
     around = [{link for link in range(graph.links) if mask >> link & 1} for mask in graph.neighbours]
     binary = [link for link in range(graph.links) if len(around[link]) == 2]
@@ -135,21 +125,10 @@ def _turn(p: Complex, q: Complex, r: Complex) -> Array:
 
 
 def fewest_crossings(own: list[list[int]], count: int) -> tuple[Complex, int]:
-    """Place joints so that links cross little.
+    """Places of joints, given those of every link, so that links cross little; and the crossings of sides.
 
-    Parameters
-    ----------
-    own : list of list of int
-        The joints of every link.
-    count : int
-        Number of joints.
-
-    Returns
-    -------
-    ndarray of complex, shape (count,)
-        Places; the springs between the joints of a link have rest length 1.
-    int
-        Crossings of sides counted (exact for the places returned; the fewest found, not proved least).
+    The springs between the joints of a link have rest length 1.  The crossings are counted exactly for the places
+    returned: the fewest found, not proved least.
     """
     links = _Links(own)
     z = _starts(count)

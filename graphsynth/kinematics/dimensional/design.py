@@ -27,14 +27,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Design:
-    """A mechanism graph with a frame, drivers and kinds of joints: all but the numbers.
+    """A mechanism graph with a frame, drivers (base, link) and kinds of joints: all but the numbers.
 
-    Parameters
-    ----------
-    graph : MechanismGraph
-    drivers : tuple of (base, link)
-    kinds : tuple of str
-        "R", "P" or "pin-slot" for every joint, in the order of ``graph.joints``.
+    A kind is "R", "P" or "pin-slot", in the order of ``graph.joints``.
     """
 
     graph: MechanismGraph
@@ -114,13 +109,8 @@ def choices(graph: MechanismGraph, driver: Drivers | None) -> list[tuple[Mechani
     The order: smallest largest group first (dyads before larger groups), then the lowest class, then driven links with
     the fewest joints, then inversions in their canonical order and links by number.
 
-    Raises
-    ------
-    GraphError
-        A driver for a chain without a frame, drivers that do not fit, or a graph that no choice can drive.
+    `GraphError` for a driver of a chain without a frame, drivers that do not fit, a graph that no choice can drive.
 
-    Examples
-    --------
     >>> chain = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)])
     >>> [drivers for _, drivers in choices(chain, None)]
     [((0, 1),), ((0, 3),)]

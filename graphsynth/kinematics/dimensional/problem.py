@@ -72,15 +72,9 @@ class Unknowns:
 class DimensionProblem:
     """Candidates for one design under given goals, from one sketch.
 
-    Parameters
-    ----------
-    design : Design
-    goals : Goals
-    random : numpy.random.Generator
-        Shifts the sketch, so that repeated problems start from different ones.
-    variant : int
-        0: the assembly modes of the sketch, drivers turn left.  With a target other curves matter too: bit 0 turns the
-        drivers the other way, bit k the mode of dyad k - 1 (only of mechanisms of dyads, which need no start pose).
+    ``random`` shifts the sketch, so that repeated problems start from different ones.  Variant 0 has the assembly modes
+    of the sketch, and drivers turn left.  With a target other curves matter too: bit 0 turns the drivers the other way,
+    bit k the mode of dyad k - 1 (only of mechanisms of dyads, which need no start pose).
     """
 
     def __init__(self, design: Design, goals: Goals, random: np.random.Generator, variant: int = 0) -> None:

@@ -276,22 +276,10 @@ def _before(mechanism: Mechanism, step: Step) -> list[tuple[int, ...]]:
 def transmission_sines(
     forms: Sequence[GroupForm], dimensions: Array, ends: Sequence[tuple[int, int]], frames: Array, margins: Array
 ) -> Array:
-    """Sine of the smallest transmission angle of every group.
+    """Sine of the smallest transmission angle of every group, shape (sets, n, groups); NaN where there is no pose.
 
-    Parameters
-    ----------
-    forms : sequence of GroupForm
-    dimensions : ndarray, shape (sets, joints, 10)
-    ends : sequence of (a, b)
-        The links of every joint, in the order of the dimensions.
-    frames : ndarray, shape (sets, n, links, 4)
-        (x, y, cos, sin) of every link.
-    margins : ndarray, shape (sets, n, groups)
-
-    Returns
-    -------
-    ndarray, shape (sets, n, groups)
-        NaN where there is no pose.
+    ``dimensions`` (sets, joints, 10); ``ends``, the links of every joint in that order; ``frames`` (sets, n, links, 4)
+    with x, y, cos, sin of every link; ``margins`` (sets, n, groups).
     """
     found = np.empty(margins.shape)
     for form in forms:

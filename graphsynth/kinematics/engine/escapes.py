@@ -63,9 +63,8 @@ def pivot_passes(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
         at = float(trace.u[jumps[0] + 1])
         blind = trace.u[np.abs(trace.u - at) <= _BLIND * float(np.abs(np.diff(trace.u)).max())]
         text = (
-            f"group {step.group} ({step.kind}, links {', '.join(map(str, step.links))}): the pin passes the pivot of "
-            f"link {step.core[0]} at the input {at:.12g}: the direction of the link is not determined there, so the "
-            "branch after it is a choice"
+            f"{step.name}: the pin passes the pivot of link {step.core[0]} at the input {at:.12g}: "
+            "the direction of the link is not determined there, so the branch after it is a choice"
         )
         width = float(abs(at - blind[0]))
         found.append(MotionEvent("change point", float(blind[0]), step.group, step.links, 2, width, True, text))
@@ -182,8 +181,8 @@ def centres_that_meet(program: Program, stop: Stop) -> Iterator[MotionEvent]:
                 continue
             at = stop.at - (d * d1.conjugate()).real / abs(d1) ** 2
             text = (
-                f"the centres of the gear pair {a}-{b} of group {step.group} ({step.kind}, links "
-                f"{', '.join(map(str, step.links))}) coincide at the input {at:.12g}: their line has no direction there"
+                f"the centres of the gear pair {a}-{b} of {step.name} coincide at the input {at:.12g}: "
+                "their line has no direction there"
             )
             yield MotionEvent("singular", at, step.group, step.links, 0, abs(at - stop.at), True, text)
 

@@ -51,8 +51,7 @@ def ending(tracker: Tracker, trace: Trace) -> MotionEvent:
         text = f"the driver of link {step.links[0]} has no value from the input {at:.12g} on"
         return MotionEvent("input", at, -1, step.links, 0, uncertainty, True, text)
     if trace.done == 0:
-        name = f"group {step.group} ({step.kind}, links {_list(step.links)})"
-        text = f"{name} cannot be assembled at the first input"
+        name, text = step.name, f"{step.name} cannot be assembled at the first input"
         if step.code == codes.NEWTON:  # its modes are searched for, and some may be missed
             text = f"no pose of {name} was found at the first input; if there is one, give a start pose close to it"
         if stop.code == codes.SINGULAR:
@@ -94,10 +93,6 @@ def _limit_beyond(tracker: Tracker, trace: Trace, stop: Stop) -> float | None:
     return beyond if code == codes.UNREACHABLE and where < stop.step else None
 
 
-def _list(links: tuple[int, ...]) -> str:
-    return ", ".join(map(str, links))
-
-
 def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
     """Bisect for the last input at which the closed forms can be assembled."""
     assert trace.stop is not None
@@ -125,14 +120,14 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
         return gone
     if step.has_two_modes and tracker.near(source, at, bad)[0].M[1, step_index] == _COINCIDE:
         text = (
-            f"two points of group {step.group} ({step.kind}, links {_list(step.links)}) coincide at the input "
-            f"{bad:.12g}: its place is not determined there, so the branch after it is a choice"
+            f"two points of {step.name} coincide at the input {bad:.12g}: "
+            "its place is not determined there, so the branch after it is a choice"
         )
         return MotionEvent("change point", bad, step.group, step.links, 2, abs(bad - good), True, text)
     if step.has_two_modes:
         text = (
-            f"group {step.group} ({step.kind}, links {_list(step.links)}) is stretched or folded at the input "
-            f"{good:.12g}: its two modes merge and it cannot be assembled beyond"
+            f"{step.name} is stretched or folded at the input {good:.12g}: "
+            "its two modes merge and it cannot be assembled beyond"
         )
         return MotionEvent("fold", good, step.group, step.links, 2, abs(bad - good), True, text)
     why = "its sliding directions become parallel" if step.code == codes.P_LINE else "two of its points coincide"
@@ -143,7 +138,7 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
         gone = escape_at(tracker.program, step, pair, good, abs(bad - good) + cut, why)
         if gone is not None:
             return gone
-    text = f"group {step.group} ({step.kind}, links {_list(step.links)}) has no place at the input {good:.12g}: {why}"
+    text = f"{step.name} has no place at the input {good:.12g}: {why}"
     return MotionEvent("singular", good, step.group, step.links, 0, abs(bad - good), True, text)
 
 
@@ -158,8 +153,9 @@ def _singular(tracker: Tracker, stop: Stop) -> MotionEvent:
         nearest = min(abs(event.input - stop.at) for event in ahead)
         return next(event for event in ahead if abs(event.input - stop.at) <= 1.5 * nearest)
     step = program.steps[stop.step]
-    where = f"group {step.group} ({step.kind}, links {_list(step.links)})"
-    text = f"{where} becomes singular near the input {stop.at:.12g}: modes meet and the branch after it is ambiguous"
+    text = (
+        f"{step.name} becomes singular near the input {stop.at:.12g}: modes meet and the branch after it is ambiguous"
+    )
     return MotionEvent("singular", stop.at, step.group, step.links, 0, stop.uncertainty, True, text)
 
 
@@ -172,8 +168,7 @@ def _folds(tracker: Tracker, stop: Stop) -> Iterator[MotionEvent]:
         if found is not None:
             at, uncertainty, power = found
             text = (
-                f"group {step.group} ({step.kind}, links {_list(step.links)}) is singular at the input {at:.12g}: two "
-                "assembly modes merge and the branch ends "
+                f"{step.name} is singular at the input {at:.12g}: two assembly modes merge and the branch ends "
                 f"(the determinant goes to zero like the power {power:.2f} of the distance)"
             )
             yield MotionEvent("fold", at, step.group, step.links, 2, uncertainty, True, text)
@@ -268,7 +263,7 @@ def _touch(tracker: Tracker, trace: Trace, where: tuple[int, int, int], s: int) 
     best = minimize_scalar(margin, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * (high - low)})
     least, at = min((float(best.fun), float(best.x)), (float(trace.M[k, s]), float(trace.u[k])))
     step = tracker.program.steps[s]
-    name = f"group {step.group} ({step.kind}, links {_list(step.links)})"
+    name = step.name
     if least < -_TOUCH:
         start, uncertainty = float(trace.u[first]), 1e-14 * max(1.0, abs(at))
         try:

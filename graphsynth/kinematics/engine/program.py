@@ -63,27 +63,23 @@ class KernelRow(NamedTuple):
 
 @dataclass(frozen=True)
 class Step:
-    """What one step of a program places.
+    """What one step of a program places."""
 
-    Attributes
-    ----------
-    code : int
-        See :mod:`.codes`.
-    group : int
-        Index of the Assur group, or -1 for a driver.
-    links : tuple of int
-        Links placed.
-    kind : str
-        "driver R", "driver P", "RRR", "RRP", "RPR", "PRP", "RPP", or a description of the group.
-    core : tuple of int
-        Links whose poses are the unknowns.
-    """
-
+    #: See :mod:`.codes`.
     code: int
+    #: Index of the Assur group, or -1 for a driver.
     group: int
+    #: Links placed.
     links: tuple[int, ...]
+    #: "driver R", "driver P", "RRR", "RRP", "RPR", "PRP", "RPP", or a description of the group.
     kind: str
+    #: Links whose poses are the unknowns.
     core: tuple[int, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The group with its kind and links, for messages."""
+        return f"group {self.group} ({self.kind}, links {', '.join(map(str, self.links))})"
 
     @property
     def has_two_modes(self) -> bool:
@@ -112,18 +108,9 @@ class Program:
 
 
 def compile_program(mechanism: Mechanism, dimensions: Array | None = None) -> Program:
-    """Compile a mechanism, or many of the same kind.
+    """Compile a mechanism, or many of a kind with ``dimensions`` (sets, joints, 10) in the form of the mechanism's own.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-    dimensions : ndarray, shape (sets, joints, 10), optional
-        Dimension sets in the form of ``mechanism.dimensions``, which is the default.
-
-    Raises
-    ------
-    GeometryError
-        If the drivers do not fit the mobility, or a group can have no definite place with these joint kinds.
+    `GeometryError` if the drivers do not fit the mobility, or a group has no definite place with these joint kinds.
     """
     if not isinstance(mechanism, Mechanism):
         raise GeometryError(f"{type(mechanism).__name__} is not a Mechanism; give one")

@@ -120,12 +120,7 @@ def initial(tracker: Tracker, u0: float, modes: Mapping[int, int], guess: Array 
     """Poses (links, 3) close to the branch at ``u0``; also a code and step where no pose was found.
 
     Groups solved by Newton start from ``guess`` if there is one, else from the mode of the given rank (0 by default)
-    among all modes found.
-
-    Raises
-    ------
-    GeometryError
-        A mode that does not exist.
+    among all modes found; `GeometryError` for a mode that does not exist.
     """
     program = tracker.program
     links = program.mechanism.graph.links

@@ -34,21 +34,11 @@ class LegStatus(IntEnum):
 class LegSolution:
     """Reach of a leg and the ingredients of its two angles; every array has the broadcast shape of the input.
 
-    Attributes
-    ----------
-    u, v : ndarray
-        End point relative to the pivot.
-    S, C : ndarray
-        ``2 l1 rho sin(gamma)`` and ``2 l1 rho cos(gamma)`` with gamma the angle between end point and arm; S is NaN
-        out of reach.  They overflow for lengths above 1e154 and underflow below 1e-154; the angles do not.
-    status : ndarray of int8
-        `LegStatus`.
-    deficit : ndarray
-        Signed distance missing: positive out of reach, negative is the margin left.
-    scaled : tuple of 2 ndarrays
-        ``S`` and ``C`` divided by ``4^exponent``.
-    exponent : ndarray of int
-        Exponent of the largest of the four given numbers.
+    ``u``, ``v``: the end point relative to the pivot.  ``S``, ``C``: ``2 l1 rho sin(gamma)`` and
+    ``2 l1 rho cos(gamma)`` with gamma the angle between end point and arm; S is NaN out of reach.  They overflow for
+    lengths above 1e154 and underflow below 1e-154; the angles do not, for which S and C are kept ``scaled``, divided by
+    ``4^exponent``, with the exponent of the largest given number.  ``status``: `LegStatus`.  ``deficit``: the signed
+    distance missing, positive out of reach; negative is the margin left.
     """
 
     u: Array
@@ -196,12 +186,7 @@ class PlatformLegs:
     The compiled evaluation keeps every sum as a pair of numbers; the few legs within about 1e-15 of their boundary,
     free legs and extreme magnitudes are solved again by `solve_leg`, so that both give the same status.
 
-    Parameters
-    ----------
-    D, b : sequence of 3 complex
-        Pivots in the fixed frame, vertices in the platform frame.
-    l1, l2 : sequence of 3 floats
-        Arms and links.
+    D are the pivots in the fixed frame, b the vertices in the platform frame, l1 and l2 the arms and links.
     """
 
     def __init__(self, D: Sequence[complex], b: Sequence[complex], l1: Sequence[float], l2: Sequence[float]) -> None:
