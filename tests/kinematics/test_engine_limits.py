@@ -13,6 +13,7 @@ from graphsynth.kinematics import simulate, simulate_batch
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.escapes import between
 from graphsynth.kinematics.engine.events import _touch
+from graphsynth.kinematics.engine.program import Step
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver, Harmonic, Linear, Table
 from graphsynth.mechanism.model import Mechanism
@@ -345,7 +346,7 @@ def test_a_fold_behind_a_group_that_is_lost() -> None:
         margin = np.nan if 0.1 < u < 0.75 else (u - 1.2) ** 2 - 0.09
         return SimpleNamespace(M=np.array([[0.0], [margin]])), None
 
-    step = SimpleNamespace(group=0, kind="RRR", links=(1, 2))
+    step = Step(codes.R_DIST, 0, (1, 2), "RRR")
     tracker = SimpleNamespace(reach=reach, program=SimpleNamespace(steps=[step]))
     trace = SimpleNamespace(u=np.array([0.0, 1.6, 2.0]), M=np.array([[1.35], [0.07], [0.55]]))
     event = _touch(tracker, trace, (0, 1, 2), 0)
