@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 from graphsynth.core.errors import GraphError
 from graphsynth.drawing.diagram import mechanism_sketch
 from graphsynth.drawing.sketch import Sketch
-from graphsynth.kinematics.dimensional.sketch import JointLayout, layout
 from graphsynth.mechanism.joints import JointGeometry, PinSlot, Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
 
 if TYPE_CHECKING:
+    from graphsynth.kinematics.dimensional.sketch import JointLayout
     from graphsynth.structure.graph import MechanismGraph
 
 
@@ -38,6 +38,8 @@ def graph_sketch(
     neighbouring joints is 1; dimensions are those of a readable picture, nothing is said about motion. Raises
     `GraphError`: another space, a joint of higher mobility, a graph that is not connected.
     """
+    from graphsynth.kinematics.dimensional.sketch import layout
+
     if graph.space != 3 or any(joint.mobility > 2 for joint in graph.joints):
         raise GraphError("only planar graphs (space 3) with joints of mobility 1 and 2 have a kinematic diagram")
     places = layout(graph)

@@ -43,9 +43,14 @@ def coupled_joints(context: Any, effort: Effort) -> Problem:
     bearing = Bearing(table.radius_mm, table.height_mm, table.clearance_mm)
     tilt = Misalignment(driver.base, driver.link, table.alpha, table.direction)
     return coupled_problem(
-        mechanism, bearing_limits(bearing, table.condition), tilt, name, condition=table.condition, inputs=(0.0, span),
+        mechanism,
+        bearing_limits(bearing, table.condition),
+        tilt,
+        name,
+        condition=table.condition,
+        inputs=(0.0, span),
         effort=effort,
-    )  # fmt: skip
+    )
 
 
 def linkage_dynamics(context: Any, effort: Effort) -> Problem:

@@ -232,10 +232,19 @@ def cranks(
     s_y = _branch(leg_y, l1, phi_x, point_y, axis_y[..., to_y])
     s_x = _branch(leg_x, l1, phi_y, point_x, axis_x[..., to_x] * flip)
     return CrankAngles(
-        a=wanted_a, b=wanted_b, phi_x=phi_x, phi_y=phi_y, status_y=status_y.astype(np.int8),
-        status_x=status_x.astype(np.int8), deficit_y=deficit_y * scale, deficit_x=deficit_x * scale,
-        margin_y=margin_y, margin_x=margin_x, s_y=s_y, s_x=s_x,
-    )  # fmt: skip
+        a=wanted_a,
+        b=wanted_b,
+        phi_x=phi_x,
+        phi_y=phi_y,
+        status_y=status_y.astype(np.int8),
+        status_x=status_x.astype(np.int8),
+        deficit_y=deficit_y * scale,
+        deficit_x=deficit_x * scale,
+        margin_y=margin_y,
+        margin_x=margin_x,
+        s_y=s_y,
+        s_x=s_x,
+    )
 
 
 def _gimbal_axes(a: Array, b: Array, order: str) -> tuple[Array, Array]:

@@ -128,13 +128,29 @@ def _chains(mechanism: PointingDimensions, chart: str) -> tuple[list[_Turn | _Sh
     l1, l2, l3, l4, l5 = mechanism.lengths
     axes = (2, 0) if chart == "corrected" else (0, 1)
     leg_y: list[_Turn | _Shift] = [
-        _Turn(0, _INPUT_X), _Turn(1, 4), _Shift(1, l3), _Turn(axes[0], 3), _Turn(axes[1], 2), _Shift(2, l2),
-        _Turn(1, 1), _Turn(0, 0), _Turn(2, _FIXED, 0.5 * math.pi), _Shift(0, -l1),
-    ]  # fmt: skip
+        _Turn(0, _INPUT_X),
+        _Turn(1, 4),
+        _Shift(1, l3),
+        _Turn(axes[0], 3),
+        _Turn(axes[1], 2),
+        _Shift(2, l2),
+        _Turn(1, 1),
+        _Turn(0, 0),
+        _Turn(2, _FIXED, 0.5 * math.pi),
+        _Shift(0, -l1),
+    ]
     leg_x: list[_Turn | _Shift] = [
-        _Turn(1, _INPUT_Y), _Turn(0, 10), _Shift(0, l5), _Turn(2, 9), _Turn(1, 8), _Shift(2, l4),
-        _Turn(0, 7), _Turn(1, 6), _Turn(2, _FIXED, 0.0), _Shift(0, -l1),
-    ]  # fmt: skip
+        _Turn(1, _INPUT_Y),
+        _Turn(0, 10),
+        _Shift(0, l5),
+        _Turn(2, 9),
+        _Turn(1, 8),
+        _Shift(2, l4),
+        _Turn(0, 7),
+        _Turn(1, 6),
+        _Turn(2, _FIXED, 0.0),
+        _Shift(0, -l1),
+    ]
     return leg_y, leg_x
 
 
@@ -427,10 +443,16 @@ def solve_loops(
     shape = given_x.shape
     x = np.where(genuine[:, None], x - 2.0 * np.pi * np.round(x / (2.0 * np.pi)), np.nan)
     return LoopSolution(
-        x=x.reshape(*shape, 12), residual=size.reshape(shape), error=last.reshape(shape),
-        converged=converged.reshape(shape), genuine=genuine.reshape(shape), iterations=(total + used).reshape(shape),
-        chart=chart, start_rank=ranks.reshape(shape), message=message,
-    )  # fmt: skip
+        x=x.reshape(*shape, 12),
+        residual=size.reshape(shape),
+        error=last.reshape(shape),
+        converged=converged.reshape(shape),
+        genuine=genuine.reshape(shape),
+        iterations=(total + used).reshape(shape),
+        chart=chart,
+        start_rank=ranks.reshape(shape),
+        message=message,
+    )
 
 
 def survey_roots(

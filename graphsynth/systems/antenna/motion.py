@@ -65,9 +65,18 @@ def _motion(leg: Leg, l1: float, phi: Array, dphi: Array, ddphi: Array) -> _LegM
     k2 = (leg.crank * leg.crank - p * c - q * s) / l1
     square = dphi * dphi
     return _LegMotion(
-        p, q, -s, c, k1, dphi, -s * dphi, c * dphi, -c * square - s * ddphi, -s * square + c * ddphi,
+        p,
+        q,
+        -s,
+        c,
+        k1,
+        dphi,
+        -s * dphi,
+        c * dphi,
+        -c * square - s * ddphi,
+        -s * square + c * ddphi,
         k2 * square + k1 * ddphi,
-    )  # fmt: skip
+    )
 
 
 def rates(

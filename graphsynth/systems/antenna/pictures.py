@@ -163,8 +163,10 @@ def comparison_picture(
     degrees = np.degrees(phi)
     figure = new_figure(size)
     panels = figure.subplots(1, 3, sharex=True, sharey=True)
-    for axes, which, name in ((panels[0], 1, f"a: model of order {other.order}"),
-                              (panels[1], 0, f"b: model of order {mechanism.order}")):  # fmt: skip
+    for axes, which, name in (
+        (panels[0], 1, f"a: model of order {other.order}"),
+        (panels[1], 0, f"b: model of order {mechanism.order}"),
+    ):
         axes.plot(degrees, np.degrees(found.a[which]), color=_LEG_Y, lw=1.8, label="1 about X (elevation)")
         axes.plot(degrees, np.degrees(found.b[which]), color=_LEG_X, lw=1.8, ls="--", label="2 about Y (azimuth)")
         axes.set_title(name, fontsize=10)
@@ -404,24 +406,30 @@ def plots(context: Context, motion: AntennaMotion, comparison: ModelComparison) 
     other, reading = other_model(context)
     largest = table.sweep.largest
     figure4 = comparison_picture(
-        antenna, other, other_reading=reading, largest=largest, samples=table.sweep.samples,
-        working=table.sweep.working, size=(8.6, 3.7),
-    )  # fmt: skip
+        antenna,
+        other,
+        other_reading=reading,
+        largest=largest,
+        samples=table.sweep.samples,
+        working=table.sweep.working,
+        size=(8.6, 3.7),
+    )
     pictures = [
         Picture(
-            "Figure 4: two models over equal crank angles", themed_svg(figure4),
+            "Figure 4: two models over equal crank angles",
+            themed_svg(figure4),
             "a: second model; b: first model; c: the means of both and their difference. Dotted: working limit.",
             "wide",
         ),
         *_curves(motion, comparison),
-    ]  # fmt: skip
+    ]
     drawn = difference_map_picture(antenna, other, other_reading=reading, span=largest)
     words = "Left: what the article compares. Right: how far apart the two models really point."
     pictures.append(Picture("Map of the difference of the two models", themed_svg(drawn), words, "wide"))
     if any(widths_of(context)):
         drawn = tolerance_map_picture(
             antenna, tuple(widths_of(context)), span=largest, nodes=table.tolerances.map_nodes
-        )  # fmt: skip
+        )
         pictures.append(
             Picture("Map of the certified deviations", themed_svg(drawn), "Mean-value form at every node.", "wide")
         )

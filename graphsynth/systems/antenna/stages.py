@@ -114,9 +114,15 @@ def cross_check(context: Context, motion: AntennaMotion) -> CrossCheck | None:
     charts = antenna.check_chart(0.0, 0.0, "printed"), antenna.check_chart(0.0, 0.0, "corrected")
     survey = antenna.survey_roots(last, last, starts=_STARTS, seed=context.scene.scene.seed)
     return CrossCheck(
-        phi, found.x, float(found.residual.max()), float(np.abs(turned).max()), float(rates_gap), charts, survey,
+        phi,
+        found.x,
+        float(found.residual.max()),
+        float(np.abs(turned).max()),
+        float(rates_gap),
+        charts,
+        survey,
         int(antenna.solve(last, last).count),
-    )  # fmt: skip
+    )
 
 
 def singular_poses(context: Context) -> SingularPoses:
@@ -264,11 +270,16 @@ def _sweep_table(motion: AntennaMotion, comparison: ModelComparison) -> Table:
     poses = motion.path.poses
     rows = (
         (
-            motion.phi[k], poses.a[k], poses.b[k], poses.a[k] - poses.b[k], comparison.a[1, k], comparison.b[1, k],
+            motion.phi[k],
+            poses.a[k],
+            poses.b[k],
+            poses.a[k] - poses.b[k],
+            comparison.a[1, k],
+            comparison.b[1, k],
             f"{comparison.arcminutes[k]:.9g}",
         )
         for k in _every(motion.phi.size)
-    )  # fmt: skip
+    )
     columns = (
         "cranks [°] | .6g",
         "elevation [°] | 12 .12g",
@@ -340,9 +351,14 @@ def _tolerance_table(context: Context, bounds: tuple[tuple[float, Tolerance], ..
             first = f"±{unit_in('[″]').from_si(side.first_order):.4f}"
             rows.append((phi, name, side.nominal, certified, corners, first, _excess(side.excess)))
     columns = (
-        "cranks [°] | g", "angle", "nominal [°] | 9 .9f", "certified [″]", "corners [″]", "first order [″]",
+        "cranks [°] | g",
+        "angle",
+        "nominal [°] | 9 .9f",
+        "certified [″]",
+        "corners [″]",
+        "first order [″]",
         "too wide by",
-    )  # fmt: skip
+    )
     widths = ", ".join(
         f"{name.replace('_', ' ')} ±{unit_in('[mm]').from_si(w):g} mm"
         for name, w in zip(LENGTH_NAMES, widths_of(context))
@@ -430,9 +446,19 @@ def _check_table(check: CrossCheck) -> Table:
 def _unknowns_table(check: CrossCheck) -> Table:
     ends = (0, check.phi.size // 2, check.phi.size - 1)
     names = (
-        "x1 cardan of leg Y", "x2", "x3 ball joint of leg Y", "x4", "x5", "x6 elevation", "x7 cardan of leg X", "x8",
-        "x9 ball joint of leg X", "x10", "x11", "x12 azimuth",
-    )  # fmt: skip
+        "x1 cardan of leg Y",
+        "x2",
+        "x3 ball joint of leg Y",
+        "x4",
+        "x5",
+        "x6 elevation",
+        "x7 cardan of leg X",
+        "x8",
+        "x9 ball joint of leg X",
+        "x10",
+        "x11",
+        "x12 azimuth",
+    )
     rows = ((name, *(check.angles[k, i] for k in ends)) for i, name in enumerate(names))
     columns = ("angle", *(f"at cranks {math.degrees(check.phi[k]):g}° [°] | 12 .12g" for k in ends))
     return table("The twelve unknowns", columns, rows, "Of the equations; the closed form gives the same.")

@@ -359,9 +359,15 @@ def _face_bound(
 
 
 def tolerance(
-    mechanism: PointingDimensions, phi_x: float, phi_y: float, widths: ArrayLike, s_y: int, s_x: int, method: str,
+    mechanism: PointingDimensions,
+    phi_x: float,
+    phi_y: float,
+    widths: ArrayLike,
+    s_y: int,
+    s_x: int,
+    method: str,
     converted: bool = False,
-) -> Tolerance:  # fmt: skip
+) -> Tolerance:
     """Bound both outputs; see `PointingMechanism.tolerance`."""
     choice("method", method, ("mixed", "mean_value"))
     given = finite_array("widths", widths)

@@ -18,9 +18,20 @@ _LEAST = {"least": 0, "why": "a tolerance is zero or more"}
 
 Grashof = Literal["crank-rocker", "double crank"]
 Column = Literal[
-    "frame", "coupler", "rocker", "type", "kind", "transmission angle", "rocker swing", "size", "largest tilt",
-    "largest axis tilt", "smallest clearance", "jammed part", "passes",
-]  # fmt: skip
+    "frame",
+    "coupler",
+    "rocker",
+    "type",
+    "kind",
+    "transmission angle",
+    "rocker swing",
+    "size",
+    "largest tilt",
+    "largest axis tilt",
+    "smallest clearance",
+    "jammed part",
+    "passes",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +103,15 @@ class SurveyTable:
     certify: Annotated[int, In(least=1, most=1_000_000, why="use 1 to 1000000 sets")] = 1000
     rows: Literal["all", "passing"] = "passing"
     columns: tuple[Column, ...] = (
-        "frame", "coupler", "rocker", "type", "transmission angle", "rocker swing", "size", "largest axis tilt",
-    )  # fmt: skip
+        "frame",
+        "coupler",
+        "rocker",
+        "type",
+        "transmission angle",
+        "rocker swing",
+        "size",
+        "largest axis tilt",
+    )
     slices: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
