@@ -153,12 +153,12 @@ class JammingReport(Assessment):
             ("tilt", f"{self.largest_tilt:.6g} rad at most, critical {critical}"),
             ("binds", f"{arcs or 'at no crank angle'} (nominal dimensions)"),
         ]
-        for name, limit, unit in (
-            ("smallest clearance", self.smallest_clearance, "mm"),
-            ("largest misalignment", self.largest_misalignment, "rad"),
+        for name, limit, side, unit in (
+            ("clearance", self.smallest_clearance, "from", "mm"),
+            ("misalignment", self.largest_misalignment, "up to", "rad"),
         ):
             if limit is not None and limit.value is not None:
-                rows.append((name, f"{limit.value:.6g} {unit}"))
+                rows.append((name, f"free {side} {limit.value:.6g} {unit}"))
         return rows
 
     @property

@@ -123,7 +123,7 @@ class Fit:
 
     @checked
     def pair(self, loosest: bool) -> tuple[Fraction, Fraction]:
-        """Return radius and clearance of the pair with the most or the least clearance."""
+        """Return radius and clearance of the pair with the largest or the smallest clearance."""
         if loosest:
             return self.radius.lower, self.clearance.upper
         return self.radius.upper, self.clearance.lower

@@ -356,21 +356,19 @@ def _bracket(
     return search.answer(works, fails, reason)
 
 
+@dataclass
 class _LimitSearch:
     """Certificates of one question, counted; ``direction`` +1 if larger values are worse, -1 if smaller ones are."""
 
-    def __init__(
-        self,
-        condition: Condition,
-        at: Callable[[float], ToleranceBox],
-        milder: Callable[[float], ToleranceBox],
-        direction: int,
-        unit: str,
-        covers: str,
-    ) -> None:
-        self.condition, self.at, self.milder, self.direction = condition, at, milder, direction
-        self.unit, self.covers, self.begin = unit, covers, perf_counter()
-        self.trials, self.why = 0, ""
+    condition: Condition
+    at: Callable[[float], ToleranceBox]
+    milder: Callable[[float], ToleranceBox]
+    direction: int
+    unit: str
+    covers: str
+    trials: int = 0
+    why: str = ""
+    begin: float = field(default_factory=perf_counter)
 
     def answer(self, works: float | None, fails: float | None, reason: str) -> CertifiedLimit:
         seconds = perf_counter() - self.begin

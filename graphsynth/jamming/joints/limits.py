@@ -43,13 +43,15 @@ def _pair(name: str, given: Range) -> Range:
     return given[0], given[1]
 
 
-def _range(name: str, value: float, given: Range | None) -> Range:
-    if given is None:
-        return (value, value)
-    low, high = (_limit(f"{name} of the range", bound) for bound in _pair(name, given))
-    if not low <= value <= high:
-        raise GeometryError(f"{name} = {value} lies outside its range ({low}, {high}); correct one of them")
-    return (low, high)
+def _fill(limits: Limits, *names: str) -> None:
+    """Check limits and their ranges; a range that is not given is the limit itself."""
+    for name in names:
+        value, given = _limit(name, getattr(limits, name)), getattr(limits, f"{name}_range")
+        low, high = (value, value) if given is None else (_limit(f"{name} of the range", v) for v in _pair(name, given))
+        if not low <= value <= high:
+            raise GeometryError(f"{name} = {value} lies outside its range ({low}, {high}); correct one of them")
+        object.__setattr__(limits, name, value)
+        object.__setattr__(limits, f"{name}_range", (low, high))
 
 
 @dataclass(frozen=True)
@@ -78,10 +80,7 @@ class JointLimits:
     axial_clearance_range: Range | None = None
 
     def __post_init__(self) -> None:
-        for name in ("tilt", "axial_clearance"):
-            value = _limit(name, getattr(self, name))
-            object.__setattr__(self, name, value)
-            object.__setattr__(self, f"{name}_range", _range(name, value, getattr(self, f"{name}_range")))
+        _fill(self, "tilt", "axial_clearance")
 
 
 @dataclass(frozen=True)
@@ -106,10 +105,7 @@ class SlideLimits:
     axial_clearance_range: Range | None = None
 
     def __post_init__(self) -> None:
-        for name in ("roll", "pitch", "axial_clearance"):
-            value = _limit(name, getattr(self, name))
-            object.__setattr__(self, name, value)
-            object.__setattr__(self, f"{name}_range", _range(name, value, getattr(self, f"{name}_range")))
+        _fill(self, "roll", "pitch", "axial_clearance")
 
 
 Limits: TypeAlias = JointLimits | SlideLimits
