@@ -121,24 +121,15 @@ def store(connection: sqlite3.Connection, evaluations: Iterable[Evaluation]) -> 
                 _drop_tied(connection, place, item)
             elif item.kind in TIED:
                 _check_tie(connection, place, item)
-            connection.execute(
-                "INSERT OR REPLACE INTO evaluations VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", (*place, *_values(item))
-            )
+            row = *place, item.kind, item.status, item.value, item.unit, item.guarantee, item.text
+            connection.execute("INSERT OR REPLACE INTO evaluations VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
     return len(items)
-
-
-def _named_dimensions(connection: sqlite3.Connection, place: tuple[int, int, int | str]) -> str | None:
-    """Name of the dimensions stored for a mechanism; None also where they cannot be read."""
-    try:
-        return fingerprint_at(connection, place)
-    except ValueError:
-        return None
 
 
 def _drop_tied(connection: sqlite3.Connection, place: tuple[int, int, int | str], item: Evaluation) -> None:
     """Drop what was found for other dimensions than the new ones."""
     mechanism = mechanism_in(item.data)
-    if mechanism is None or fingerprint(mechanism) != _named_dimensions(connection, place):
+    if mechanism is None or fingerprint(mechanism) != fingerprint_at(connection, place):
         kinds = ", ".join("?" * len(TIED))
         connection.execute(
             f"DELETE FROM evaluations WHERE (chain_id, frame, driver) = (?, ?, ?) AND kind IN ({kinds})",
@@ -148,15 +139,11 @@ def _drop_tied(connection: sqlite3.Connection, place: tuple[int, int, int | str]
 
 def _check_tie(connection: sqlite3.Connection, place: tuple[int, int, int | str], item: Evaluation) -> None:
     named = item.data.get("dimensions") if isinstance(item.data, dict) else None
-    if named is not None and named != _named_dimensions(connection, place):
+    if named is not None and named != fingerprint_at(connection, place):
         raise SpecError(
             f"the {item.kind} of {item.chain} with frame {item.frame} and driver {item.driver} is of the dimensions "
             f"{named!r}, which are not those stored: store its dimensions first, or compute it for the stored ones"
         )
-
-
-def _values(item: Evaluation) -> tuple[Any, ...]:
-    return item.kind, item.status, item.value, item.unit, item.guarantee, item.text
 
 
 def _mechanism(connection: sqlite3.Connection, item: Evaluation) -> tuple[int, int, int | str]:

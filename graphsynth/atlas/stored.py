@@ -80,14 +80,14 @@ def fingerprint(mechanism: dict[str, Any]) -> str:
 
 
 def fingerprint_at(connection: sqlite3.Connection, place: tuple[int, int, int | str]) -> str | None:
-    """Return the name of the dimensions stored for (chain, frame, driver); None where there are none.
-
-    Raises `ValueError` if the row is not JSON.
-    """
+    """Return the name of the dimensions stored for (chain, frame, driver); None where there are none to be read."""
     row = connection.execute(
         "SELECT data FROM evaluations WHERE (chain_id, frame, driver, kind) = (?, ?, ?, 'dimensions')", place
     ).fetchone()
-    mechanism = mechanism_in(data_of(row[0])) if row and row[0] else None
+    try:
+        mechanism = mechanism_in(data_of(row[0])) if row and row[0] else None
+    except ValueError:
+        return None
     return None if mechanism is None else fingerprint(mechanism)
 
 

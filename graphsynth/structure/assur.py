@@ -125,14 +125,7 @@ class Fault:
 class _System:
     """Bodies, constraints between them, and their assignment to bodies.
 
-    Parameters
-    ----------
-    graph : MechanismGraph
-    drivers : tuple of Joint
-    base : int
-        Link that is placed from the start: the frame, or a link of a floating body.
-    within : int, optional
-        Bit mask of the links that count; all by default.
+    ``base`` is placed from the start: the frame, or a link of a floating body; ``within`` masks the links that count.
     """
 
     def __init__(self, graph: MechanismGraph, drivers: tuple[Joint, ...], base: int, within: int = -1) -> None:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import FormatError
 from graphsynth.structure.connectivity import bits, breadth_first
-from graphsynth.structure.search import CanonicalSearch
+from graphsynth.structure.search import CanonicalSearch, find_root, join_images
 from graphsynth.structure.text import LINKS_MAX
 
 if TYPE_CHECKING:
@@ -110,24 +110,13 @@ def joint_orbits(graph: MechanismGraph) -> tuple[tuple[Joint, ...], ...]:
     >>> [len(orbit) for orbit in joint_orbits(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (3, 0)]))]
     [4]
     """
-    joints = graph.joints
-    number = {(joint.a, joint.b): place for place, joint in enumerate(joints)}
-    parent = list(range(len(joints)))
-
-    def root(place: int) -> int:
-        while parent[place] != place:
-            parent[place] = parent[parent[place]]
-            place = parent[place]
-        return place
-
-    for generator in graph.labelling.generators:
-        for place, (a, b, _) in enumerate(joints):
-            a, b = generator[a], generator[b]
-            one, other = root(place), root(number[min(a, b), max(a, b)])
-            parent[max(one, other)] = min(one, other)
+    number = {(joint.a, joint.b): place for place, joint in enumerate(graph.joints)}
+    parent = list(range(len(number)))
+    for image in graph.labelling.generators:
+        join_images(parent, [number[min(image[a], image[b]), max(image[a], image[b])] for a, b in number])
     orbits: dict[int, list[Joint]] = {}
-    for place, joint in enumerate(joints):
-        orbits.setdefault(root(place), []).append(joint)
+    for place, joint in enumerate(graph.joints):
+        orbits.setdefault(find_root(parent, place), []).append(joint)
     return tuple(tuple(orbit) for orbit in orbits.values())
 
 

@@ -51,18 +51,19 @@ def _cell_end(starts: int, place: int, n: int) -> int:
     return place + (rest & -rest).bit_length() if rest else n
 
 
-def _find(parent: list[int], vertex: int) -> int:
+def find_root(parent: list[int], vertex: int) -> int:
+    """Return the smallest member of the class of a vertex."""
     while parent[vertex] != vertex:
         parent[vertex] = parent[parent[vertex]]
         vertex = parent[vertex]
     return vertex
 
 
-def _merge(parent: list[int], permutation: Sequence[int]) -> bool:
+def join_images(parent: list[int], permutation: Sequence[int]) -> bool:
     """Join each vertex with its image; roots stay minimal.  Return whether any classes were joined."""
     joined = False
     for vertex, image in enumerate(permutation):
-        a, b = _find(parent, vertex), _find(parent, image)
+        a, b = find_root(parent, vertex), find_root(parent, image)
         if a != b:
             parent[max(a, b)] = min(a, b)
             joined = True
@@ -70,31 +71,15 @@ def _merge(parent: list[int], permutation: Sequence[int]) -> bool:
 
 
 class CanonicalSearch:
-    """One canonical labelling; make it, call :meth:`run`, read the results.
+    """One canonical labelling of ``n`` vertices; make it, call :meth:`run`, read the results.
 
-    Parameters
-    ----------
-    n : int
-        Number of vertices.
-    layers : sequence of sequence of int
-        ``layers[c][v]``: bit mask of the vertices joined to ``v`` by an edge of colour ``c``.
-    colours : sequence of int
-        Vertex colours; cells are ordered by colour first.
-    twins : bool
-        Exchange vertices with the same neighbours at once; the generators may then differ from those of the kernel.
+    ``layers[c][v]`` is the bit mask of the vertices joined to ``v`` by an edge of colour ``c``; cells are ordered by
+    vertex colour first.  With ``twins``, the generators may differ from those of the kernel.
 
-    Attributes
-    ----------
-    order_of_vertices : list of int
-        Vertex at each canonical position.
-    form : list of list of int
-        ``form[c][i]``: bit mask of the canonical positions joined to position ``i`` by colour ``c``.
-    generators : list of list of int
-        Automorphisms that generate the whole group.
-    index : list of int
-        Orbit sizes along the path to the first leaf; their product is the order of the group.
-    orbits : list of int
-        Smallest vertex of the orbit of each vertex.
+    Results: ``order_of_vertices``, the vertex at each canonical position; ``form[c][i]``, the bit mask of the positions
+    joined to position ``i`` by colour ``c``; ``generators`` of the whole automorphism group; ``index``, orbit sizes
+    along the path to the first leaf, whose product is the order of the group; ``orbits``, the smallest vertex of the
+    orbit of each vertex.
     """
 
     def __init__(self, n: int, layers: Sequence[Sequence[int]], colours: Sequence[int], *, twins: bool = False) -> None:
@@ -144,15 +129,15 @@ class CanonicalSearch:
                 if vertex >= 0:
                     break
                 if level == self.on_first:
-                    root = _find(self.orbits, self.first_path[level])
-                    self.index.append(sum(_find(self.orbits, v) == root for v in range(self.n)))
+                    root = find_root(self.orbits, self.first_path[level])
+                    self.index.append(sum(find_root(self.orbits, v) == root for v in range(self.n)))
                     self.on_first -= 1
                 level -= 1
             if level < 0:
                 break
             self._child(level, vertex)
             level += 1
-        self.orbits = [_find(self.orbits, v) for v in range(self.n)]
+        self.orbits = [find_root(self.orbits, v) for v in range(self.n)]
         return self
 
     def _root(self) -> None:
@@ -294,7 +279,7 @@ class CanonicalSearch:
         permutation = [0] * self.n
         for a, b in zip(source, image, strict=True):
             permutation[a] = b
-        if _merge(self.orbits, permutation):
+        if join_images(self.orbits, permutation):
             self.generators.append(permutation)
         else:
             self.others = [*self.others[1 - self.n :], permutation] if self.n > 1 else []
@@ -306,7 +291,7 @@ class CanonicalSearch:
             others = ~(1 << vertex | 1 << other)
             if any((layer[vertex] ^ layer[other]) & others for layer in self.layers):
                 continue
-            a, b = _find(self.orbits, vertex), _find(self.orbits, other)
+            a, b = find_root(self.orbits, vertex), find_root(self.orbits, other)
             if a != b:
                 self.orbits[max(a, b)] = min(a, b)
                 permutation = list(range(self.n))
@@ -327,12 +312,12 @@ class CanonicalSearch:
             for permutation in (*self.generators, *self.others):
                 if all(permutation[vertex] == vertex for vertex in self.path[:level]):
                     self.work += self.n
-                    _merge(parent, permutation)
+                    join_images(parent, permutation)
         while left:
             low = left & -left
             left ^= low
             vertex = low.bit_length() - 1
-            if _find(parent, vertex) == vertex:
+            if find_root(parent, vertex) == vertex:
                 self.left[level] = left
                 return vertex
         self.left[level] = 0

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 import sqlite3
 from contextlib import contextmanager
 from time import monotonic
 
 import pytest
 
+from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.sealing import seal
 
 
@@ -50,3 +52,24 @@ def loosened(path, *, sealed=True, anything=False):
 def altered():
     """:func:`loosened`, for tests."""
     return loosened
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory):
+    """Give a folder its copy ``x.sqlite`` of a catalogue that is built once for all tests.
+
+    It holds chains of mobility 1 with these numbers of links, and those of mobility 2 ``with_two``, the fractionated
+    ones among them.
+    """
+    made = {}
+
+    def copy(folder, links, *, with_two=()):
+        asked = tuple(links), tuple(with_two)
+        if asked not in made:
+            made[asked] = tmp_path_factory.mktemp("built") / "x.sqlite"
+            Catalogue.build(made[asked], asked[0]).close()
+            if with_two:
+                Catalogue.build(made[asked], asked[1], 2, fractionated=True).close()
+        return shutil.copy(made[asked], folder / "x.sqlite")
+
+    return copy

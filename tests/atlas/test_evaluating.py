@@ -25,19 +25,19 @@ TILT = (0.001, 0.005)
 
 
 @pytest.fixture(scope="module")
-def file(tmp_path_factory):
+def file(built, tmp_path_factory):
     """Four and six links evaluated, eight not."""
-    path = tmp_path_factory.mktemp("evaluated") / "x.sqlite"
-    with Catalogue.build(path, [4, 6, 8]) as catalogue:
+    path = built(tmp_path_factory.mktemp("evaluated"), [4, 6, 8])
+    with Catalogue(path) as catalogue:
         assert catalogue.evaluate([4, 6]) == 3
     return path
 
 
 @pytest.fixture(scope="module")
-def four(tmp_path_factory):
+def four(built, tmp_path_factory):
     """The four-bar linkage alone, with dimensions."""
-    path = tmp_path_factory.mktemp("four") / "x.sqlite"
-    with Catalogue.build(path, [4]) as catalogue:
+    path = built(tmp_path_factory.mktemp("four"), [4])
+    with Catalogue(path) as catalogue:
         assert catalogue.evaluate() == 1
     return path
 

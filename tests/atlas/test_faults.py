@@ -18,9 +18,9 @@ from graphsynth.core.errors import FormatError, GraphsynthError
 
 
 @pytest.fixture(scope="module")
-def right(tmp_path_factory):
-    path = tmp_path_factory.mktemp("right") / "x.sqlite"
-    with Catalogue.build(path, [4, 6, 8]) as catalogue:
+def right(built, tmp_path_factory):
+    path = built(tmp_path_factory.mktemp("right"), [4, 6, 8])
+    with Catalogue(path) as catalogue:
         catalogue.record([Evaluation("1.4.4.1", 0, 2, "jamming", "free", 0.1, "rad", "certified", {"a": 1})])
     return path
 

@@ -22,10 +22,8 @@ LONG = (
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("whole") / "x.sqlite"
-    Catalogue.build(path, [4, 6]).close()
-    return path
+def whole(built, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return built(tmp_path_factory.mktemp("whole"), [4, 6])
 
 
 @pytest.fixture

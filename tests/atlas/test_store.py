@@ -35,11 +35,10 @@ def rows(catalogue):
 
 
 @pytest.fixture(scope="module")
-def small(tmp_path_factory):
+def small(built, tmp_path_factory):
     """Four to ten links, W = 1; and W = 2 with fractionated chains."""
-    path = tmp_path_factory.mktemp("small") / "small.sqlite"
-    Catalogue.build(path, range(4, 11)).close()
-    with Catalogue.build(path, range(5, 10), 2, fractionated=True) as catalogue:
+    path = built(tmp_path_factory.mktemp("small"), range(4, 11), with_two=range(5, 10))
+    with Catalogue(path) as catalogue:
         yield catalogue
 
 
@@ -348,7 +347,8 @@ sys.exit(main(["catalog", "build", "--links", "4..10", "--workers", "1", "-o", s
 def test_a_file_that_may_not_grow_is_one_sentence_and_the_build_goes_on(many, tmp_path, fine):
     path = tmp_path / "x.sqlite"
     command = [sys.executable, "-c", LIMITED.format(fine=FINE), path, "200000"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    plain = dict(os.environ)  # without the width of a terminal that readline tells the processes of pytest
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=plain)
     assert (done.returncode, len(said(done.stderr))) == (2, 1), done.stderr
     assert "the catalogue cannot be written" in done.stderr
     with Catalogue.build(path, range(4, 11)) as resumed:

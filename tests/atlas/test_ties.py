@@ -40,8 +40,8 @@ def verdict(own=None, **more):
 
 
 @pytest.fixture
-def catalogue(tmp_path):
-    with Catalogue.build(tmp_path / "x.sqlite", [4]) as made:
+def catalogue(built, tmp_path):
+    with Catalogue(built(tmp_path, [4])) as made:
         yield made
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import sqlite3
 import subprocess
@@ -20,9 +21,9 @@ from ..telling import said
 
 
 @pytest.fixture(scope="module")
-def right(tmp_path_factory):
-    path = tmp_path_factory.mktemp("right") / "x.sqlite"
-    with Catalogue.build(path, [4, 6]) as catalogue:
+def right(built, tmp_path_factory):
+    path = built(tmp_path_factory.mktemp("right"), [4, 6])
+    with Catalogue(path) as catalogue:
         catalogue.record([Evaluation("1.4.4.1", 0, 2, "mass", "found", 0.1, "kg", "estimated", {"seed": 1})])
     return path
 
@@ -342,9 +343,9 @@ def test_a_full_disk_names_the_file_and_the_remedy(path, tmp_path, words, name):
     if "parquet" in words:
         pytest.importorskip("pyarrow")
     words = [str(path) if word == "FILE" else word for word in words]
-    done = subprocess.run(
-        [sys.executable, "-c", FULL, "300", *words], capture_output=True, text=True, check=False, cwd=tmp_path
-    )
+    command = [sys.executable, "-c", FULL, "300", *words]
+    plain = dict(os.environ)  # without the width of a terminal that readline tells the processes of pytest
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path, env=plain)
     assert (done.returncode, len(said(done.stderr))) == (2, 1), done.stderr
     assert name in done.stderr and ("make room" in done.stderr)
     left = {own.name for own in tmp_path.rglob("*") if own.is_file()} - {"x.sqlite"}

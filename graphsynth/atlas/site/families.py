@@ -160,17 +160,8 @@ def groups_script(connection: sqlite3.Connection) -> str:
 
 def contents(connection: sqlite3.Connection, found: list[Family], **more: Any) -> str:
     """Write the table of contents: the families with their counts, contracted graphs, and what else is given."""
-    listed = [
-        {
-            "name": family.name,
-            "mobility": family.mobility,
-            "links": family.links,
-            "joints": family.joints,
-            "chains": len(family.rows),
-            "expected": family.expected,
-        }
-        for family in found
-    ]
+    shown = ("name", "mobility", "links", "joints", "expected")
+    listed = [{name: getattr(own, name) for name in shown} | {"chains": len(own.rows)} for own in found]
     contracted = dict(connection.execute("SELECT contracted_id, edges FROM contracted").fetchall())
     return script("open", {"families": listed, "contracted": contracted, **more})
 

@@ -14,9 +14,8 @@ FLAGS = (
 
 
 @pytest.fixture(scope="session")
-def catalogue(tmp_path_factory):
-    path = tmp_path_factory.mktemp("atlas") / "small.sqlite"
-    with Catalogue.build(path, links=range(4, 9)) as small:
+def catalogue(built, tmp_path_factory):
+    with Catalogue(built(tmp_path_factory.mktemp("atlas"), range(4, 9))) as small:
         yield small
 
 

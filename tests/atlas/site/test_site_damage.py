@@ -26,9 +26,9 @@ WRONG = {
 
 
 @pytest.fixture(scope="module")
-def right(tmp_path_factory):
-    path = tmp_path_factory.mktemp("right") / "x.sqlite"
-    with Catalogue.build(path, [4]) as catalogue:
+def right(built, tmp_path_factory):
+    path = built(tmp_path_factory.mktemp("right"), [4])
+    with Catalogue(path) as catalogue:
         frame, driver = catalogue.connection.execute("SELECT frame, driver FROM mechanisms").fetchone()
         place = "1.4.4.1", frame, driver
         catalogue.record([Evaluation(*place, "dimensions", "found", data={"mechanism": {}})])
