@@ -247,21 +247,11 @@ def assess_design(
     measured: Harmonics = harmonics(sweep.pose)
     size = float(np.linalg.norm(weight * target)) or math.nan
     achieved, mean = measured.order(1), measured.mean - start
-    return Design(
-        mechanism,
-        True,
-        "",
-        target,
-        achieved,
-        mean,
-        float(np.linalg.norm(weight * (achieved - target))) / size,
-        float(np.linalg.norm(weight * mean)) / size,
-        measured.total_distortion(mechanism.Lc),
-        _off_line(weight * (sweep.pose - start), weight * target),
-        iterations,
-        1.0,
-        mechanism.full_turn(np.linspace(0.0, math.tau, samples + 1)),
-    )
+    error = float(np.linalg.norm(weight * (achieved - target))) / size
+    drift, distortion = float(np.linalg.norm(weight * mean)) / size, measured.total_distortion(mechanism.Lc)
+    off = _off_line(weight * (sweep.pose - start), weight * target)
+    motion, moved = mechanism.full_turn(np.linspace(0.0, math.tau, samples + 1)), (target, achieved, mean)
+    return Design(mechanism, True, "", *moved, error, drift, distortion, off, iterations, 1.0, motion)
 
 
 def _off_line(path: Array, wanted: Complex) -> float:

@@ -168,13 +168,6 @@ def _cover(platform: ParallelPlatform, test: Test, resolution: float, statement:
         low += float(sure.sum()) * 4.0 * side * side
         centres = centres[~sure]
     area = low + float(test(centres, 0.0).sum()) * 4.0 * side * side
-    return RegionArea(
-        area,
-        low,
-        low + len(centres) * 4.0 * side * side,
-        np.concatenate(inside),
-        np.concatenate(inside_half),
-        centres,
-        np.full(len(centres), side),
-        statement,
-    )
+    high, halves = low + len(centres) * 4.0 * side * side, np.full(len(centres), side)
+    boxes = (np.concatenate(inside), np.concatenate(inside_half), centres, halves)
+    return RegionArea(area, low, high, *boxes, statement)

@@ -204,15 +204,8 @@ class SingleMotorPlatform:
             If there is no such branch at the first angle.
         """
         guess = np.array(self.home) if start is None else triple("start", start)
-        tracked = track(
-            self._machine[None],
-            psi,
-            np.array([stop]),
-            guess[None],
-            self.Lc,
-            grown=start is None,
-            accelerations=accelerations,
-        )
+        stops, grown = np.array([stop]), start is None
+        tracked = track(self._machine[None], psi, stops, guess[None], self.Lc, grown=grown, accelerations=accelerations)
         self._require_start(BranchEnd(int(tracked.status[0])), float(psi[0]), float(tracked.end[0, 0]))
         return tracked
 
@@ -358,15 +351,8 @@ class SingleMotorPlatform:
         modes = self.all_poses(float(psi[0]))
         barrier = first_barrier(self.drives, float(psi[0]), float(psi[-1]))
         stop = np.inf if barrier is None else barrier.psi
-        tracked = track(
-            np.repeat(self._machine[None], len(modes), axis=0),
-            psi,
-            np.full(len(modes), stop),
-            modes,
-            self.Lc,
-            grown=False,
-            accelerations=False,
-        )
+        machines, stops = np.repeat(self._machine[None], len(modes), axis=0), np.full(len(modes), stop)
+        tracked = track(machines, psi, stops, modes, self.Lc, grown=False, accelerations=False)
         permutation, reasons = [], []
         for i in range(len(modes)):
             status, reason, target = BranchEnd(int(tracked.status[i])), "", -1

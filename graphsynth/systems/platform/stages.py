@@ -116,17 +116,8 @@ def _move(table: PlatformTable) -> PlatformMotion:
     crank = np.array(mechanism.crank) * np.exp(1j * (motion.psi[:, None] + np.array(mechanism.phase)))
     arm = np.array(mechanism.rocker) * np.exp(1j * (motion.theta - np.array(mechanism.delta)))
     share = table.wheel_teeth / (table.pinion_teeth + table.wheel_teeth)
-    return PlatformMotion(
-        mechanism=mechanism,
-        motion=motion,
-        O=O,
-        D=D,
-        B=O + crank,
-        C=D + arm,
-        A=mechanism.platform.elbows(motion.theta),
-        F=mechanism.platform.vertices(motion.pose),
-        wheel_radius=float(abs(O[0])) * share,
-    )
+    A, F = mechanism.platform.elbows(motion.theta), mechanism.platform.vertices(motion.pose)
+    return PlatformMotion(mechanism, motion, O, D, O + crank, D + arm, A, F, float(abs(O[0])) * share)
 
 
 def assess(

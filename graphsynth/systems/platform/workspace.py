@@ -157,22 +157,10 @@ def constant_orientation_workspace(
     loops = () if thin is not None else _chain(arcs)
     signed = [sum(_sector(arcs[i], circles[0].centre) for i in loop) for loop in loops]
     dimension = (2 if thin is None else 1) if arcs else (0 if isolated else -1)
-    return Workspace(
-        platform,
-        alpha,
-        mode,
-        bounds,
-        tuple(arcs),
-        math.fsum(signed),
-        math.fsum(arc.length for arc in arcs),
-        loops,
-        sum(part > 0.0 for part in signed) if thin is None else 0,
-        sum(part < 0.0 for part in signed),
-        tuple(isolated),
-        tuple(problem.contacts),
-        dimension,
-        problem.tolerance,
-    )
+    perimeter, holes = math.fsum(arc.length for arc in arcs), sum(part < 0.0 for part in signed)
+    components = sum(part > 0.0 for part in signed) if thin is None else 0
+    sizes, points = (math.fsum(signed), perimeter, loops, components, holes), (tuple(isolated), tuple(problem.contacts))
+    return Workspace(platform, alpha, mode, bounds, tuple(arcs), *sizes, *points, dimension, problem.tolerance)
 
 
 def _checked(
