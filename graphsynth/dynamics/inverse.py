@@ -86,10 +86,15 @@ def inverse_dynamics(
     speed, acceleration : array_like, scalar or shape (n,)
         First and second time derivative of the input at every sample.
     times : array_like, scalar or shape (n,), optional
-        Time of every sample, s, at which loads given as functions are taken.  By default ``input / speed``, the time
-        since the input was 0, if the speed is constant (0 at rest); at a speed that varies it must be given.
+        Time of every sample, s, for loads given as functions.  By default ``input / speed``, if the speed is constant
+        (0 at rest); at a speed that varies it must be given.
     refuse : bool, optional
         False: NaN at inputs where friction leaves no loads, or several; by default that is an error.
+
+    Returns
+    -------
+    InverseDynamics
+        Efforts of the drivers, N m or N, and reactions at every sample (estimated).
 
     Raises
     ------
@@ -99,8 +104,6 @@ def inverse_dynamics(
 
     Examples
     --------
-    A bar of 1 kg and 1 m held still, level: half its weight times its length.
-
     >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
     >>> from graphsynth.dynamics.model import Body
     >>> arm = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
@@ -113,9 +116,8 @@ def inverse_dynamics(
     passive = tuple(e.idle if isinstance(e, MotorDrive) else e for e in model.elements)
     compiled = compile_model(replace(model, elements=passive, prescribed=held))
     n = len(motion.inputs)
-    rate, second = (
-        _by_sample(name, given, n)[:, None, None] for name, given in (("speed", speed), ("acceleration", acceleration))
-    )
+    given = {"speed": speed, "acceleration": acceleration}
+    rate, second = (_by_sample(name, values, n)[:, None, None] for name, values in given.items())
     instants = _times(compiled, motion, rate.ravel(), second.ravel(), times)
     q = compiled.to_coordinates(motion.poses)
     rates = motion.velocities * rate
