@@ -184,15 +184,8 @@ def _data(stage: _Stage, seconds: float, driver: int) -> dict[str, Any]:
         {"name": name, "link": link, "colour": TRACE_COLOURS[k % len(TRACE_COLOURS)], "at": _short(stage, link, at)}
         for k, (name, (link, at)) in enumerate(mechanism.points.items())
     ]
-    return {
-        "count": len(frames.poses),
-        "loop": frames.loops,
-        "seconds": seconds,
-        "poses": poses,
-        "drivers": drivers,
-        "points": points,
-        "grip": _grip_data(stage, driver),
-    }
+    played = {"count": len(frames.poses), "loop": frames.loops, "seconds": seconds, "grip": _grip_data(stage, driver)}
+    return played | {"poses": poses, "drivers": drivers, "points": points}
 
 
 def _short(stage: _Stage, link: int, at: tuple[float, float]) -> list[float]:

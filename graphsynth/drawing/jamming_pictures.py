@@ -211,14 +211,8 @@ def report_picture(report: JammingReport) -> Figure:
     if report.critical_tilt is not None:
         for sign in (1.0, -1.0):
             tilts.axhline(sign * 1e3 * report.critical_tilt, color=LIGHT["soft"], lw=1.0, ls=(0, (4, 2)))
-        tilts.annotate(
-            "critical tilt",
-            (f[0], 1e3 * report.critical_tilt),
-            xytext=(4, 3),
-            fontsize=8,
-            textcoords="offset points",
-            color=LIGHT["note"],
-        )
+        at, look = (f[0], 1e3 * report.critical_tilt), {"fontsize": 8, "color": LIGHT["note"]}
+        tilts.annotate("critical tilt", at, xytext=(4, 3), textcoords="offset points", **look)
     gaps.plot(f, report.table.interference, color=LIGHT["ink"], lw=1.5)
     gaps.axhline(0.0, color=LIGHT["soft"], lw=1.0)
     if report.certificate is not None:
