@@ -272,15 +272,8 @@ def _against(row: Row, truth: _Truth, drive: _Drive) -> Row:
 def reduction_problem(machine: Any, times: Any, inductances: Sequence[float], effort: Effort | None = None) -> Problem:
     """Leave the inductance out: what the limit L -> 0 costs in accuracy, and what keeping it costs in time.
 
-    Parameters
-    ----------
-    machine : object
-        Has ``inductance_study``, a motor, and ``simulate``: a motor-driven platform, a braider.
-    times : array_like
-        Output times, s.
-    inductances : sequence of float
-        H, at least three.
-    effort : Effort, optional
+    The machine has ``inductance_study``, a motor, and ``simulate``: a motor-driven platform, a braider. Output times in
+    s, at least three inductances in H.
     """
     effort = effort or Effort()
     chosen = effort.some(inductances)

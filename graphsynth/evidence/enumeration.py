@@ -26,13 +26,7 @@ _NOTE = (
 class Growth:
     """Power law ``seconds = factor * graphs ** exponent`` through the largest runs.
 
-    Attributes
-    ----------
-    exponent, factor : float
-    spread : float
-        Largest ratio between a run and the law (1: all on the line).
-    rows : int
-        Runs used.
+    `spread` is the largest ratio between a run and the law (1: all on the line), `rows` the number of runs used.
     """
 
     exponent: float

@@ -206,15 +206,8 @@ def lambda_problem(
 ) -> Problem:
     """Find the largest misalignment of the driven axis of a four-bar linkage with equal bearings in its moving joints.
 
-    Parameters
-    ----------
-    linkage : TiltedFourBar
-        Planar, and its crank turns fully.
-    bearing : Bearing
-    direction : float
-        Of the axis about which the motor axis is tilted, radians from the frame line.
-    condition : {"A", "B"}
-    effort : Effort, optional
+    The linkage is planar, and its crank turns fully; `direction` is that of the axis about which the motor axis is
+    tilted, radians from the frame line.
     """
     from graphsynth.evidence.position import four_bar
     from graphsynth.jamming.joints.limits import Misalignment
@@ -241,25 +234,10 @@ def coupled_problem(
 ) -> Problem:
     """Find the largest misalignment of a mechanism whose bearings share it, by samples and by proof.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-    bearings
-        As for `graphsynth.jamming.joints.assess_coupled`.
-    tilt : Misalignment
-    name : str
-        Of the mechanism, for the picture.
-    condition : {"A", "B"}
-    exact : mpmath number, optional
-        The largest misalignment, radians, if it is known; else the reference are proved bounds, 1e-6 apart.
-    inputs : (float, float), optional
-        Range of the input, radians.
-    effort : Effort, optional
-
-    Raises
-    ------
-    GeometryError
-        If the mechanism does not move through the range, or no bounds can be proved.
+    Bearings as for `graphsynth.jamming.joints.assess_coupled`; `name` is that of the mechanism, for the picture;
+    `exact` the largest misalignment, radians, if it is known: else the reference are proved bounds, 1e-6 apart;
+    `inputs` the range of the input, radians. A `GeometryError` says that the mechanism does not move through it, or
+    that no bounds can be proved.
     """
     from graphsynth.jamming.joints.assess import assess_coupled
     from graphsynth.jamming.joints.scale import largest_scale

@@ -74,25 +74,11 @@ def _point(poses: Array, watched: tuple[int, tuple[float, float]]) -> Complex:
 
 
 def precise_poses(mechanism: Mechanism, u: float, guess: Array) -> list[list[Any]]:
-    """Poses of all links at one input with 50 digits: Newton's method on the joint equations, from a pose near by.
+    """Poses [x, y, theta] of all links at one input with 50 digits: Newton's method on the joint equations.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-        With one driver of a revolute joint that follows the input.
-    u : float
-        Input, taken as the double it is.
-    guess : ndarray, shape (links, 3)
-        Decides the branch.
-
-    Returns
-    -------
-    list of [x, y, theta], mpmath numbers
-
-    Raises
-    ------
-    GeometryError
-        Another driver, or no convergence from this guess.
+    The input is taken as the double it is; the pose `guess` (links, 3) decides the branch. The mechanism has one
+    driver, of a revolute joint, that follows the input: a `GeometryError` refuses others, and says where there is no
+    convergence.
     """
     import mpmath
 
@@ -152,30 +138,11 @@ def position_problem(
     inputs: tuple[float, float] = (0.0, math.tau),
     effort: Effort | None = None,
 ) -> Problem:
-    """Compare every way to the positions over a range of the input.
+    """Compare every way to the positions over a range of the input, radians.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-        That can be moved through the range; its driver as for `precise_poses`.
-    name : str
-        Of the mechanism, for the picture.
-    closed : (str, function), optional
-        A closed form of the watched point: the last revolute joint between two moving links.
-    inputs : (float, float), optional
-        Range of the input, radians.
-    effort : Effort, optional
-
-    Returns
-    -------
-    Problem
-        Error: largest distance of the watched point from the reference over the characteristic length; seconds for one
-        position.
-
-    Raises
-    ------
-    GeometryError
-        If the motion ends within the range.
+    The mechanism moves through the range, or a `GeometryError` says so; its driver is as for `precise_poses`. A closed
+    form gives the watched point: the last revolute joint between two moving links. Error: largest distance of the
+    watched point from the reference over the characteristic length; seconds for one position.
     """
     effort = effort or Effort()
     nodes = np.linspace(*inputs, NODES + 1)
@@ -308,11 +275,7 @@ def _proof_row(mechanism: Mechanism, grid: Array, truth: Complex, watched: Any, 
 def batch_problem(crank: float, largest: float, effort: Effort | None = None) -> Problem:
     """Move crank-rockers with one crank and other lengths up to ``largest``, at 73 crank angles each.
 
-    Parameters
-    ----------
-    crank, largest : float
-        In one unit; ``largest`` is at least four cranks.
-    effort : Effort, optional
+    Both in one unit; ``largest`` is at least four cranks.
 
     Examples
     --------

@@ -226,20 +226,10 @@ class ToleranceStatus(IntEnum):
 class AngleBounds:
     """One output over the box of lengths, radians.
 
-    Attributes
-    ----------
-    nominal : float
-        At the middle of the box.
-    lower, upper : float
-        Certified bounds; NaN if undecided.
-    corner_lower, corner_upper : float
-        Extremes over the 32 corners of the box (estimate from inside); NaN if a corner cannot be assembled.
-    first_order : float
-        Sum of ``|d output / d l_i| width_i`` (estimate).
-    gradient : tuple of float
-        Derivatives by l1 to l5 at the middle, rad per unit of length.
-    monotone : tuple of bool
-        Lengths for which the sign of the derivative is proved over the whole box.
+    `nominal`: at the middle of the box; `lower`, `upper`: certified bounds, NaN if undecided; `corner_lower`,
+    `corner_upper`: extremes over the 32 corners of the box (estimate from inside), NaN if a corner cannot be assembled;
+    `first_order`: sum of ``|d output / d l_i| width_i`` (estimate); `gradient`: derivatives by l1 to l5 at the middle,
+    rad per unit of length; `monotone`: lengths for which the sign of the derivative is proved over the whole box.
     """
 
     nominal: float
