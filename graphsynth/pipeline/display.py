@@ -116,13 +116,10 @@ def chart(
     from graphsynth.drawing.plots import line_plot
 
     across, up = unit_in(x), unit_in(y)
-
-    def converted(line: Line) -> Line:
-        return replace(line, x=across.from_si(np.asarray(line.x)), y=up.from_si(np.asarray(line.y)))
-
+    drawn = [replace(n, x=across.from_si(np.asarray(n.x)), y=up.from_si(np.asarray(n.y))) for n in lines]
     bands = [replace(band, start=across.from_si(band.start), stop=across.from_si(band.stop)) for band in bands]
     svg = line_plot(
-        [converted(line) for line in lines],
+        drawn,
         x,
         y,
         levels=[replace(level, y=up.from_si(level.y)) for level in levels],

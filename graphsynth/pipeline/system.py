@@ -166,10 +166,7 @@ def system(name: str, place: Place | None = None) -> System:
 
 
 def plans_of(name: str, *, structure: bool = False) -> tuple[Plan, ...]:
-    """Return the problems of a system, those that other packages announce included.
-
-    `structure` says whether the scene has a structural question.
-    """
+    """Return the problems of a system, those that other packages announce included; more with a structural question."""
     found = list(system(name).evidence)
     for point in announced("evidence").select(name=name):
         found += point.load()

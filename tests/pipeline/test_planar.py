@@ -102,6 +102,30 @@ def test_a_motor_brings_it_near_its_speed_without_load(tmp_path: Path) -> None:
     assert 0.0 < found["ripple of the speed"] < 0.1
 
 
+@pytest.mark.parametrize(
+    "own",
+    [
+        {"stall_Nm": 0.04, "no_load": "3000 rpm"},
+        # K_m K w_d / r at rest; without load at K w_d / (K + c)
+        {"direct_current": {"resistance_ohm": 1, "inductance_H": 1e-4, "constant_V_s": 0.01, "gain_V_s": 0.01,
+                            "speed": "6000 rpm"}},
+    ],
+    ids=["straight", "direct current"],
+)  # fmt: skip
+def test_a_motor_behind_a_train(tmp_path: Path, own: dict[str, Any]) -> None:
+    """Two stages of 1:4 and 2:5 bring 3000 rpm down to 300; the rotor weighs a hundred times its inertia there."""
+    motor = {"end_s": 0.5, "inertia_kg_m2": 1e-6, "stages": [[10, 40], [20, 50]], **own}
+    report = execute(scene(tmp_path, ["records"], loads={"bar_kg_per_m": 0.005, "motor": motor}))
+    assert report["records"][0].good
+    assert margins(report)["mean speed with the motor"] == pytest.approx(10 * math.pi, rel=1e-2)
+
+
+def test_a_motor_has_one_characteristic(tmp_path: Path) -> None:
+    for motor in ({"end_s": 1}, {"end_s": 1, "stall_Nm": 1}):
+        with pytest.raises(SceneError, match=r"needs stall_Nm and no_load_rad_s, or .*direct_current"):
+            scene(tmp_path, ["records"], loads={"bar_kg_per_m": 0.005, "motor": motor})
+
+
 BEARINGS = {"radius_mm": 17.5, "height_mm": 10, "clearance_mm": 0.03}
 
 

@@ -14,10 +14,12 @@ from graphsynth.pipeline.products import Candidate, Columns, Outcome, Quantity, 
 from graphsynth.pipeline.stages import Context
 
 if TYPE_CHECKING:
+    from graphsynth.dynamics.elements import MotorDrive
     from graphsynth.dynamics.model import Body, DynamicModel
-    from graphsynth.jamming.joints.limits import JointLimits, Misalignment
+    from graphsynth.jamming.joints.limits import Misalignment
     from graphsynth.kinematics.dimensional.goals import Goals, Target
     from graphsynth.kinematics.engine.result import Motion
+    from graphsynth.mechanism.laws import Driver
     from graphsynth.mechanism.model import Mechanism
 
 
@@ -137,10 +139,8 @@ def _target(table: EmbodyTable) -> Target | None:
 def _crank(mechanism: Mechanism) -> float:
     """Length of the first driven link: from its driven joint to its next one; 1 for a slider."""
     driver = mechanism.drivers[0]
-    at = [
-        joint.at_a if joint.a == driver.link else joint.at_b for joint in mechanism.joints if driver.link in joint.pair
-    ]
     joints = [joint for joint in mechanism.joints if driver.link in joint.pair]
+    at = [joint.at_a if joint.a == driver.link else joint.at_b for joint in joints]
     first = next(p for p, joint in zip(at, joints, strict=True) if driver.base in joint.pair)
     others = [math.dist(p, first) for p, joint in zip(at, joints, strict=True) if driver.base not in joint.pair]
     return others[0] if others and others[0] > 0.0 else 1.0
@@ -202,7 +202,7 @@ def _extent(motion: Motion) -> float:
     return float(np.hypot(*(high - low)))
 
 
-def assess(context: Context, moved: Moved, *parts: Jammed | Driven) -> Record:
+def assess(context: Context, moved: Moved, *parts: Part) -> Record:
     """Give the record of a candidate: what its motion, its bearings and its loads say."""
     words = ["moves over the whole range (estimated)", *(part.words for part in parts if part.words)]
     verdicts = [part.good for part in parts if part.words]
@@ -244,8 +244,8 @@ _SAMPLES = 401
 
 
 @dataclass(frozen=True, slots=True)
-class Jammed:
-    """What the bearings do."""
+class Part:
+    """What the bearings do, or what the loads need."""
 
     words: str
     good: bool | None
@@ -253,29 +253,19 @@ class Jammed:
     reason: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Driven:
-    """What the loads need."""
-
-    words: str
-    good: bool | None
-    margins: tuple[Quantity, ...]
-    reason: str = ""
-
-
-def jamming(context: Context, moved: Moved) -> Jammed:
+def jamming(context: Context, moved: Moved) -> Part:
     """Assess all bearings together when the driven axis is tilted; proved if ``certify`` is true.
 
-    Raises
-    ------
-    Rejected
-        If they jam (or, with ``certify``, are not proved free) and ``must_be_free`` is true.
+    It is `Rejected` if they jam (or, with ``certify``, are not proved free) and ``must_be_free`` is true.
     """
-    from graphsynth.jamming.joints import assess_coupled, certify_coupled
+    from graphsynth.jamming.bearing.bearing import Bearing
+    from graphsynth.jamming.joints import assess_coupled, bearing_limits, certify_coupled
     from graphsynth.jamming.verdict import Verdict
 
     table: BearingsTable = context.scene.mechanism.bearings
-    limits, tilt = _limits(table), _tilt(table, moved.motion.mechanism)
+    bearing = Bearing(table.radius_mm, table.height_mm, table.clearance_mm)
+    limits = bearing_limits(bearing, table.condition, clearance_tolerance=table.clearance_tolerance_mm)
+    tilt = _tilt(table, moved.motion.mechanism)
     report = assess_coupled(moved.motion, limits, tilt, condition=table.condition)
     verdict, reason = report.verdict, report.reason
     if table.certify:
@@ -297,16 +287,7 @@ def jamming(context: Context, moved: Moved) -> Jammed:
         Quantity.of_si("tilt allowed", table.alpha * report.smallest_scale, "deg"),
         Quantity.of_si("worst input", report.worst_input, "deg"),
     )
-    return Jammed(f"bearings: {verdict.value}", good, margins, reason if verdict is Verdict.UNDECIDED else "")
-
-
-def _limits(table: BearingsTable) -> JointLimits:
-    from graphsynth.jamming.bearing.bearing import Bearing
-    from graphsynth.jamming.joints import bearing_limits
-
-    bearing = Bearing(table.radius_mm, table.height_mm, table.clearance_mm)
-    found: JointLimits = bearing_limits(bearing, table.condition, clearance_tolerance=table.clearance_tolerance_mm)
-    return found
+    return Part(f"bearings: {verdict.value}", good, margins, reason if verdict is Verdict.UNDECIDED else "")
 
 
 def _tilt(table: BearingsTable, mechanism: Mechanism) -> Misalignment:
@@ -324,7 +305,7 @@ def _tilt(table: BearingsTable, mechanism: Mechanism) -> Misalignment:
     )
 
 
-def dynamics(context: Context, moved: Moved) -> Driven:
+def dynamics(context: Context, moved: Moved) -> Part:
     """Find the torque of a constant speed; with a motor, also start from rest."""
     import numpy as np
 
@@ -343,9 +324,9 @@ def dynamics(context: Context, moved: Moved) -> Driven:
         Quantity("largest reaction", float(np.linalg.norm(forces, axis=-1).max()), "N"),
     )
     if table.motor is None:
-        return Driven("", None, margins)
+        return Part("", None, margins)
     words, good, more, reason = _start_up(table, table.motor, moved)
-    return Driven(words, good, (*margins, *more), reason)
+    return Part(words, good, (*margins, *more), reason)
 
 
 def model_of(table: LoadsTable, mechanism: Mechanism, elements: tuple[Any, ...] = ()) -> DynamicModel:
@@ -372,30 +353,31 @@ def _body(table: LoadsTable, mechanism: Mechanism, link: int) -> Body:
     return Body.combined(*bars)
 
 
+def _drive(motor: MotorTable, driver: Driver, sense: float) -> MotorDrive:
+    """Return the motor and its train at a driver's joint, turning in the given sense."""
+    from graphsynth.dynamics.elements import MotorDrive
+    from graphsynth.dynamics.motors import DCMotor, LinearCharacteristic, Train
+
+    train = Train.of_teeth(motor.stages, motor.efficiency) if motor.stages else Train()
+    if (own := motor.direct_current) is None:
+        stall, slope = sense * (motor.stall or 0.0), (motor.stall or 0.0) / (motor.no_load or 1.0)
+        return MotorDrive(driver.base, driver.link, LinearCharacteristic(stall, slope, motor.inertia), train)
+    values = own.resistance, own.inductance, own.constant, own.constant, own.gain, sense * own.speed
+    return MotorDrive(driver.base, driver.link, DCMotor(*values, rotor_inertia=motor.inertia), train)
+
+
 def _start_up(table: LoadsTable, motor: MotorTable, moved: Moved) -> tuple[str, bool, tuple[Quantity, ...], str]:
     """Start from rest with the motor; a run that does not reach the end is reported as such."""
     import numpy as np
 
-    from graphsynth.dynamics.elements import TorqueSource
     from graphsynth.dynamics.integrate import simulate_dynamics
 
     mechanism = moved.motion.mechanism
     driver = mechanism.drivers[0]
-    slope = motor.stall / motor.no_load
     angle = moved.motion.poses[:2, driver.link, 2] - moved.motion.poses[:2, driver.base, 2]
     sense = math.copysign(1.0, angle[1] - angle[0])  # in which the input grows
-
-    def torque(t: float, angle: float, speed: float) -> float:
-        return sense * motor.stall - slope * speed
-
-    source = TorqueSource(driver.base, driver.link, torque, rotor_inertia=motor.inertia)
-    run = simulate_dynamics(
-        model_of(table, mechanism, (source,)),
-        np.linspace(0.0, motor.end, _SAMPLES),
-        pose=moved.motion.poses[0],
-        rtol=1e-7,
-        atol=1e-9,
-    )
+    model, times = model_of(table, mechanism, (_drive(motor, driver, sense),)), np.linspace(0.0, motor.end, _SAMPLES)
+    run = simulate_dynamics(model, times, pose=moved.motion.poses[0], rtol=1e-7, atol=1e-9)
     if not run.completed:
         return f"start-up stops at {run.reached:.3g} s", False, (), run.message
     _, speed = run.coordinate(driver.base, driver.link)

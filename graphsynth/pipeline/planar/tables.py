@@ -110,13 +110,34 @@ class BearingsTable:
 
 
 @dataclass(frozen=True, slots=True)
-class MotorTable:
-    """A motor with a straight characteristic on the driven link: torque at rest, speed without load."""
+class DirectCurrentTable:
+    """A direct-current motor with voltage ``gain`` times what its speed lacks; one constant for torque and back-emf."""
 
-    stall: Annotated[float, In("Nm", above=0)]
-    no_load: Annotated[float, In("rad/s", above=0)]
+    resistance: Annotated[float, In("ohm", above=0)]
+    constant: Annotated[float, In("V s", above=0)]
+    gain: Annotated[float, In("V s", above=0)]
+    speed: Annotated[float, In("rad/s", above=0)]
+    inductance: Annotated[float, In("H", least=0)] = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class MotorTable:
+    """A motor on the driven link and its train: stages [driving teeth, driven teeth], with an efficiency each."""
+
     end: Annotated[float, In("s", above=0)]
+    stall: Annotated[float | None, In("Nm", above=0)] = None
+    no_load: Annotated[float | None, In("rad/s", above=0)] = None
     inertia: Annotated[float, In("kg m^2")] = 0.0
+    direct_current: DirectCurrentTable | None = None
+    stages: tuple[tuple[int, int], ...] = ()
+    efficiency: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        straight = [self.stall is not None, self.no_load is not None]
+        require(
+            all(straight) if self.direct_current is None else not any(straight),
+            "needs stall_Nm and no_load_rad_s, or [mechanism.loads.motor.direct_current], but not both",
+        )
 
 
 @dataclass(frozen=True, slots=True)
