@@ -317,7 +317,8 @@ def moved(value: Any, rng: np.random.Generator) -> Any:
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
     if isinstance(value, np.ndarray) and value.dtype.kind in "fc":
         size = 10.0 ** rng.uniform(-15, -1) * (rng.random(value.shape) < rng.random())
-        found = (value * (1.0 + size * rng.standard_normal(value.shape))).astype(value.dtype)
+        with np.errstate(all="ignore"):  # of results that nobody has written yet
+            found = (value * (1.0 + size * rng.standard_normal(value.shape))).astype(value.dtype)
         found.flags.writeable = value.flags.writeable
         return found
     return duplicate(value)
