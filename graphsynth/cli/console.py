@@ -51,9 +51,9 @@ def facts(rows: Iterable[tuple[str, str]]) -> None:
 
 
 def note(text: str) -> None:
-    """Print a remark for people; nobody need be there to read it."""
+    """Print a remark for people, one line whatever the terminal's width; nobody need be there to read it."""
     with suppress(OSError):
-        sys.stderr.write("\n".join(map(wrapped, text.split("\n"))) + "\n")
+        sys.stderr.write(text + "\n")
     settle(sys.stderr)
 
 

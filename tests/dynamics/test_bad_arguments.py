@@ -114,8 +114,8 @@ CALLS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]] = {
     "type one circles": lambda: (of("singular_loci", "type_one_circles"), ON),
     "isolated points": lambda: (of("singular_loci", "isolated_singular_points"), ON | {"sigma": SIGMA, "nodes": 12}),
     "singularity": lambda: (of("singularity", "singularity"), at() | {"platform": G1, "tolerance": 1e-9}),
-    "statics": lambda: (of("statics", "statics"), at() | {"platform": G1, "wrench": (1, 0, 0), "tolerance": 1e-9}),
-    "crank statics": lambda: (of("statics", "crank_statics"), {
+    "statics": lambda: (of("singularity", "statics"), at() | {"platform": G1, "wrench": (1, 0, 0), "tolerance": 1e-9}),
+    "crank statics": lambda: (of("singularity", "crank_statics"), {
         "mechanism": DRIVEN, "psi": 0.0, "pose": DRIVEN.home_pose(0.0), "wrench": (1, 0, 0),
     }),
     "link poses": lambda: (of("rank_check", "link_poses"), turn()),

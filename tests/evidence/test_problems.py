@@ -42,7 +42,7 @@ def test_a_hull_without_the_crossing_is_a_failure(monkeypatch):
     from types import SimpleNamespace
 
     from graphsynth.evidence import crossing
-    from graphsynth.jamming import intersection as circle_ellipse
+    from graphsynth.jamming.intersection import hull as circle_ellipse, surrogate_problem
 
     real = circle_ellipse.exact_hull
 
@@ -50,7 +50,7 @@ def test_a_hull_without_the_crossing_is_a_failure(monkeypatch):
         found = real(problem)
         return SimpleNamespace(hull=found.hull + 1e-9)
 
-    truth = crossing.precise_crossing(problem := circle_ellipse.surrogate_problem(Bearing(), SINE))
+    truth = crossing.precise_crossing(problem := surrogate_problem(Bearing(), SINE))
     assert crossing._hull_row(problem, truth, QUICK)[1].status is RowStatus.OK
     monkeypatch.setattr(circle_ellipse, "exact_hull", shifted)
     row = crossing._hull_row(problem, truth, QUICK)[1]

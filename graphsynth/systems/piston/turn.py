@@ -118,6 +118,10 @@ def piston_turn(machine: PistonMachine, length: float | None = None) -> PistonTu
     length : float, optional
         Of piston and shoe, for the forces at their ends, m; the stroke by default.
 
+    Returns
+    -------
+    PistonTurn
+
     Raises
     ------
     GeometryError
@@ -177,6 +181,10 @@ def compare_pistons(machine: PistonMachine, length: float | None = None) -> Pist
         With a second group.
     length : float, optional
         Of both pistons and of the crosshead's shoe, m; the stroke by default.
+
+    Returns
+    -------
+    PistonComparison
 
     Raises
     ------

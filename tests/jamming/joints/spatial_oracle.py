@@ -60,18 +60,30 @@ class Spatial:
         x, least = self.solve()
         return least, float(np.abs(self.gaps(x)[0]).max())
 
-    def solve(self):
-        x0 = np.zeros(6 * len(self.free) + 1)
+    def solve(self, starts=6):
+        """Return the best of several local searches that close the loops, the first of them from the plane poses."""
+        rng = np.random.default_rng(1)
+        found = [self._search(0.5 * rng.standard_normal(6 * len(self.free)) * (k > 0)) for k in range(starts)]
+        missed = [float(np.abs(self.gaps(x)[0]).max()) for x in found]
+        least = [float(max(self.gaps(x)[1])) for x in found]
+        best = min(range(starts), key=lambda k: (max(missed[k], 1e-7), least[k]))
+        return found[best], least[best]
+
+    def _search(self, start):
+        x0 = np.append(start, 0.0)
         x0[-1] = max(1.0, *self.gaps(x0)[1])
-        found = minimize(
-            lambda x: x[-1], x0, jac=lambda x: np.eye(x.size)[-1], method="SLSQP",
+        return minimize(
+            lambda x: x[-1],
+            x0,
+            jac=lambda x: np.eye(x.size)[-1],
+            method="SLSQP",
             bounds=[(-9.0, 9.0)] * (x0.size - 1) + [(0.0, None)],
             constraints=[
                 {"type": "eq", "fun": lambda x: self.gaps(x)[0]},
                 {"type": "ineq", "fun": lambda x: x[-1] ** 2 - self.gaps(x)[1] ** 2},
-            ], options={"ftol": 1e-13, "maxiter": 300},
-        )  # fmt: skip
-        return found.x, float(max(self.gaps(found.x)[1]))
+            ],
+            options={"ftol": 1e-13, "maxiter": 300},
+        ).x
 
 
 def spatial(mechanism, poses, tilt, limits):
