@@ -173,6 +173,7 @@ def test_a_train_that_holds_the_mechanism_says_so():
     assert not motion.completed and "holds the mechanism at rest" in motion.message
 
 
+@pytest.mark.slow  # the smaller the inductance, the stiffer
 def test_limit_without_inductance_is_of_first_order():
     keep = {"keep": {(0, 1): 0.4}, "modes": {0: 1}, "method": "Radau", "rtol": 1e-10}
     limit = simulate_dynamics(driven_four_bar(MotorDrive(0, 1, replace(DC, inductance=0.0))), [0.0, 0.5], **keep)

@@ -48,7 +48,7 @@ PLANAR = [
     (5, 2, 5),
     (7, 2, 8),
     (6, 3, 6),
-    (8, 3, 9),
+    pytest.param(8, 3, 9, marks=pytest.mark.slow),
     (7, 4, 7),
 ]
 

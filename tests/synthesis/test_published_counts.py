@@ -62,7 +62,15 @@ def test_chains(row):
         assert count_chains(row["links"], row["mobility"], fractionated=True) == row["with_fractionated"]
 
 
-@pytest.mark.parametrize("row", [row for row in rows("chains") if row.values[0]["count"] < 10_000])
+def listed():
+    found = [row for row in rows("chains") if row.values[0]["count"] < 10_000]
+    return [
+        pytest.param(*row.values, id=row.id, marks=pytest.mark.slow if row.values[0]["count"] > 3_000 else row.marks)
+        for row in found
+    ]
+
+
+@pytest.mark.parametrize("row", listed())
 def test_chains_listed(row):
     row_count, links, mobility = row["count"], row["links"], row["mobility"]
     listed = list(enumerate_chains(links, mobility))

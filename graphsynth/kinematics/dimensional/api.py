@@ -348,7 +348,7 @@ class _Run:
         self.ended = False
 
     def start(self, design: Design, attempt: int, round_: int) -> None:
-        """SearchResult once; without a target an accepted result ends the run."""
+        """Search once; without a target an accepted result ends the run."""
         random = np.random.default_rng([self.seed, attempt])
         problem = DimensionProblem(design, self.goals, random, round_ if self.goals.target is not None else 0)
         found = search(problem, attempt, random, self.deadline, effort=self.effort)
