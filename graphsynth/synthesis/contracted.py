@@ -2,7 +2,7 @@
 
 They are the 2-connected loopless multigraphs of minimum degree 3 with a given number of independent loops
 (``docs/explanation/enumeration.md``).  There are few of them, so the lists up to eight loops are shipped as package
-data.  ``python -m graphsynth.synthesis.regenerate LOOPS FOLDER`` makes the lists anew, or those for more loops; the
+data.  ``python -m graphsynth.synthesis.contracted LOOPS FOLDER`` makes the lists anew, or those for more loops; the
 environment variable ``GRAPHSYNTH_CONTRACTED`` names a folder where lists for more than eight loops are looked for.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import lzma
 import os
+import sys
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -117,7 +118,7 @@ def contracted_graphs(loops: int, vertices: int) -> NDArray[np.uint8]:
     if loops < 2 or not has_contracted_graphs(loops, vertices):
         raise TooLargeError(
             f"there is no list of contracted graphs with {loops} loops (2..{SHIPPED_LOOPS} are shipped): make it with "
-            f"'python -m graphsynth.synthesis.regenerate {loops} FOLDER' and set {FOLDER_VARIABLE}=FOLDER"
+            f"'python -m graphsynth.synthesis.contracted {loops} FOLDER' and set {FOLDER_VARIABLE}=FOLDER"
         )
     if not has_contracted_graphs(loops):
         return _made(loops, vertices)
@@ -170,3 +171,25 @@ def generate(loops: int, vertices: int | None = None, smaller: dict[int, Layers]
                     codes = _unique_rows(np.concatenate([codes, _unique_rows(buffer[:count])]))
             layers[k] = _from_codes(codes, k)
     return found
+
+
+def main(arguments: list[str]) -> int:
+    """Make the lists for 2..LOOPS loops and write them to FOLDER."""
+    if len(arguments) != 2 or not arguments[0].isdecimal() or not 2 <= int(arguments[0]) <= 10:
+        sys.stderr.write("usage: python -m graphsynth.synthesis.contracted LOOPS FOLDER, with LOOPS from 2 to 10\n")
+        return 2
+    folder = Path(arguments[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    found: dict[int, Layers] = {}
+    for loops in range(2, int(arguments[0]) + 1):
+        found = generate(loops, smaller=found)
+        data = encode(found[loops])
+        (folder / f"contracted-{loops}.xz").write_bytes(data)
+        count = sum(map(len, found[loops].values()))
+        sys.stdout.write(f"{loops} loops: {count} contracted graphs, {len(data)} bytes\n")
+        sys.stdout.flush()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -194,7 +194,7 @@ def check_loops(loops: int, links: int, mobility: int, space: int, higher: Mappi
     if loops <= _MOST_LOOPS:
         takes = "five minutes and 1.5 GB" if loops == 9 else "hours and tens of GB"
         remedy = (
-            f"make their contracted graphs once with 'python -m graphsynth.synthesis.regenerate {loops} FOLDER' "
+            f"make their contracted graphs once with 'python -m graphsynth.synthesis.contracted {loops} FOLDER' "
             f"({takes}), set {FOLDER_VARIABLE}=FOLDER, and share the work out with --shard i/m over m machines"
         )
     else:

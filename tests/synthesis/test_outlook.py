@@ -47,7 +47,7 @@ def test_without_anything_smaller_to_count_every_link_may_be_the_frame():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: count_chains(20), r"2e\+11 chains.* 4\d hours on one core.*regenerate 9.*1.5 GB"),
+        (lambda: count_chains(20), r"2e\+11 chains.* 4\d hours on one core.*contracted 9.*1.5 GB"),
         (lambda: count_chains(30), "14 independent loops.* years.*cannot be made"),
         (lambda: count_mechanisms(StructuralSpec(W=1, links=20)), r"e\+12 mechanisms.* days"),
         (lambda: count_assur_groups(18), r"1e\+11 groups"),

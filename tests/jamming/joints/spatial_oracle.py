@@ -55,13 +55,13 @@ class Spatial:
                     ratios.append(size / limit)
         return np.array(across), np.array(ratios)
 
-    def least_factor(self):
+    def least_factor(self, starts=1):
         """Least factor on all limits that was found, and by how much the centres miss their axes."""
-        x, least = self.solve()
+        x, least = self.solve(starts)
         return least, float(np.abs(self.gaps(x)[0]).max())
 
-    def solve(self, starts=6):
-        """Return the best of several local searches that close the loops, the first of them from the plane poses."""
+    def solve(self, starts=1):
+        """Return the best of local searches that close the loops, the first of them from the plane poses."""
         rng = np.random.default_rng(1)
         found = [self._search(0.5 * rng.standard_normal(6 * len(self.free)) * (k > 0)) for k in range(starts)]
         missed = [float(np.abs(self.gaps(x)[0]).max()) for x in found]
