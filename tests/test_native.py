@@ -93,6 +93,12 @@ def test_counting_does_not_load_numba() -> None:
     assert python(ADD, GRAPHSYNTH_NATIVE="0").split() == ["-3.0", "4.0", "True"]
 
 
+@pytest.mark.slow  # numba compiles the kernels of counting
+@needs_library
+def test_counting_without_the_library_is_the_same() -> None:
+    assert python(COUNT, GRAPHSYNTH_NATIVE="0").split() == ["6856", "True"]
+
+
 @needs_library
 def test_a_changed_source_falls_back_and_says_so(tmp_path: Path) -> None:
     package = tmp_path / "graphsynth"

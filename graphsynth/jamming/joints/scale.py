@@ -333,7 +333,7 @@ def compare_sensitivities(
     condition: Condition = "A",
     by: float = 0.1,
 ) -> SensitivityTable:
-    """Sensitivity every limit by itself and tell how much more misalignment the whole motion then takes.
+    """Loosen every limit by itself and tell how much more misalignment the whole motion then takes.
 
     Parameters
     ----------
