@@ -224,7 +224,7 @@ def test_a_question_is_called_open_exactly_when_its_answers_never_end(question, 
         assert found == []
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(questions())
 def test_text_forms_give_the_question_back(case):
     import tomllib
@@ -237,7 +237,7 @@ def test_text_forms_give_the_question_back(case):
     assert StructuralSpec.from_assignments(ranged) == spec
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(
     st.dictionaries(
         st.one_of(st.sampled_from(("W", "n", "links", "p2", "n3", "levels", "p_i")), st.text(max_size=6)),
