@@ -2,7 +2,7 @@
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_circle_ellipse_speed.py
 --benchmark-enable -n0``. No time is asserted: machines differ. Every benchmark checks its result; measured times are in
-``docs/explanation/circle-and-ellipse.md``.
+``docs/theory/circle-and-ellipse.md``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How fast the stick-slip model is; ``docs/explanation/tribometer.md`` holds what was measured.
+"""How fast the stick-slip model is; ``docs/theory/tribometer.md`` holds what was measured.
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench --benchmark-enable -n 0``.
 ``pytest tests/bench/test_tribometer_speed.py -k scipy -s`` prints the time of scipy's own event location on the same

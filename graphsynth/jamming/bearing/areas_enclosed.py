@@ -3,7 +3,7 @@
 The closed forms of `graphsynth.jamming.bearing.areas` in interval arithmetic.  Each area is evaluated at the two
 corners of the ranges at which it is smallest and largest, so that wide ranges of tilt, height and clearance give their
 exact range up to rounding; the radius of the bearing is carried as it is.  Why the areas are monotone:
-``docs/explanation/circle-and-ellipse.md``.  See theory/circle-and-ellipse 2 to 5, theory/jam-arcs 2.
+``docs/theory/circle-and-ellipse.md``.  See theory/circle-and-ellipse 2 to 5, theory/jam-arcs 2.
 
 The source plots "the part of the ellipse not crossed by the circle" over [90, 450] degrees.  That is the free gap of
 the surrogate ellipse, zero where there is no intersection: it jumps at the onset and falls towards the worst pose.  The
@@ -45,7 +45,7 @@ Mask = NDArray[np.bool_]
 ZOOMS = ((90.0, 115.5), (414.0, 450.0))
 #: With 13 terms of the series what is left out is below 1e-30 of the first for |x| <= 1, and the relative error in
 #: double precision below 6 units of 2^-53: each partial sum is dominated 19 to 1 by its first term, so that errors of
-#: later ones fade (proof in docs/explanation/circle-and-ellipse.md).
+#: later ones fade (proof in docs/theory/circle-and-ellipse.md).
 _SERIES_ERROR = 8.0 * 2.0**-53
 
 
