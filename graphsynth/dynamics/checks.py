@@ -147,9 +147,8 @@ def motor_histories(
     compiled: Compiled, v: Array, currents: Array, modes: NDArray[np.int64]
 ) -> tuple[MotorHistory, ...]:
     """Speed, torque, currents and torque behind the train of every motor."""
-    shafts, found = shaft_speeds(compiled, v), []
-    torques = np.array([motor_torques(compiled, w, i) for w, i in zip(shafts, currents)])
-    first = 0
+    shafts, found, first = shaft_speeds(compiled, v), [], 0
+    torques = motor_torques(compiled, shafts, currents)
     for k, drive in enumerate(compiled.drives):
         eta = np.where(modes[:, k, 1] < 0, 1.0 / drive.train.efficiency, drive.train.efficiency)
         last = first + len(drive.currents)

@@ -9,11 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 from graphsynth.core.checks import Point, finite, link_number, point, positive
 from graphsynth.core.errors import GeometryError
-from graphsynth.dynamics.motors import DCMotor, IdealTorque, LinearCharacteristic, Motor, SynchronousMotor, Train
+from graphsynth.dynamics.motors import (
+    DCMotor,
+    IdealTorque,
+    LinearCharacteristic,
+    Motor,
+    SynchronousMotor,
+    Train,
+    electric,
+)
 
 #: (t, place, velocity of the point) -> (fx, fy), world coordinates.
 ForceLaw = Callable[[float, Point, Point], Sequence[float]]
@@ -250,7 +259,7 @@ class MotorDrive:
             )
         if not isinstance(self.train, Train):
             raise GeometryError(f"train {name} = {self.train!r} is not a Train; give Train(ratio)")
-        count = {DCMotor: 1, SynchronousMotor: 2}.get(type(self.equation), 0)
+        count = electric(self.equation)[0]
         if not isinstance(self.currents, Iterable):
             raise GeometryError(f"currents {name} = {self.currents!r} are not a list; leave them out or give amperes")
         given = tuple(finite(f"current {name}", part) for part in self.currents)
@@ -258,16 +267,21 @@ class MotorDrive:
             raise GeometryError(f"{len(given)} currents {name} given for a motor with {count}; leave them out")
         object.__setattr__(self, "currents", given or (0.0,) * count)
 
-    @property
+    @cached_property
     def equation(self) -> DCMotor | SynchronousMotor | LinearCharacteristic:
         """The motor as it is integrated: without inductance its limit."""
         idle = isinstance(self.motor, IdealTorque) or getattr(self.motor, "inductance", 1.0) == 0.0
         return self.motor.reduced() if idle else self.motor  # type: ignore[union-attr,return-value]
 
     @property
+    def voltage_limit(self) -> float:
+        """Of the motor, V; infinite if it has none."""
+        return float(getattr(self.motor, "voltage_limit", math.inf))
+
+    @property
     def switches(self) -> bool:
         """Whether its equations change at events: a voltage limit, or losses in the train."""
-        return self.train.efficiency < 1.0 or getattr(self.motor, "voltage_limit", math.inf) < math.inf
+        return self.train.efficiency < 1.0 or self.voltage_limit < math.inf
 
     @property
     def idle(self) -> TorqueSource:

@@ -30,7 +30,7 @@ from graphsynth.dynamics.motors import current_scale
 from graphsynth.dynamics.result import DynamicEvent, DynamicMotion
 from graphsynth.dynamics.start import StartReport, check_start, start_compiled
 from graphsynth.dynamics.stepping import Form, SolverStatistics, StepOptions
-from graphsynth.dynamics.switching import integrate, starting_modes
+from graphsynth.dynamics.switching import integrate, with_starting_modes
 from graphsynth.dynamics.tables import Compiled, compile_model
 
 if TYPE_CHECKING:
@@ -232,7 +232,7 @@ def _once(compiled: Compiled, report: StartReport, grid: Array, name: str, optio
 def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, options: StepOptions) -> _Run:
     begin = perf_counter()
     if compiled.drives:
-        compiled = compiled.with_modes(starting_modes(compiled, report.v))
+        compiled = with_starting_modes(compiled, report.v)
     run = _Run(compiled, report, name, len(grid), make_form(compiled, report, name, options.project))
     with np.errstate(all="ignore"):
         if compiled.tables.friction.size:

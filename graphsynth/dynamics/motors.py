@@ -291,11 +291,48 @@ class SynchronousMotor:
 Motor = DCMotor | SynchronousMotor | LinearCharacteristic | IdealTorque
 
 
+_ELECTRIC = {
+    LinearCharacteristic: "stall slope",
+    DCMotor: "inductance resistance emf_constant torque_constant gain speed voltage_limit",
+    SynchronousMotor: "inductance resistance pole_pairs flux ud uq",
+}
+
+
+def electric(motor: Motor | IdealSpeed) -> tuple[int, list[float]]:
+    """Return the number of currents, by which kernels tell the kinds of motors, and the electrical numbers in order."""
+    kind = type(motor)
+    if kind not in _ELECTRIC:
+        raise SpecError(f"{kind.__name__} has no equation of motion to integrate; give a motor with a torque")
+    return list(_ELECTRIC).index(kind), [float(getattr(motor, name)) for name in _ELECTRIC[kind].split()]
+
+
 def torque_constant(motor: Motor) -> float:
     """Torque per ampere of the current that makes it, N m/A; 0 without currents."""
     if isinstance(motor, SynchronousMotor):
         return 1.5 * motor.pole_pairs * motor.flux
     return motor.torque_constant if isinstance(motor, DCMotor) else 0.0
+
+
+def shaft_torque(motor: Motor, shaft: NDArray[np.float64], currents: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Torques on the motor's own shaft at speeds (...) and currents (..., 0, 1 or 2)."""
+    if isinstance(motor, LinearCharacteristic):
+        return motor.stall - (motor.slope * shaft if motor.slope else np.zeros_like(shaft))
+    return np.asarray(torque_constant(motor) * currents[..., -1])
+
+
+def starting_modes(motor: Motor, shaft: float, torque: float) -> tuple[int, int]:
+    """Voltage at its limit (-1, 0, 1) and power flow (1 drives, -1) of a motor that starts.
+
+    One without torque yet drives where its torque will.
+    """
+    held = 0
+    if isinstance(motor, DCMotor):
+        asked = motor.gain * (motor.speed - shaft)
+        held = 0 if abs(asked) <= motor.voltage_limit else int(math.copysign(1, asked))
+        torque = torque or asked - motor.emf_constant * shaft
+    elif isinstance(motor, SynchronousMotor):
+        torque = torque or motor.uq - motor.pole_pairs * shaft * motor.flux
+    return held, -1 if torque * shaft < 0.0 else 1
 
 
 def current_scale(motor: Motor) -> float:

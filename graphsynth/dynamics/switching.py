@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.dynamics.motors import DCMotor, SynchronousMotor
+from graphsynth.dynamics.motors import shaft_torque, starting_modes
 from graphsynth.dynamics.result import DynamicEvent
 from graphsynth.dynamics.stepping import Finding, Form, Output, SolverStatistics, StepOptions, Stepper
 from graphsynth.dynamics.tables import Compiled
 
 Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LIMIT, FLOW = 0, 1
 #: Events of one motion.
@@ -41,37 +40,21 @@ def shaft_speeds(compiled: Compiled, v: Array) -> Array:
 
 
 def motor_torques(compiled: Compiled, shafts: Array, currents: Array) -> Array:
-    """Torques of the motors on their own shafts at one state."""
-    from graphsynth.dynamics import kernels
-
-    T, currents = compiled.tables, np.ascontiguousarray(currents)
-    return np.array([kernels.motor_torque(T, k, currents, float(shaft)) for k, shaft in enumerate(shafts)])
-
-
-def _limit(motor: Any) -> float:
-    return float(getattr(motor, "voltage_limit", math.inf))
+    """Torques of the motors on their own shafts (..., motors) at shaft speeds (..., motors) and currents (..., all)."""
+    found, first = np.empty(np.shape(shafts)), 0
+    for k, drive in enumerate(compiled.drives):
+        last = first + len(drive.currents)
+        found[..., k] = shaft_torque(drive.equation, shafts[..., k], currents[..., first:last])
+        first = last
+    return found
 
 
-def _asked(motor: Any, shaft: float) -> float:
-    """Voltage that the speed controller asks for."""
-    return float(motor.gain * (motor.speed - shaft)) if isinstance(motor, DCMotor) else 0.0
-
-
-def starting_modes(compiled: Compiled, v: Array) -> IntArray:
-    """Modes of the motors at a start: a motor without torque yet drives where its torque will."""
-    modes = np.tile(np.array([0, 1]), (len(compiled.drives), 1)).astype(np.int64)
+def with_starting_modes(compiled: Compiled, v: Array) -> Compiled:
+    """Return the same with the modes that its motors start in, at velocities v."""
     shafts = shaft_speeds(compiled, v)
     torques = motor_torques(compiled, shafts, compiled.currents)
-    for k, (drive, w) in enumerate(zip(compiled.drives, shafts)):
-        motor, tendency = drive.equation, torques[k]
-        if isinstance(motor, DCMotor):
-            asked = _asked(motor, w)
-            modes[k, LIMIT] = 0 if abs(asked) <= motor.voltage_limit else int(math.copysign(1, asked))
-            tendency = tendency or asked - motor.emf_constant * w
-        elif isinstance(motor, SynchronousMotor):
-            tendency = tendency or motor.uq - motor.pole_pairs * w * motor.flux
-        modes[k, FLOW] = -1 if tendency * w < 0.0 else 1
-    return modes
+    starts = [starting_modes(d.equation, w, torque) for d, w, torque in zip(compiled.drives, shafts, torques)]
+    return compiled.with_modes(np.array(starts, dtype=np.int64))
 
 
 class Switches:
@@ -87,7 +70,7 @@ class Switches:
             (k, what)
             for k, drive in enumerate(self.compiled.drives)
             for what in (LIMIT, FLOW)
-            if (drive.train.efficiency < 1.0 if what == FLOW else _limit(drive.motor) < math.inf)
+            if (drive.train.efficiency < 1.0 if what == FLOW else drive.voltage_limit < math.inf)
         ]
         self.hit: tuple[int, int] | None = None
         self.value = self._values(t, y)
@@ -106,10 +89,15 @@ class Switches:
             if what == FLOW:
                 found.append(modes[k, FLOW] * torques[k] * shafts[k])
                 continue
-            motor = self.compiled.drives[k].motor
-            held, asked, limit = modes[k, LIMIT], _asked(motor, shafts[k]), _limit(motor)
+            held, limit = modes[k, LIMIT], self.compiled.drives[k].voltage_limit
+            asked = self._asked(k, shafts)
             found.append((held * asked - limit if held else limit - abs(asked)) + _ROUNDING * limit)
         return np.array(found)
+
+    def _asked(self, k: int, shafts: Array) -> float:
+        """Voltage that the speed controller of motor k asks for."""
+        motor: Any = self.compiled.drives[k].motor
+        return float(motor.gain * (motor.speed - shafts[k]))
 
     def look(self, stepper: Stepper, t0: float, y0: Array, solver: Any) -> Finding:
         """Look at a step from ``(t0, y0)`` that the solver has made."""
@@ -169,8 +157,8 @@ class Switches:
         if what == FLOW:
             modes[k, FLOW] *= -1
             return f"{name} {'drives' if modes[k, FLOW] > 0 else 'is driven by the mechanism'} from here on"
-        shaft = float(shaft_speeds(self.compiled, self.form.state(t, y)[1])[k])
-        modes[k, LIMIT] = 0 if modes[k, LIMIT] else int(math.copysign(1, _asked(drive.motor, shaft)))
+        asked = self._asked(k, shaft_speeds(self.compiled, self.form.state(t, y)[1]))
+        modes[k, LIMIT] = 0 if modes[k, LIMIT] else int(math.copysign(1, asked))
         return f"the voltage of {name} {'is at its limit' if modes[k, LIMIT] else 'is below its limit'} from here on"
 
 

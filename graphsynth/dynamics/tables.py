@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Force, JointFriction, MotorDrive, Spring, Torque, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel, Rack, Rigid
-from graphsynth.dynamics.motors import DCMotor, SynchronousMotor
+from graphsynth.dynamics.motors import electric
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.inputs import coordinates
 from graphsynth.kinematics.engine.program import ROWS
@@ -452,14 +452,7 @@ def _motors(model: DynamicModel) -> tuple[IntArray, Array, IntArray]:
     drives = [e for e in model.elements if isinstance(e, MotorDrive)]
     ints, table, first = np.zeros((len(drives), 4), dtype=np.int64), np.zeros((len(drives), 9)), 0
     for k, e in enumerate(drives):
-        motor = e.equation
-        if isinstance(motor, DCMotor):
-            kind, names = 1, "inductance resistance emf_constant torque_constant gain speed voltage_limit"
-        elif isinstance(motor, SynchronousMotor):
-            kind, names = 2, "inductance resistance pole_pairs flux ud uq"
-        else:
-            kind, names = 0, "stall slope"
-        numbers = [float(getattr(motor, name)) for name in names.split()]
+        kind, numbers = electric(e.equation)
         ints[k] = e.a, e.b, kind, first
         table[k, : 2 + len(numbers)] = e.train.ratio, e.train.efficiency, *numbers
         first += len(e.currents)

@@ -20,7 +20,7 @@ class EffectiveInertia:
     """Effective inertia ``J(q) = sum_i v_i(q)^2`` at the crank, each ``v_i`` a trigonometric polynomial.
 
     ``v_i`` is a velocity per crank speed times the square root of a mass; the constant inertia of rotor and wheels is
-    not part of it.
+    not part of it (theory/motor-drive 2).
 
     Parameters
     ----------
@@ -35,10 +35,6 @@ class EffectiveInertia:
     ------
     SpecError
         Rows with an even number of columns, or not finite.
-
-    Notes
-    -----
-    See theory/motor-drive 2.
 
     Examples
     --------

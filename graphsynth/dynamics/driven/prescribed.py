@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.driven.run import DriveRun, RunStatus
+from graphsynth.dynamics.driven.run import DriveRun, RunStatus, largest_defect
 from graphsynth.dynamics.driven.setup import Plant, output_times, prepare
 from graphsynth.dynamics.motors import IdealSpeed, LinearCharacteristic, Train, number
 
@@ -21,11 +21,10 @@ _PANEL = 0.2
 def prescribed_run(
     plant: Plant, motor: IdealSpeed, train: Train, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0
 ) -> DriveRun:
-    """Motion of an ideal speed source: constant crank speed, the motor torque by inverse dynamics.
+    """Motion of an ideal speed source: constant crank speed, the motor torque by inverse dynamics, in closed form.
 
-    ``speed`` is 0 or that of the source: the start has no other.  Closed form up to rounding; ``energy_error`` compares
-    the kinetic energy with a quadrature of the net power ``J'(q) w^3 / 2``.  NaN from the first angle on at which the
-    mechanism cannot be assembled.
+    ``speed`` is 0 or that of the source.  ``energy_error`` compares the kinetic energy with a quadrature of the net
+    power ``J'(q) w^3 / 2``.  NaN from the first angle on at which the mechanism cannot be assembled.
     """
     begin = perf_counter()
     out = output_times(times)
@@ -37,13 +36,14 @@ def prescribed_run(
     required = slope * w * w + friction * w - load
     eta = np.where(required * w >= 0.0, train.efficiency, 1.0 / train.efficiency)
     work = np.concatenate([[0.0], np.cumsum(_net_work(plant, motor, train, out, q, w))])
-    reached = int(np.isfinite(J).cumprod().sum())
+    reached, kinetic = int(np.isfinite(J).cumprod().sum()), 0.5 * J * w * w
+    complete = reached == out.size
     fields = {
         "angle": q,
         "speed": np.full(out.size, w),
         "momentum": np.sqrt(J) * w,
         "motor_torque": required / (train.ratio * eta),
-        "kinetic_energy": 0.5 * J * w * w,
+        "kinetic_energy": kinetic,
         "work": work,
     }
     there = np.arange(out.size) < reached
@@ -54,13 +54,13 @@ def prescribed_run(
         currents=np.zeros((out.size, 0)),
         reduced_angle=fields["angle"] - math.tau * turns,
         turns=turns,
-        energy_error=_defect(fields["kinetic_energy"], fields["work"], reached),
+        energy_error=largest_defect(kinetic - kinetic[0] - work, kinetic, reached),
         electric_error=0.0,
         error=np.array([2.0**-52 * float(np.abs(q).max()), 0.0]),
         events=(),
-        status=RunStatus.DONE if reached == out.size else RunStatus.NOT_FINITE,
+        status=RunStatus.DONE if complete else RunStatus.NOT_FINITE,
         reached=reached,
-        reason=_reason(out, reached),
+        reason="" if complete else f"the mechanism cannot be assembled at t = {out[reached]:.6g} s",
         model="ideal speed (motion given, torque by inverse dynamics)",
         steps=0,
         rejected=0,
@@ -68,10 +68,6 @@ def prescribed_run(
         seconds=perf_counter() - begin,
         **fields,
     )
-
-
-def _reason(out: Array, reached: int) -> str:
-    return "" if reached == out.size else f"the mechanism cannot be assembled at t = {out[reached]:.6g} s"
 
 
 def _terms(plant: Plant, motor: IdealSpeed, train: Train, out: Array, q: Array) -> tuple[Array, Array, Array, float]:
@@ -96,11 +92,3 @@ def _net_work(plant: Plant, motor: IdealSpeed, train: Train, out: Array, q: Arra
     slope = _terms(plant, motor, train, out, angles.ravel())[1].reshape(angles.shape)
     panels = half * (slope @ weights) * w * w
     return np.asarray(np.add.reduceat(panels, np.concatenate([[0], np.cumsum(counts)[:-1]])))
-
-
-def _defect(kinetic: Array, work: Array, reached: int) -> float:
-    """Largest defect of the energy relative to the largest energy."""
-    if reached < 2:
-        return math.nan
-    size = float(kinetic[:reached].max())
-    return float(np.abs(kinetic - kinetic[0] - work)[:reached].max()) / size if size > 0.0 else 0.0

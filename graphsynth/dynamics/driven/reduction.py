@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
+from graphsynth.dynamics.driven.prescribed import prescribed_run
 from graphsynth.dynamics.driven.run import DriveRun, run
 from graphsynth.dynamics.driven.setup import Plant, output_times
-from graphsynth.dynamics.motors import DCMotor, Motor, SynchronousMotor, Train, number
+from graphsynth.dynamics.motors import DCMotor, IdealSpeed, Motor, SynchronousMotor, Train, number
 
 Array = NDArray[np.float64]
 
@@ -35,66 +37,74 @@ class ReductionStudy:
     limit: DriveRun
 
 
-def choose_motor(
+def simulate_drive(
     plant: Plant,
-    motor: Motor,
+    motor: Motor | IdealSpeed,
     train: Train,
     times: ArrayLike,
     reduce: bool | str,
-    *,
-    angle: float,
-    speed: float,
-    rtol: float,
-    regular: bool = False,
-) -> tuple[Motor, str]:
-    """Motor to integrate with, and a note when it is the limit L -> 0 of the given one.
+    notes: tuple[str, ...] = (),
+    **options: Any,
+) -> DriveRun:
+    """Motion of any motor, integrated or given, with the limit L -> 0 where it may be taken, and a note of that.
 
     ``reduce`` is True, False or "auto"; the last takes the limit for L = 0, and for a small L if the error of first
-    order is below ``rtol`` (rad).
+    order is below ``rtol`` (rad).  The options are those of `run`.
 
     Raises
     ------
     SpecError
         An unknown option, L = 0 with ``reduce=False``, a motor that has no linear limit.
     """
+    start = {name: options[name] for name in ("angle", "speed")}
+    if isinstance(motor, IdealSpeed):
+        return prescribed_run(plant, motor, train, times, **start)
     if not isinstance(reduce, bool | str) or reduce not in (True, False, "auto"):
         raise SpecError(f"reduce = {reduce!r} is unknown; choose 'auto', True or False")
-    if not isinstance(motor, (DCMotor, SynchronousMotor)) or (reduce is False and motor.inductance > 0.0):
-        return motor, ""
-    if motor.inductance == 0.0:
+    note, inductance = "", getattr(motor, "inductance", None)
+    if inductance == 0.0:
         if reduce is False:
             raise SpecError("inductance = 0 with the unreduced model divides by zero; set reduce = True or 'auto'")
-        return motor.reduced(), "inductance 0: the reduced model, exact"
-    out = output_times(times)
-    if reduce == "auto":
-        limited = isinstance(motor, DCMotor) and motor.voltage_limit < math.inf
-        if regular or limited or not motor.electrical_time <= rtol * float(out[-1] - out[0]):
-            return motor, ""
-    error = reduction_error(plant, motor, train, out, angle=angle, speed=speed)
-    if reduce == "auto" and not error <= rtol:
-        return motor, ""
-    return motor.reduced(), f"reduced to L -> 0; estimated error of the angle {error:.1e} rad, of first order in L"
+        note = "inductance 0: the reduced model, exact"
+    elif inductance is not None and reduce is not False:
+        real, out, rtol = _with_inductance(motor), output_times(times), options["rtol"]
+        limited = options.get("regular") or getattr(motor, "voltage_limit", math.inf) < math.inf
+        if reduce is True or (not limited and real.electrical_time <= rtol * float(out[-1] - out[0])):
+            error = reduction_error(plant, motor, train, out, **start)
+            if reduce is True or error <= rtol:
+                note = f"reduced to L -> 0; estimated error of the angle {error:.1e} rad, of first order in L"
+    if note:
+        motor, notes, options["currents"] = motor.reduced(), (*notes, note), None  # type: ignore[union-attr]
+    return run(plant, motor, train, times, notes=notes, **options)
 
 
 def reduction_error(
-    plant: Plant, motor: Motor, train: Train, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0
+    plant: Plant, motor: Motor | IdealSpeed, train: Train, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0
 ) -> float:
     """Largest error of the angle (rad) of the limit L -> 0 after the electrical transient; estimated.
 
     From a run at an inductance large enough to be seen, scaled down linearly; 0 for a motor without inductance.
     """
-    if not isinstance(motor, (DCMotor, SynchronousMotor)) or motor.inductance == 0.0:
+    if getattr(motor, "inductance", 0.0) == 0.0 and not isinstance(motor, IdealSpeed):
         return 0.0
-    out = output_times(times)
-    factor = max(1.0, 1e-5 * float(out[-1] - out[0]) / motor.electrical_time)
-    seen = [factor * motor.inductance]
-    study = inductance_study(plant, motor, train, out, seen, angle=angle, speed=speed)
+    real, out = _with_inductance(motor), output_times(times)
+    factor = max(1.0, 1e-5 * float(out[-1] - out[0]) / real.electrical_time)
+    study = inductance_study(plant, real, train, out, [factor * real.inductance], angle=angle, speed=speed)
     return float(study.angle[0]) / factor
+
+
+def _with_inductance(motor: Motor | IdealSpeed) -> DCMotor | SynchronousMotor:
+    """Return a motor that has an inductance, or refuse it."""
+    if isinstance(motor, DCMotor | SynchronousMotor):
+        return motor
+    if isinstance(motor, IdealSpeed):
+        raise SpecError("an ideal speed has no inductance to take to zero; give a DCMotor or a SynchronousMotor")
+    raise SpecError(f"{type(motor).__name__} has no inductance; give a DCMotor or a SynchronousMotor")
 
 
 def inductance_study(
     plant: Plant,
-    motor: Motor,
+    motor: Motor | IdealSpeed,
     train: Train,
     times: ArrayLike,
     inductances: Sequence[float],
@@ -113,9 +123,7 @@ def inductance_study(
     SpecError
         For a motor without inductance, an inductance that is not positive, or times all within the transient.
     """
-    if not isinstance(motor, (DCMotor, SynchronousMotor)):
-        raise SpecError(f"{type(motor).__name__} has no inductance; give a DCMotor or a SynchronousMotor")
-    out = output_times(times)
+    motor, out = _with_inductance(motor), output_times(times)
     if not isinstance(inductances, Sequence | np.ndarray) or len(inductances) == 0:
         raise SpecError("there is no inductance to try; give at least one, in H")
     limit = run(plant, motor.reduced(), train, out, angle=angle, speed=speed, rtol=rtol, estimate=False)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.setup import Plant, Prepared, output_times, prepare
-from graphsynth.dynamics.motors import DCMotor, IdealTorque, Motor, SynchronousMotor, Train, number, whole
+from graphsynth.dynamics.motors import IdealTorque, Motor, Train, number, shaft_torque, whole
 
 Array = NDArray[np.float64]
 _EVENTS = {2: "dead centre", 3: "stall", 4: "voltage limit", 5: "direction of power flow"}
@@ -132,128 +132,48 @@ def run(
     """
     begin = perf_counter()
     out = output_times(times)
-    _check_guards(rtol, max_steps, max_events)
-    ready = prepare(plant, motor, train, out, angle, speed, currents, regular)
-    found = _integrate(ready, out, rtol, max_steps, max_events)
-    error = np.full(ready.start.size - regular, np.nan)
-    if estimate and found[0] is RunStatus.DONE:
-        # every other output: where the outputs limit the steps, the same outputs would hide the error
-        shared = np.unique(np.concatenate([[0], np.arange(out.size - 1, 0, -2)]))
-        second = _integrate(ready, out[shared], min(100.0 * rtol, 1e-2), max_steps, max_events)
-        error = _difference(found, second, shared, ready, plant, regular)
-        notes = notes if second[0] is RunStatus.DONE else (*notes, _NO_ESTIMATE)
-    return _result(ready, plant, motor, train, out, found, error, regular, rtol, perf_counter() - begin, notes)
-
-
-def _check_guards(rtol: float, max_steps: int, max_events: int) -> None:
     whole("max_steps", max_steps, "raise it for long runs")
     whole("max_events", max_events, "raise it for many events")
     if not 1e-13 <= number("rtol", rtol) <= 1e-3:
         raise SpecError(f"rtol = {rtol:g} must be from 1e-13 to 1e-3; double precision gives no more")
-
-
-def _integrate(ready: Prepared, out: Array, rtol: float, max_steps: int, max_events: int) -> _Raw:
-    """One run of the compiled integrator on copies of everything it changes."""
-    from graphsynth.dynamics.driven.kernels import radau
-
-    n = ready.start.size
-    state, values, setup = ready.start.copy(), ready.values.copy(), ready.setup.copy()
-    Y, turns = np.full((out.size, n), np.nan), np.zeros(out.size, np.int64)
-    balance, marks = np.full((out.size, 6), np.nan), np.full((int(max_events), 3 + n), np.nan)
-    counts = np.zeros(4, np.int64)
-    status = radau.integrate(
-        setup,
-        values,
-        ready.rows,
-        ready.zeros,
-        state,
-        out,
-        rtol,
-        ready.scale,
-        ready.first,
-        int(max_steps),
-        Y,
-        turns,
-        balance,
-        marks,
-        counts,
-    )
-    return RunStatus(status), Y, turns, balance, marks, counts, state
-
-
-def _physical(Y: Array, turns: NDArray[np.int64], ready: Prepared, regular: bool) -> tuple[Array, Array, Array]:
-    """Unwrapped angle, speed and sqrt(J) w of state rows."""
-    from graphsynth.dynamics.driven.kernels import systems as s
-
-    table = np.zeros((len(Y), 16))
-    s.tabulate(ready.setup, np.ascontiguousarray(Y[:, 0]), ready.values, ready.rows, table)
-    root = np.sqrt(table[:, 0])
-    angle = Y[:, 0] + turns * math.tau
-    if regular:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return angle, np.asarray(Y[:, 1] / root), Y[:, 1].copy()
-    return angle, Y[:, 1].copy(), np.asarray(root * Y[:, 1])
-
-
-def _difference(
-    found: _Raw, second: _Raw, shared: NDArray[np.intp], ready: Prepared, plant: Plant, regular: bool
-) -> Array:
-    """Largest differences of angle, sqrt(J) w over the largest sqrt(J), and currents at the shared outputs."""
+    ready = prepare(plant, motor, train, out, angle, speed, currents, regular)
+    found = _integrate(ready, out, rtol, max_steps, max_events)
     n = ready.start.size - int(regular)
-    if second[0] is not RunStatus.DONE:
-        return np.full(n, np.nan)
-    states, turns = found[1][shared], found[2][shared]
-    gap = np.abs(states[:, :n] - second[1][:, :n])
-    gap[:, 0] = np.abs(states[:, 0] - second[1][:, 0] + math.tau * (turns - second[2]))
-    if regular:
-        gap[:, 1] /= _largest_root(plant)
-    return np.asarray(gap.max(axis=0))
-
-
-def _largest_root(plant: Plant) -> float:
-    return math.sqrt(float((np.abs(plant.rows).sum(axis=1) ** 2).sum())) or 1.0
-
-
-def _result(
-    ready: Prepared,
-    plant: Plant,
-    motor: Motor,
-    train: Train,
-    out: Array,
-    found: _Raw,
-    error: Array,
-    regular: bool,
-    rtol: float,
-    seconds: float,
-    notes: tuple[str, ...],
-) -> DriveRun:
+    error = np.full(n, np.nan)
+    if estimate and found[0] is RunStatus.DONE:
+        # every other output: where the outputs limit the steps, the same outputs would hide the error
+        shared = np.unique(np.concatenate([[0], np.arange(out.size - 1, 0, -2)]))
+        second = _integrate(ready, out[shared], min(100.0 * rtol, 1e-2), max_steps, max_events)
+        if second[0] is RunStatus.DONE:
+            size = math.sqrt(plant.most_inertia) or 1.0
+            error = _difference(found, second, shared, size if regular else 1.0)[:n]
+        else:
+            notes = (*notes, _NO_ESTIMATE)
     status, Y, turns, balance, marks, counts, _ = found
-    angle, speed, momentum = _physical(Y, turns, ready, regular)
-    currents = Y[:, 2 : Y.shape[1] - int(regular)]
-    reached = int(counts[3])
-    torque = _torque(motor, speed * train.ratio, currents)
-    work, moved, surplus, supplied = balance[:, 0], balance[:, 1], balance[:, 2], balance[:, 3]
-    kinetic, magnetic = balance[:, 4], balance[:, 5]
-    energy = _defect(kinetic - kinetic[0] - work, np.maximum.accumulate(kinetic) + moved, reached)
-    electric = _defect(magnetic - magnetic[0] - surplus, np.maximum.accumulate(magnetic) + supplied, reached)
-    off = float(np.fmax(energy, electric))  # NaN without a second output time only
+    angles, speeds, momentum = _physical(Y, turns, ready, regular)
+    amperes, reached = Y[:, 2:n], int(counts[3])
+    work, moved, surplus, supplied, kinetic, magnetic = balance.T
+    energy = largest_defect(kinetic - kinetic[0] - work, np.maximum.accumulate(kinetic) + moved, reached)
+    electric = largest_defect(magnetic - magnetic[0] - surplus, np.maximum.accumulate(magnetic) + supplied, reached)
     if status is RunStatus.DONE and not (energy <= _WARN and electric <= _WARN):
+        off = float(np.fmax(energy, electric))  # NaN without a second output time only
         notes = (*notes, f"the energy balance is off by {off:.1e}; tighten rtol")
-    unit = "currents negligible" if currents.shape[1] == 0 else f"{currents.shape[1]} current(s)"
+    line = motor.reduced() if isinstance(motor, IdealTorque) else motor
+    unit = f"{n - 2} current(s)" if n > 2 else "currents negligible"
     name = "S (regularised, without inertia)" if regular else "J (with inertia)"
     return DriveRun(
         time=out,
-        angle=angle,
-        speed=speed,
-        currents=currents,
+        angle=angles,
+        speed=speeds,
+        currents=amperes,
         reduced_angle=Y[:, 0].copy(),
         turns=turns,
         momentum=momentum,
-        motor_torque=torque,
+        motor_torque=shaft_torque(line, speeds * train.ratio, amperes),
         kinetic_energy=kinetic,
         work=work,
         energy_error=energy,
-        electric_error=electric if currents.shape[1] else 0.0,
+        electric_error=electric if n > 2 else 0.0,
         error=error,
         events=_events(marks[: counts[2]], regular),
         status=status,
@@ -263,9 +183,42 @@ def _result(
         steps=int(counts[0]),
         rejected=int(counts[1]),
         rtol=rtol,
-        seconds=seconds,
+        seconds=perf_counter() - begin,
         notes=notes,
     )
+
+
+def _difference(found: _Raw, second: _Raw, shared: NDArray[np.intp], size: float) -> Array:
+    """Largest differences of angle, speed (momentum over ``size``, the root of an inertia) and currents."""
+    gap = np.abs(found[1][shared] - second[1])
+    gap[:, 0] = np.abs(found[1][shared, 0] - second[1][:, 0] + math.tau * (found[2][shared] - second[2]))
+    gap[:, 1] /= size
+    return np.asarray(gap.max(axis=0))
+
+
+def _integrate(ready: Prepared, out: Array, rtol: float, max_steps: int, max_events: int) -> _Raw:
+    """One run of the compiled integrator on copies of everything it changes."""
+    from graphsynth.dynamics.driven.kernels import radau
+
+    n = ready.start.size
+    state, values, setup = ready.start.copy(), ready.values.copy(), ready.setup.copy()
+    found = np.full((out.size, n), np.nan), np.zeros(out.size, np.int64), np.full((out.size, 6), np.nan)
+    marks, counts = np.full((int(max_events), 3 + n), np.nan), np.zeros(4, np.int64)
+    given = setup, values, ready.rows, ready.zeros, state, out, rtol, ready.scale, ready.first, int(max_steps)
+    status = radau.integrate(*given, *found, marks, counts)
+    return RunStatus(status), *found, marks, counts, state
+
+
+def _physical(Y: Array, turns: NDArray[np.int64], ready: Prepared, regular: bool) -> tuple[Array, Array, Array]:
+    """Unwrapped angle, speed and sqrt(J) w of state rows."""
+    from graphsynth.dynamics.driven.kernels import systems as s
+
+    table = np.zeros((len(Y), 16))
+    s.tabulate(ready.setup, np.ascontiguousarray(Y[:, 0]), ready.values, ready.rows, table)
+    root = np.sqrt(table[:, 0])
+    angle, rate = Y[:, 0] + turns * math.tau, Y[:, 1].copy()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return (angle, rate / root, rate) if regular else (angle, rate, root * rate)
 
 
 def _reason(found: _Raw, train: Train, out: Array, regular: bool) -> str:
@@ -288,7 +241,7 @@ def _reason(found: _Raw, train: Train, out: Array, regular: bool) -> str:
     return reason
 
 
-def _defect(defect: Array, size: Array, reached: int) -> float:
+def largest_defect(defect: Array, size: Array, reached: int) -> float:
     """Largest defect of a balance relative to the energy moved so far in the whole run."""
     if reached < 2:
         return math.nan
@@ -296,27 +249,11 @@ def _defect(defect: Array, size: Array, reached: int) -> float:
     return float(np.abs(defect[:reached]).max()) / largest if largest > 0.0 else 0.0
 
 
-def _torque(motor: Motor, shaft: Array, currents: Array) -> Array:
-    if isinstance(motor, DCMotor):
-        return np.asarray(motor.torque_constant * currents[:, 0])
-    if isinstance(motor, SynchronousMotor):
-        return np.asarray(1.5 * motor.pole_pairs * motor.flux * currents[:, 1])
-    line = motor.reduced() if isinstance(motor, IdealTorque) else motor
-    return np.asarray(line.stall - (line.slope * shaft if line.slope else 0.0 * np.abs(currents.sum(axis=1))))
-
-
 def _events(marks: Array, regular: bool) -> tuple[DriveEvent, ...]:
     found = []
-    for row in marks:
-        state = row[3:]
-        found.append(
-            DriveEvent(
-                kind=_EVENTS[int(row[0])],
-                time=float(state[-1] if regular else row[1]),
-                angle=float(state[0] + row[2] * math.tau),
-                currents=tuple(map(float, state[2 : state.size - int(regular)])),
-                motion=float(state[1]),
-                fictitious_time=float(row[1]) if regular else math.nan,
-            )
-        )
+    for code, at, turns, *state in marks.tolist():
+        time, fictitious = (state.pop(), at) if regular else (at, math.nan)
+        angle, motion, *amperes = state
+        kind = _EVENTS[int(code)]
+        found.append(DriveEvent(kind, time, angle + turns * math.tau, tuple(amperes), motion, fictitious))
     return tuple(found)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
+from graphsynth.dynamics.driven.inertia import EffectiveInertia
 from graphsynth.dynamics.motors import (
     DCMotor,
     IdealTorque,
@@ -16,8 +18,11 @@ from graphsynth.dynamics.motors import (
     Motor,
     SynchronousMotor,
     Train,
+    electric,
     number,
     numbers,
+    shaft_torque,
+    starting_modes,
 )
 
 Array = NDArray[np.float64]
@@ -40,9 +45,13 @@ class Plant:
     linkage: Array | None = None
     dead_centres: tuple[float, ...] = ()
 
+    @property
+    def most_inertia(self) -> float:
+        """Bound of the inertia of the rows, kg m^2."""
+        return float((np.abs(self.rows).sum(axis=1) ** 2).sum())
 
-@dataclass(frozen=True)
-class Prepared:
+
+class Prepared(NamedTuple):
     """Arrays of the integrator: setup, parameters, series, dead centres, start, natural scales, first step."""
 
     setup: NDArray[np.int64]
@@ -76,116 +85,68 @@ def prepare(
 ) -> Prepared:
     """Check everything and lay it out for the integrator; the arguments are those of `run`.
 
-    ``singular`` allows an inertia that vanishes, for motions that are given.
-
-    Raises
-    ------
-    SpecError
-        Currents that do not fit the motor, or an inertia that vanishes on the way.
+    ``singular`` allows an inertia that vanishes, for motions that are given.  `SpecError` for currents that do not fit
+    the motor, or an inertia that vanishes on the way.
     """
     from graphsynth.dynamics.driven.kernels import systems as s
 
     if isinstance(motor, IdealTorque):
         motor = motor.reduced()
+    if isinstance(motor, (DCMotor, SynchronousMotor)) and motor.inductance == 0.0:
+        raise SpecError("inductance = 0 has no current equation; use the reduced motor, motor.reduced()")
+    kind, numbers_of = electric(motor)
     values = np.zeros(s.SIZE)
     values[s.BASE] = plant.base + train.reflected(motor.rotor_inertia)
     values[s.FRICTION] = plant.friction + train.ratio**2 * motor.friction
     values[s.RATIO], values[s.EFFICIENCY], values[s.CONSTANT] = train.ratio, train.efficiency, plant.load
-    code, electric, amperes = _motor(motor)
-    values[s.ELECTRIC : s.ELECTRIC + electric.size] = electric
+    values[s.ELECTRIC : s.ELECTRIC + len(numbers_of)] = numbers_of
     if plant.linkage is not None:
         values[s.LINKAGE :] = plant.linkage
-    rows = _rows(plant)
-    given = (0.0,) * amperes if currents is None else tuple(numbers("currents", currents, "A").ravel().tolist())
-    if len(given) != amperes:
-        raise SpecError(f"{len(given)} currents given for a motor with {amperes}; leave them out or give {amperes}")
-    setup = np.array([s.SERIES if plant.linkage is None else s.FOUR_BAR, code, int(regular), 0, 1])
+    load = np.zeros(1) if plant.load_series is None else load_coefficients(plant.load_series)
+    count, width = plant.rows.shape
+    rows = np.zeros((count + 1, max(width, load.size)))  # the series of the load is the last row
+    rows[:-1, :width], rows[-1, : load.size] = plant.rows, load
+    given = (0.0,) * kind if currents is None else tuple(numbers("currents", currents, "A").ravel().tolist())
+    if len(given) != kind:
+        raise SpecError(f"{len(given)} currents given for a motor with {kind}; leave them out or give {kind}")
     q, w = number("angle", angle), number("speed", speed)
+    torque = float(shaft_torque(motor, np.array(train.ratio * w), np.array(given)))
+    held, driving = starting_modes(motor, train.ratio * w, torque)
+    setup = np.array([s.SERIES if plant.linkage is None else s.FOUR_BAR, kind, int(regular), held, driving])
     here = np.zeros(16)
     s.mechanism(setup, q, values, rows, here)
     if regular:
         _allow_regular(values, motor, plant.dead_centres, q)
-    elif not singular and (not here[0] > 0.0 or not _least_inertia(plant, values[s.BASE]) > 0.0):
-        raise SpecError("the inertia vanishes on the way: give J_0 > 0 (rotor or wheels), or use the regularised model")
-    zeros = _bounds(plant, values, q, regular)
-    _modes(setup, values, motor, w, given, train.ratio)
-    reference = _reference_speed(motor, train, w, here[0], out)
-    unit = np.array([1.0, reference, *_currents(motor, train, reference, given, out)])
-    start = np.array([q, w, *given])
+    elif not singular:
+        least = here[0]
+        if not values[s.BASE] > 0.0 and plant.linkage is None:
+            turn = EffectiveInertia(plant.rows).value(np.linspace(0.0, math.tau, 720, endpoint=False))
+            least = -1.0 if plant.dead_centres else min(least, turn.min())
+        if not least > 0.0:
+            raise SpecError(
+                "the inertia vanishes on the way: give J_0 > 0 (rotor or wheels), or use the regularised model"
+            )
     span = float(out[-1] - out[0])
+    reference, sizes = _sizes(motor, train.ratio, w, here[0], given, span)
+    unit, start = np.array([1.0, reference, *sizes]), np.array([q, w, *given])
     first = 1e-3 * min(span, 1.0 / reference)
     if isinstance(motor, (DCMotor, SynchronousMotor)):
         first = min(first, 0.25 * motor.electrical_time)
     if regular:
         root = math.sqrt(here[0])
         start = np.array([q, root * w, *given, out[0]])
-        largest = math.sqrt(float((np.abs(plant.rows).sum(axis=1) ** 2).sum()) + values[s.BASE])
-        unit = np.array([1.0, reference * largest, *unit[2:], span])
+        largest = math.sqrt(plant.most_inertia + values[s.BASE])
+        unit = np.array([1.0, reference * largest, *sizes, span])
         first /= largest
-    return Prepared(setup, values, rows, zeros, start, unit, first)
-
-
-def _motor(motor: Motor) -> tuple[int, Array, int]:
-    """Code, electrical parameters and number of currents of a motor."""
-    if isinstance(motor, (DCMotor, SynchronousMotor)) and motor.inductance == 0.0:
-        raise SpecError("inductance = 0 has no current equation; use the reduced motor, motor.reduced()")
-    if isinstance(motor, DCMotor):
-        return (
-            1,
-            np.array(
-                [
-                    motor.inductance,
-                    motor.resistance,
-                    motor.emf_constant,
-                    motor.torque_constant,
-                    motor.gain,
-                    motor.speed,
-                    motor.voltage_limit,
-                ]
-            ),
-            1,
-        )
-    if isinstance(motor, SynchronousMotor):
-        return (
-            2,
-            np.array(
-                [
-                    motor.inductance,
-                    motor.resistance,
-                    motor.pole_pairs,
-                    motor.flux,
-                    motor.ud,
-                    motor.uq,
-                ]
-            ),
-            2,
-        )
-    if isinstance(motor, LinearCharacteristic):
-        return 0, np.array([motor.stall, motor.slope]), 0
-    raise SpecError(f"{type(motor).__name__} has no equation of motion to integrate; give a motor with a torque")
+    return Prepared(setup, values, rows, _bounds(plant, values, q, regular), start, unit, first)
 
 
 def load_coefficients(series: ArrayLike) -> Array:
-    """Return the coefficients ``a0, a1, b1, ...`` of a load torque, checked.
-
-    Raises
-    ------
-    SpecError
-        An even number of coefficients.
-    """
+    """Return the coefficients ``a0, a1, b1, ...`` of a load torque; `SpecError` for an even number of them."""
     load = numbers("load_series", series, "N m")
     if load.ndim != 1 or load.size % 2 == 0:
         raise SpecError(f"load_series of shape {load.shape} must be coefficients a0, a1, b1, ...; give an odd number")
     return load
-
-
-def _rows(plant: Plant) -> Array:
-    """Velocity rows with the series of the load as the last row."""
-    load = np.zeros(1) if plant.load_series is None else load_coefficients(plant.load_series)
-    rows = np.zeros((plant.rows.shape[0] + 1, max(plant.rows.shape[1], load.size)))
-    rows[:-1, : plant.rows.shape[1]] = plant.rows
-    rows[-1, : load.size] = load
-    return rows
 
 
 def _allow_regular(values: Array, motor: Motor, dead_centres: tuple[float, ...], q: float) -> None:
@@ -215,16 +176,6 @@ def _allow_regular(values: Array, motor: Motor, dead_centres: tuple[float, ...],
         raise SpecError("the start is a dead centre, where the speed says nothing; start at another angle")
 
 
-def _least_inertia(plant: Plant, base: float) -> float:
-    if base > 0.0 or plant.linkage is not None:
-        return 1.0
-    q = np.linspace(0.0, math.tau, 720, endpoint=False)
-    from graphsynth.dynamics.driven.inertia import EffectiveInertia
-
-    values = EffectiveInertia(plant.rows).value(q)
-    return -1.0 if plant.dead_centres or not values.max() > 0.0 else float(values.min())
-
-
 def _bounds(plant: Plant, values: Array, q: float, regular: bool) -> Array:
     """Dead centres in increasing order from the piece that holds q; sets the bounds of that piece."""
     from graphsynth.dynamics.driven.kernels import systems as s
@@ -241,47 +192,25 @@ def _bounds(plant: Plant, values: Array, q: float, regular: bool) -> Array:
     return zeros
 
 
-def _modes(
-    setup: NDArray[np.int64], values: Array, motor: Motor, w: float, given: tuple[float, ...], ratio: float
-) -> None:
-    """Voltage limit and direction of the power flow at the start."""
-    from graphsynth.dynamics.driven.kernels import systems as s
-
-    if isinstance(motor, DCMotor):
-        asked = motor.gain * (motor.speed - ratio * w)
-        setup[s.SATURATED] = 0 if abs(asked) <= motor.voltage_limit else int(math.copysign(1, asked))
-        tendency = given[0] or asked - motor.emf_constant * ratio * w
-    elif isinstance(motor, SynchronousMotor):
-        tendency = given[1] or motor.uq - motor.pole_pairs * ratio * w * motor.flux
-    elif isinstance(motor, LinearCharacteristic):
-        tendency = motor.torque(ratio * w)
-    else:
-        tendency = motor.value
-    setup[s.DRIVING] = -1 if tendency * w < 0.0 else 1
-
-
-def _reference_speed(motor: Motor, train: Train, w: float, inertia: float, out: Array) -> float:
-    """Size of the crank speed to expect: the scale of its absolute tolerance."""
+def _sizes(
+    motor: Motor, ratio: float, w: float, inertia: float, given: tuple[float, ...], span: float
+) -> tuple[float, list[float]]:
+    """Sizes of the crank speed and of the currents to expect: the scales of their absolute tolerances."""
     if isinstance(motor, DCMotor):
         total = motor.gain + motor.emf_constant
-        free = motor.gain * motor.speed / total / train.ratio if total else motor.speed / train.ratio
+        free = motor.gain * motor.speed / total / ratio if total else motor.speed / ratio
     elif isinstance(motor, SynchronousMotor):
-        free = motor.uq / (motor.pole_pairs * motor.flux) / train.ratio if motor.flux else 0.0
+        free = motor.uq / (motor.pole_pairs * motor.flux) / ratio if motor.flux else 0.0
     else:
-        line = motor.reduced() if isinstance(motor, IdealTorque) else motor
-        span = float(out[-1] - out[0])
-        pushed = abs(line.stall) * train.ratio * span / inertia if inertia > 0.0 else 1.0
-        free = min(line.stall / line.slope / train.ratio if line.slope else math.inf, pushed)
-    return max(abs(free), abs(w)) or 1.0
-
-
-def _currents(motor: Motor, train: Train, reference: float, given: tuple[float, ...], out: Array) -> list[float]:
-    """Sizes of the currents to expect."""
+        assert isinstance(motor, LinearCharacteristic)
+        pushed = abs(motor.stall) * ratio * span / inertia if inertia > 0.0 else 1.0
+        free = min(motor.stall / motor.slope / ratio if motor.slope else math.inf, pushed)
+    reference = max(abs(free), abs(w)) or 1.0
     if isinstance(motor, DCMotor):
-        volts = motor.gain * abs(motor.speed) + motor.emf_constant * train.ratio * reference
-        ohms = motor.resistance + motor.inductance / min(0.1, float(out[-1] - out[0]))
-        return [max(volts / ohms, abs(given[0])) or 1.0]
+        volts = motor.gain * abs(motor.speed) + motor.emf_constant * ratio * reference
+        ohms = motor.resistance + motor.inductance / min(0.1, span)
+        return reference, [max(volts / ohms, abs(given[0])) or 1.0]
     if isinstance(motor, SynchronousMotor):
         size = max(math.hypot(motor.ud, motor.uq) / motor.resistance, *map(abs, given)) or 1.0
-        return [size, size]
-    return []
+        return reference, [size, size]
+    return reference, []

@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import check_fields, check_sizes, checked, finite_array
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.driven.prescribed import prescribed_run
-from graphsynth.dynamics.driven.reduction import ReductionStudy, choose_motor, inductance_study
-from graphsynth.dynamics.driven.run import DriveRun, RunStatus, run
+from graphsynth.dynamics.driven.reduction import ReductionStudy, inductance_study, simulate_drive
+from graphsynth.dynamics.driven.run import DriveRun, RunStatus
 from graphsynth.dynamics.driven.setup import Plant
 from graphsynth.dynamics.elements import Element, Force, MotorDrive
 from graphsynth.dynamics.model import Body, DynamicModel
@@ -32,7 +31,7 @@ from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism, TracePoint
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.systems.braider.linkage import FourBar
+from graphsynth.systems.braider.linkage import ChangePoint, FourBar
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
@@ -369,38 +368,24 @@ class Braider:
         """
         if not math.isfinite(float(self.linkage.motion(number("angle", angle)).k3)):
             raise SpecError(f"the linkage cannot be assembled at angle = {angle:g} rad; start within linkage.reach()")
-        if isinstance(self.motor, IdealSpeed):
-            given = prescribed_run(self.plant(), self.motor, self.train, times, angle=angle, speed=speed)
-            return self._until_change_point(given)
-        motor, note = choose_motor(
-            self.plant(), self.motor, self.train, times, reduce, angle=angle, speed=speed, rtol=rtol
-        )
-        found = run(
+        found = simulate_drive(
             self.plant(),
-            motor,
+            self.motor,
             self.train,
             times,
+            reduce,
             angle=angle,
             speed=speed,
-            currents=None if note else currents,
+            currents=currents,
             rtol=rtol,
             estimate=estimate,
             max_steps=max_steps,
-            notes=(note,) if note else (),
         )
-        return self._until_change_point(found)
-
-    def _until_change_point(self, found: DriveRun) -> DriveRun:
-        points = self.linkage.change_points()
-        if not points:
-            return found
-        start = found.angle[0]
-        for point in points:
+        for point in self.linkage.change_points():
             turns = np.floor((found.angle - point.theta) / math.tau)
-            beyond = np.nonzero(turns != math.floor((start - point.theta) / math.tau))[0]
-            beyond = beyond[np.isfinite(found.angle[beyond])]
+            beyond = np.flatnonzero((turns != turns[0]) & np.isfinite(found.angle))
             if beyond.size:
-                return _cut(found, int(beyond[0]), point.theta, point.ratios)
+                return _cut(found, int(beyond[0]), point)
         return found
 
     @checked
@@ -412,8 +397,6 @@ class Braider:
         SpecError
             For an ideal speed, which has no inductance.
         """
-        if isinstance(self.motor, IdealSpeed):
-            raise SpecError("an ideal speed has no inductance to take to zero; give a SynchronousMotor or a DCMotor")
         return inductance_study(self.plant(), self.motor, self.train, times, inductances)
 
     def link_motion(self, found: DriveRun) -> LinkMotion:
@@ -507,11 +490,11 @@ class Braider:
         return Settling(float(brentq(lambda t: float(curve(t)) - edge, times[k], times[k + 1])), target, band)
 
 
-def _cut(found: DriveRun, row: int, theta: float, ratios: dict[int, tuple[float, float]]) -> DriveRun:
+def _cut(found: DriveRun, row: int, point: ChangePoint) -> DriveRun:
     """Run with NaN from ``row`` on, ended by a change point."""
-    said = "; ".join(f"branch {b:+d}: k2 = {k[0]:.6g}, k3 = {k[1]:.6g}" for b, k in ratios.items())
+    said = "; ".join(f"branch {b:+d}: k2 = {k[0]:.6g}, k3 = {k[1]:.6g}" for b, k in point.ratios.items())
     reason = (
-        f"the linkage passes a change point at theta = {theta:.12g} rad (modulo a turn), where both modes meet "
+        f"the linkage passes a change point at theta = {point.theta:.12g} rad (modulo a turn), where both modes meet "
         f"({said}); choose the branch and start again behind it"
     )
     arrays = {}

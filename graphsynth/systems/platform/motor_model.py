@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import check_fields, finite_array
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.inertia import EffectiveInertia
-from graphsynth.dynamics.driven.prescribed import prescribed_run
-from graphsynth.dynamics.driven.reduction import ReductionStudy, choose_motor, inductance_study, reduction_error
-from graphsynth.dynamics.driven.run import DriveRun, run
+from graphsynth.dynamics.driven.reduction import ReductionStudy, inductance_study, reduction_error, simulate_drive
+from graphsynth.dynamics.driven.run import DriveRun
 from graphsynth.dynamics.driven.setup import Plant, load_coefficients
 from graphsynth.dynamics.motors import IdealSpeed, Motor, Train, check_motor, number
 
@@ -174,20 +173,14 @@ class MotorDrivenPlatform:
         """
         if not isinstance(model, str) or model not in ("auto", "J", "S"):
             raise SpecError(f"model = {model!r} is unknown; choose 'auto', 'J' or 'S'")
-        if isinstance(self.motor, IdealSpeed):
-            return prescribed_run(self.plant(), self.motor, self.train, times, angle=angle, speed=speed)
         regular = model == "S" or (model == "auto" and self.constant_inertia == 0.0 and bool(self.inertia.dead_centres))
-        notes = (_SPIKES,) if regular else ()
-        motor, note = choose_motor(
-            self.plant(), self.motor, self.train, times, reduce, angle=angle, speed=speed, rtol=rtol, regular=regular
-        )
-        if note:
-            currents, notes = None, (*notes, note)
-        return run(
+        return simulate_drive(
             self.plant(),
-            motor,
+            self.motor,
             self.train,
             times,
+            reduce,
+            (_SPIKES,) if regular else (),
             angle=angle,
             speed=speed,
             currents=currents,
@@ -195,12 +188,11 @@ class MotorDrivenPlatform:
             rtol=rtol,
             estimate=estimate,
             max_steps=max_steps,
-            notes=notes,
         )
 
     def reduction_error(self, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0) -> float:
         """Largest error of the angle (rad) of the limit L -> 0 after the electrical transient; see `reduction`."""
-        return reduction_error(self.plant(), self._driving(), self.train, times, angle=angle, speed=speed)
+        return reduction_error(self.plant(), self.motor, self.train, times, angle=angle, speed=speed)
 
     def inductance_study(
         self,
@@ -213,13 +205,8 @@ class MotorDrivenPlatform:
     ) -> ReductionStudy:
         """Compare the full model at several inductances (H) with the limit L -> 0; see `reduction`."""
         return inductance_study(
-            self.plant(), self._driving(), self.train, times, inductances, angle=angle, speed=speed, after=after
+            self.plant(), self.motor, self.train, times, inductances, angle=angle, speed=speed, after=after
         )
-
-    def _driving(self) -> Motor:
-        if isinstance(self.motor, IdealSpeed):
-            raise SpecError("an ideal speed has no inductance to take to zero; give a DCMotor or a SynchronousMotor")
-        return self.motor
 
     def torque_at_speed(self, q: ArrayLike, speed: float) -> Array:
         """Torque at the crank that keeps a constant crank speed (rad/s): ``J'(q) w^2 / 2 + b w + load``, N m.
