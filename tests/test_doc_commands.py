@@ -83,9 +83,9 @@ def test_every_block_is_of_a_kind_that_is_checked(page):
 
 @pytest.mark.parametrize("words", [pytest.param(words, id=title(page, words)) for page, words, _ in commands()])
 def test_documented_commands_parse(words):
-    from graphsynth.cli.main import _parser
+    from graphsynth.cli.options import command_line
 
-    options = _parser().parse_args([re.sub(r"\$\{?\w+\}?", "1", word) for word in words])
+    options = command_line().parse_args([re.sub(r"\$\{?\w+\}?", "1", word) for word in words])
     assert options.verb == words[0]
 
 
@@ -238,7 +238,7 @@ def test_the_first_run_is_as_the_tutorial_tells(tmp_path, monkeypatch):
 
 def verbs():
     """Yield (verb or pair of verbs, its parser)."""
-    from graphsynth.cli.main import _parser
+    from graphsynth.cli.options import command_line
 
     def inside(parser, words):
         nested = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
@@ -248,7 +248,7 @@ def verbs():
             for word, child in action.choices.items():
                 yield from inside(child, (*words, word))
 
-    yield from inside(_parser(), ())
+    yield from inside(command_line(), ())
 
 
 def section_of(page, verb):

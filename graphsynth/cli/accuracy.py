@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from graphsynth.cli import console
 from graphsynth.core.errors import SceneError
@@ -25,7 +26,11 @@ def run(options: argparse.Namespace) -> int:
             "some through the entry points graphsynth.evidence"
         )
     folder = options.out or Path("graphsynth-out") / f"{scene.name}-accuracy"
-    _check_writable(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    try:  # refused now, not after a minute of measurements
+        TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(folder)) from error
     effort = Effort(rounds=options.rounds, quick=options.quick)
     with console.counting() as progress:
         report = measure(Context(scene), plans, effort, progress)
@@ -40,14 +45,3 @@ def run(options: argparse.Namespace) -> int:
         console.note(f"what was measured before is kept in {folder}")
         raise KeyboardInterrupt
     return 0
-
-
-def _check_writable(folder: Path) -> None:
-    """Refuse a folder that cannot be written now, not after a minute of measurements."""
-    from tempfile import TemporaryFile
-
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
-        TemporaryFile(dir=folder).close()
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(folder)) from error

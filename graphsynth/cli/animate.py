@@ -52,12 +52,22 @@ def run(options: argparse.Namespace) -> int:
         text = mechanism.to_toml() if options.save.suffix.lower() == ".toml" else mechanism.to_json()
         with replacing(options.save) as fresh:
             fresh.write_text(text, "utf-8")
-    facts = {**_facts(found.motion), **found.facts, "statement": found.statement, "file": str(options.output)}
-    if options.json:
-        console.put_json(facts)
-    else:
-        console.put(console.wrapped(f"{found.statement}; {_closure(found.motion)}"))
+    motion, closure = found.motion, found.motion.closure
+    if not options.json:
+        ending = closure.statement if motion.completed else f"not a full rotation: {motion.reason}"
+        console.put(console.wrapped(f"{found.statement}; {ending}"))
         console.put(f"{options.output}, {options.output.stat().st_size / 1000:.0f} kB")
+        return 0
+    facts = {
+        "links": motion.mechanism.graph.links,
+        "drivers": _drivers(motion.mechanism),
+        "completed": motion.completed,
+        "reason": motion.reason,
+        "closed": closure.closed if closure.tested else None,
+        "closure": _number(closure.error),
+        "residual": _number(motion.residual),
+    }
+    console.put_json({**facts, **found.facts, "statement": found.statement, "file": str(options.output)})
     return 0
 
 
@@ -107,11 +117,8 @@ def _from_graph(options: argparse.Namespace) -> _Found:
         "search_seconds": round(found.seconds, 3),
     }
     if found.figures is not None:
-        facts |= {
-            "transmission_angle": _number(found.figures.transmission_angle),
-            "singularity_distance": _number(found.figures.singularity_distance),
-            "length_ratio": _number(found.figures.length_ratio),
-        }
+        names = ("transmission_angle", "singularity_distance", "length_ratio")
+        facts |= {name: _number(getattr(found.figures, name)) for name in names}
     return _Found(found.motion, graph.to_text(), found.statement, facts)
 
 
@@ -131,42 +138,21 @@ def _on_frame(graph: MechanismGraph, links: list[int] | None) -> list[tuple[int,
 
 
 def _write(found: _Found, path: Path, suffix: str, frames: int) -> None:
+    from graphsynth.drawing.animation import animated_svg, animation_html, save_gif
     from graphsynth.drawing.frames import with_trace_points
 
     motion = with_trace_points(found.motion)
     if suffix == ".gif":
-        from graphsynth.drawing.animation import save_gif
-
         save_gif(motion, path, frames=frames)
-        return
-    from graphsynth.drawing.animation import animated_svg, animation_html
-
-    if suffix == ".svg":
+    elif suffix == ".svg":
         path.write_text(animated_svg(motion, frames=frames, title=found.title), "utf-8")
     else:
         note = f"{found.statement[:1].upper()}{found.statement[1:]}."
         path.write_text(animation_html(motion, frames=frames, title=found.title, note=note), "utf-8")
 
 
-def _facts(motion: Motion) -> dict[str, Any]:
-    closure = motion.closure
-    return {
-        "links": motion.mechanism.graph.links,
-        "drivers": _drivers(motion.mechanism),
-        "completed": motion.completed,
-        "reason": motion.reason,
-        "closed": closure.closed if closure.tested else None,
-        "closure": _number(closure.error),
-        "residual": _number(motion.residual),
-    }
-
-
 def _drivers(mechanism: Mechanism) -> str:
     return ", ".join(f"{d.base}-{d.link}" for d in mechanism.drivers)
-
-
-def _closure(motion: Motion) -> str:
-    return motion.closure.statement if motion.completed else f"not a full rotation: {motion.reason}"
 
 
 def _number(value: float) -> float | None:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.cli import console
-from graphsynth.cli.catalog_options import JOINT_LIMIT
-from graphsynth.core import wording
+from graphsynth.cli.options import JOINT_LIMIT
+from graphsynth.core import ordered, wording
 from graphsynth.core.errors import SpecError
 
 if TYPE_CHECKING:
@@ -20,7 +22,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from graphsynth.atlas.building import BuildStep
-    from graphsynth.atlas.catalogue import Catalogue
     from graphsynth.atlas.evaluating import EvaluationStep
 
 DIFFERENT = 1
@@ -35,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _build(options: argparse.Namespace) -> int:
-    from graphsynth.atlas.catalogue import Catalogue
+    from graphsynth.synthesis.writing import Step
 
     if (options.executor == "dask") != (options.scheduler is not None):
         raise SpecError("--executor dask and --scheduler ADDRESS go together; give both, or neither")
@@ -43,7 +44,12 @@ def _build(options: argparse.Namespace) -> int:
         raise SpecError("--workers is for processes of this machine; a dask cluster has its own")
     begin = time.perf_counter()
     try:
-        with _executor(options) as executor, _progress() as watch:
+        with _executor(options) as executor, console.progress("building") as bar:
+
+            def watch(step: BuildStep) -> None:
+                if bar:
+                    bar(Step(step.chains, step.done))
+
             for mobility in options.mobility:
                 Catalogue.build(
                     options.output,
@@ -71,34 +77,16 @@ def _executor(options: argparse.Namespace) -> AbstractContextManager[Executor | 
     return processes(console.workers_for(options.workers, max(options.links) > 10 + min(options.mobility)))
 
 
-@contextmanager
-def _progress() -> Iterator[Callable[[BuildStep], None] | None]:
-    """Show how far the family under way is."""
-    from graphsynth.synthesis.writing import Step
-
-    with console.progress("building") as watch:
-        yield None if watch is None else lambda step: watch(Step(step.chains, step.done))
-
-
 def _summary(options: argparse.Namespace, begin: float) -> int:
     """Say what the catalogue now holds."""
-    from graphsynth.atlas.catalogue import Catalogue
-
     seconds = round(time.perf_counter() - begin, 3)
     with Catalogue(options.output) as catalogue:
         families = catalogue.completeness()
         chains = len(catalogue)
         size = options.output.stat().st_size
     if options.json:
-        console.put_json(
-            {
-                "file": str(options.output),
-                "chains": chains,
-                "bytes": size,
-                "seconds": seconds,
-                "families": _records(families),
-            }
-        )
+        held = {"chains": chains, "bytes": size, "seconds": seconds, "families": _records(families)}
+        console.put_json({"file": str(options.output), **held})
         return 0
     _put_frame(families)
     part = "" if getattr(options, "shard", None) is None else ", part {}/{}: merge all parts".format(*options.shard)
@@ -107,8 +95,6 @@ def _summary(options: argparse.Namespace, begin: float) -> int:
 
 
 def _query(options: argparse.Namespace) -> int:
-    from graphsynth.atlas.catalogue import Catalogue
-
     if sum((options.sql is not None, options.entry is not None, options.where != "1")) > 1:
         raise SpecError("give one of --where, --sql and --entry")
     with Catalogue(options.file) as catalogue:
@@ -145,33 +131,23 @@ def _put_entry(catalogue: Catalogue, options: argparse.Namespace) -> None:
         _put(f"frame {inversion['frame']}: {inversion['frame_joints']} joints, levels {inversion['levels']}")
         for own in entry["mechanisms"]:
             if own["frame"] == inversion["frame"]:
-                groups = ", ".join(f"{g['links']} links class {g['class']} order {g['order']}" for g in own["groups"])
-                known = "; ".join(f"{kind} {_evaluated(value)}" for kind, value in own["evaluations"].items())
-                _put(f"  driver {own['driver']}: class {own['class']}, order {own['order']}: {groups}; {known}")
-
-
-def _evaluated(value: Any) -> str:
-    """Say an evaluation in a few words."""
-    if isinstance(value, str):
-        return value
-    number = "" if value["value"] is None else f" {value['value']:.6g} {value['unit'] or ''}".rstrip()
-    return f"{value['status']}{number}" + (f" ({value['guarantee']})" if value["guarantee"] else "")
+                known = [f"{g['links']} links class {g['class']} order {g['order']}" for g in own["groups"]]
+                words = [", ".join(known)]
+                for kind, found in own["evaluations"].items():
+                    if isinstance(found, dict):
+                        number = "" if found["value"] is None else f" {found['value']:.6g} {found['unit'] or ''}"
+                        sure = f" ({found['guarantee']})" if found["guarantee"] else ""
+                        found = f"{found['status']}{number.rstrip()}{sure}"
+                    words.append(f"{kind} {found}")
+                _put(f"  driver {own['driver']}: class {own['class']}, order {own['order']}: {'; '.join(words)}")
 
 
 def _verify(options: argparse.Namespace) -> int:
-    from graphsynth.atlas.catalogue import Catalogue
-
     with Catalogue(options.file) as catalogue:
         found = catalogue.verify(chains=options.chains, seed=options.seed, quick=options.quick)
     if options.json:
-        console.put_json(
-            {
-                "passed": found.passed,
-                "compared": found.compared,
-                "differences": list(found.differences),
-                "seconds": round(found.seconds, 3),
-            }
-        )
+        document = {"passed": found.passed, "compared": found.compared, "differences": list(found.differences)}
+        console.put_json({**document, "seconds": round(found.seconds, 3)})
     else:
         for difference in found.differences:
             _put(difference)
@@ -180,8 +156,6 @@ def _verify(options: argparse.Namespace) -> int:
 
 
 def _export(options: argparse.Namespace) -> int:
-    from graphsynth.atlas.catalogue import Catalogue
-
     with Catalogue(options.file) as catalogue:
         files = catalogue.export(options.output, options.form)
         digest = catalogue.digest()
@@ -196,8 +170,6 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _merge(options: argparse.Namespace) -> int:
-    from graphsynth.atlas.catalogue import Catalogue
-
     begin = time.perf_counter()
     Catalogue.merge(options.output, options.parts).close()
     return _summary(options, begin)
@@ -205,9 +177,6 @@ def _merge(options: argparse.Namespace) -> int:
 
 def _evaluate(options: argparse.Namespace) -> int:
     """Evaluate, and say what the catalogue now holds."""
-    from graphsynth.atlas.catalogue import Catalogue
-    from graphsynth.core.ordered import processes
-
     if options.joint_limit is not None and options.tilt is None:
         raise SpecError("--joint-limit goes with --tilt; give both, or neither")
     jamming = None
@@ -217,7 +186,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     begin = time.perf_counter()
     with Catalogue(options.file) as catalogue:
         try:
-            with processes(console.workers_for(options.workers, False)) as executor, console.counting() as bar:
+            with ordered.processes(console.workers_for(options.workers, False)) as executor, console.counting() as bar:
 
                 def watch(step: EvaluationStep) -> None:
                     if bar:
@@ -237,61 +206,39 @@ def _evaluate(options: argparse.Namespace) -> int:
         except KeyboardInterrupt:
             console.note(f"{options.file} keeps what is evaluated: give the same command to go on")
             raise
-        held = _held(catalogue)
+        rows = catalogue.sql(
+            "SELECT kind, status, COALESCE(guarantee, '') AS guarantee, COUNT(*) AS count, MIN(value) AS least, "
+            "MAX(value) AS most FROM evaluations GROUP BY kind, status, guarantee ORDER BY kind, status, guarantee"
+        )
+    held: list[dict[str, Any]] = rows.astype(object).where(rows.notna(), None).to_dict("records")
     seconds = round(time.perf_counter() - begin, 3)
     if options.json:
         console.put_json({"file": str(options.file), "evaluated": done, "held": held, "seconds": seconds})
         return 0
     for row in held:
         sure = f" ({row['guarantee']})" if row["guarantee"] else ""
-        console.put(f"{row['kind']:12}  {row['status']}{sure}: {row['count']}{_spread(row)}")
+        spread = ""
+        if row["kind"] == "transmission" and row["least"] is not None:
+            spread = f", {math.degrees(row['least']):.1f} to {math.degrees(row['most']):.1f} degrees"
+        console.put(f"{row['kind']:12}  {row['status']}{sure}: {row['count']}{spread}")
     console.put(f"{options.file}: {done} evaluated now ({seconds:.1f} s)")
     return 0
 
 
-def _held(catalogue: Catalogue) -> list[dict[str, Any]]:
-    """Count what is stored, by kind, status and guarantee."""
-    rows: list[dict[str, Any]] = catalogue.sql(
-        "SELECT kind, status, COALESCE(guarantee, '') AS guarantee, COUNT(*) AS count, MIN(value) AS least, "
-        "MAX(value) AS most FROM evaluations GROUP BY kind, status, guarantee ORDER BY kind, status, guarantee"
-    ).to_dict("records")
-    return [
-        {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}
-        for row in rows
-    ]
-
-
-def _spread(row: dict[str, Any]) -> str:
-    if row["kind"] != "transmission" or row["least"] is None:
-        return ""
-    return f", {math.degrees(row['least']):.1f} to {math.degrees(row['most']):.1f} degrees"
-
-
 def _site(options: argparse.Namespace) -> int:
     """Write the page and say what it holds."""
-    from graphsynth.atlas.catalogue import Catalogue
     from graphsynth.atlas.site.building import build_site
-    from graphsynth.core.ordered import processes
 
     begin = time.perf_counter()
     with Catalogue(options.file) as catalogue:
         count = console.workers_for(options.workers, len(catalogue) > _MANY)
-        with processes(count) as executor, console.counting() as watch:
-            report = build_site(
-                catalogue, options.output, motion_links=options.motion_links, executor=executor, watch=watch
-            )
+        with ordered.processes(count) as executor, console.counting() as watch:
+            motions = options.motion_links
+            report = build_site(catalogue, options.output, motion_links=motions, executor=executor, watch=watch)
     seconds = round(time.perf_counter() - begin, 3)
-    facts = {
-        "page": str(report.page),
-        "chains": report.chains,
-        "motions": report.motions,
-        "files": report.files,
-        "bytes": report.size,
-        "first_load": report.first_load,
-        "seconds": seconds,
-    }
     if options.json:
-        console.put_json(facts)
+        held = {"bytes" if name == "size" else name: value for name, value in asdict(report).items()}
+        console.put_json({**held, "page": str(report.page), "seconds": seconds})
     else:
         console.put(
             f"{report.page}: {report.chains} chains, {report.motions} in motion, {report.files} files, "
@@ -307,14 +254,10 @@ def _put(text: str) -> None:
 
 def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
     """Rows as plain values for JSON; bytes as hexadecimal digits, and columns of one name numbered."""
-    import json
-    from collections import Counter
-
-    seen: Counter[str] = Counter()
-    names = []
-    for name in frame.columns:
-        seen[name] += 1
-        names.append(name if seen[name] == 1 else f"{name}:{seen[name]}")
+    names: list[str] = []
+    for at, name in enumerate(frame.columns, 1):
+        before = list(frame.columns[:at]).count(name)
+        names.append(name if before == 1 else f"{name}:{before}")
     shown = frame.set_axis(names, axis="columns").map(lambda value: value.hex() if isinstance(value, bytes) else value)
     records: list[dict[str, Any]] = json.loads(shown.to_json(orient="records", double_precision=15))
     return records

@@ -39,14 +39,16 @@ def run(options: argparse.Namespace) -> int:
     if options.graphs:
         items = (item.graph if hasattr(item, "graph") else item for item in items)
     if options.output == PIPE:
-        if format_of("", options.target_format).feed == "lines":
-            for item in items:
-                sys.stdout.write(write_text(item, options.target_format))
-        else:
-            sys.stdout.write(write_text(items, options.target_format))
+        for one in items if format_of("", options.target_format).feed == "lines" else (items,):
+            sys.stdout.write(write_text(one, options.target_format))
         return 0
     path = Path(options.output)
-    _check(path, options)
+    if path.is_dir():
+        raise GraphsynthError(f"{path} is a folder; name a file")
+    if not path.parent.is_dir():
+        raise GraphsynthError(f"{path}: the folder {path.parent} does not exist; make it first")
+    if path.exists() and not options.force:
+        raise GraphsynthError(f"{path} exists; choose another name, or replace it with --force")
     entry = format_of(path, options.target_format)
     count = write(_some(items, options.source), path, entry.name)
     if options.json:
@@ -54,15 +56,6 @@ def run(options: argparse.Namespace) -> int:
     else:
         console.note(f"{count} written to {path} ({entry.name})")
     return 0
-
-
-def _check(path: Path, options: argparse.Namespace) -> None:
-    if path.is_dir():
-        raise GraphsynthError(f"{path} is a folder; name a file")
-    if not path.parent.is_dir():
-        raise GraphsynthError(f"{path}: the folder {path.parent} does not exist; make it first")
-    if path.exists() and not options.force:
-        raise GraphsynthError(f"{path} exists; choose another name, or replace it with --force")
 
 
 def _some(items: Iterator[Item], source: str) -> Iterator[Item]:

@@ -7,13 +7,12 @@ import time
 
 from graphsynth.cli import console
 from graphsynth.cli.question import problem_of
+from graphsynth.synthesis.problem import processes
+from graphsynth.synthesis.writing import count_with_checkpoint
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the count; the number stands alone on the last line."""
-    from graphsynth.synthesis.problem import processes
-    from graphsynth.synthesis.writing import count_with_checkpoint
-
     begin = time.perf_counter()
     problem = problem_of(options)
     if problem.reason:

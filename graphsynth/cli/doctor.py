@@ -14,11 +14,6 @@ def run(options: argparse.Namespace) -> int:
 
         console.put(schema_text().rstrip("\n"))
         return 0
-    return _doctor(options)
-
-
-def _doctor(options: argparse.Namespace) -> int:
-    """Print where the machine code of the kernels comes from, and why."""
     from graphsynth.core.native import doctor, library
 
     found = doctor.examine()

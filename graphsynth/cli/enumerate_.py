@@ -6,6 +6,7 @@ import argparse
 import shutil
 import sys
 import time
+from collections.abc import Iterable
 from io import BytesIO
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,6 @@ from graphsynth.cli.question import problem_of
 from graphsynth.core.errors import GraphsynthError, SpecError, TooLargeError
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
     from pathlib import Path
 
     from graphsynth.synthesis.problem import Problem
@@ -28,20 +28,20 @@ def run(options: argparse.Namespace) -> int:
         raise SpecError("--json needs -o FILE.jsonl here: the graphs go to the file, a summary to standard output")
     if options.output is None and (options.resume or options.force):
         raise SpecError("--resume and --force need -o FILE")
-    from graphsynth.synthesis.problem import processes
+    from graphsynth.synthesis.problem import processes, texts
+    from graphsynth.synthesis.shards import shard_of
+    from graphsynth.synthesis.writing import write_listing
 
     begin = time.perf_counter()
     entry = _other_format(options.output) if options.output else None
     problem = problem_of(options)
     if problem.reason:
         console.note(f"nothing to list: {problem.reason}")
-    weight = sum(piece.weight for piece in problem.work_items(listing=True))
-    with processes(console.workers_for(options.workers, weight > BIG)) as executor:
+    items = problem.work_items(listing=True)
+    with processes(console.workers_for(options.workers, sum(item.weight for item in items) > BIG)) as executor:
+        blocks = (data for data, _ in texts(shard_of(items, options.shard), executor))
         if options.output is None:
-            from graphsynth.synthesis.problem import texts
-            from graphsynth.synthesis.shards import shard_of
-
-            for data, _ in texts(shard_of(problem.work_items(listing=True), options.shard), executor):
+            for data in blocks:
                 sys.stdout.buffer.write(data)
             return 0
         if entry is not None and (options.resume or options.json):
@@ -50,27 +50,23 @@ def run(options: argparse.Namespace) -> int:
             )
         if not options.force:
             _check_disk(problem, options)
-        from graphsynth.synthesis.writing import write_listing
-
         if entry is not None:
-            graphs = _write_whole(problem, options, executor)
-            seconds = time.perf_counter() - begin
-            console.note(f"{problem.title}: {graphs} graphs written to {options.output} ({seconds:.2f} s)")
-            return 0
-        try:
-            with console.progress("listing") as watch:
-                graphs = write_listing(
-                    problem,
-                    options.output,
-                    shard=options.shard,
-                    resume=options.resume,
-                    overwrite=options.force,
-                    executor=executor,
-                    watch=watch,
-                )
-        except KeyboardInterrupt:
-            console.note(f"{options.output} holds whole lines so far: go on with the same command and --resume")
-            raise
+            graphs = _write_whole(blocks, options)
+        else:
+            try:
+                with console.progress("listing") as watch:
+                    graphs = write_listing(
+                        problem,
+                        options.output,
+                        shard=options.shard,
+                        resume=options.resume,
+                        overwrite=options.force,
+                        executor=executor,
+                        watch=watch,
+                    )
+            except KeyboardInterrupt:
+                console.note(f"{options.output} holds whole lines so far: go on with the same command and --resume")
+                raise
     seconds = time.perf_counter() - begin
     if options.json:
         console.put_json(
@@ -84,10 +80,7 @@ def run(options: argparse.Namespace) -> int:
 def _other_format(path: Path) -> str | None:
     """Return the name of a format that is not written line by line, None for lines of text or JSON.
 
-    Raises
-    ------
-    SpecError
-        For a suffix that names no format, or one that holds a single graph.
+    Raises `SpecError` for a suffix that names no format, or one that holds a single graph.
     """
     from graphsynth.formats.registry import FORMATS
 
@@ -102,16 +95,13 @@ def _other_format(path: Path) -> str | None:
     return None if entry.line else entry.name
 
 
-def _write_whole(problem: Problem, options: argparse.Namespace, executor: Executor | None) -> int:
+def _write_whole(blocks: Iterable[bytes], options: argparse.Namespace) -> int:
     """Write all graphs in another format; the file appears when it is complete."""
     from graphsynth.formats.registry import read_stream, write
-    from graphsynth.synthesis.problem import texts
-    from graphsynth.synthesis.shards import shard_of
 
     if options.output.exists() and not options.force:
         raise GraphsynthError(f"{options.output} exists; choose another name, or replace it with --force")
-    blocks = texts(shard_of(problem.work_items(listing=True), options.shard), executor)
-    return write((graph for data, _ in blocks for graph in read_stream(BytesIO(data), "text")), options.output)
+    return write((graph for data in blocks for graph in read_stream(BytesIO(data), "text")), options.output)
 
 
 def _check_disk(problem: Problem, options: argparse.Namespace) -> None:
@@ -124,13 +114,10 @@ def _check_disk(problem: Problem, options: argparse.Namespace) -> None:
         free += options.output.stat().st_size
     graphs, needed = estimated_size(problem, options.output, options.shard, enough=free)
     if free and needed > free:
+        wanted, there = (f"{n / 1e9:.3g} GB" if n >= 1e9 else f"{n / 1e6:.3g} MB" for n in (needed, free))
         raise TooLargeError(
-            f"about {graphs:.2g} graphs need about {_bytes(needed)}, and {_bytes(free)} are free for {options.output}: "
-            f"list a part with --shard i/{int(needed / free) + 1}, name a file on another disk, or only count them; "
-            "--force writes as much as fits",
+            f"about {graphs:.2g} graphs need about {wanted}, and {there} are free for {options.output}: list a part "
+            f"with --shard i/{int(needed / free) + 1}, name a file on another disk, or only count them; --force "
+            "writes as much as fits",
             graphs,
         )
-
-
-def _bytes(size: float) -> str:
-    return f"{size / 1e9:.3g} GB" if size >= 1e9 else f"{size / 1e6:.3g} MB"

@@ -42,21 +42,18 @@ def add_question(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--fractionated", action="store_true", help="include fractionated chains (mobility >= 2)")
 
 
-def _assignments(options: argparse.Namespace) -> list[str]:
-    found = [
-        f"{name[4:]}={value}" for name, value in vars(options).items() if name.startswith("var_") and value is not None
-    ]
-    found += options.set
-    if options.fractionated:
-        found.append("fractionated=true")
-    return found
+def _given(options: argparse.Namespace) -> dict[str, str]:
+    """Return the variables of the question that have a value, by symbol."""
+    return {name[4:]: value for name, value in vars(options).items() if name.startswith("var_") and value is not None}
 
 
 def spec_of(options: argparse.Namespace) -> StructuralSpec:
     """Return the question; options on the command line add to the file, or replace what it says."""
     from graphsynth.structure.system.spec import StructuralSpec
 
-    assignments = _assignments(options)
+    assignments = [f"{symbol}={value}" for symbol, value in _given(options).items()] + options.set
+    if options.fractionated:
+        assignments.append("fractionated=true")
     if options.spec is None:
         return StructuralSpec.from_assignments(assignments)
     question = StructuralSpec.from_toml(options.spec).as_dict()
@@ -64,58 +61,40 @@ def spec_of(options: argparse.Namespace) -> StructuralSpec:
     return StructuralSpec(**question)
 
 
-def _chain_numbers(options: argparse.Namespace) -> dict[str, int] | None:
-    """Return the numbers of a question about chains without a frame, or None when it is about mechanisms."""
-    given = {name[4:]: value for name, value in vars(options).items() if name.startswith("var_") and value is not None}
-    if options.frame or options.spec or options.set or set(given) - _OF_CHAINS:
-        return None
-    numbers = {}
-    for symbol, text in given.items():
-        if not text.isdecimal():
-            raise SpecError(f"{symbol} = {text} must be a whole number for chains; with --frame it may be a range")
-        numbers[symbol] = int(text)
-    if "N" not in numbers:
-        raise SpecError("the number of links is missing: give --links N, or a question with a frame (see --help)")
-    return numbers
-
-
 def problem_of(options: argparse.Namespace) -> Problem:
     """Return what ``count`` and ``enumerate`` are asked to do."""
     from graphsynth.synthesis.problem import Problem
 
+    given = _given(options)
     if options.assur is not None or options.truss is not None:
         if options.assur is not None and options.truss is not None:
             raise SpecError("--assur and --truss ask for different things: give one of them")
         if options.symmetry:
             raise SpecError("--symmetry is for chains and mechanisms; --assur and --truss have none: leave it out")
-        given = sorted(
-            {name[4:] for name, value in vars(options).items() if name.startswith("var_") and value} - {"Pi"}
-        )
+        space = given.pop("Pi", "3")
         if given or options.spec or options.set or options.frame or options.fractionated:
             raise SpecError(
                 f"--assur N and --truss N take no other part of a question than --space "
-                f"(given: {', '.join(given) or 'more'}): leave the rest out"
+                f"(given: {', '.join(sorted(given)) or 'more'}): leave the rest out"
             )
-        if options.var_Pi is not None and not options.var_Pi.isdecimal():
-            raise SpecError(f"Pi = {options.var_Pi} must be a whole number from 2 to 6")
-        space = int(options.var_Pi or 3)
-        if options.assur is not None:
-            return Problem.trusses(options.assur + 1, space, True)
-        return Problem.trusses(options.truss, space, False)
-    numbers = _chain_numbers(options)
-    if numbers is None:
+        if not space.isdecimal():
+            raise SpecError(f"Pi = {space} must be a whole number from 2 to 6")
+        links = options.truss if options.assur is None else options.assur + 1
+        return Problem.trusses(links, int(space), options.assur is not None)
+    if options.frame or options.spec or options.set or set(given) - _OF_CHAINS:
         spec = spec_of(options)
         if spec.bounds("W") == (None, None) and "p" not in spec.ranges:
             spec = spec.replace(W=1)  # the default of chains
         return Problem.mechanisms(spec, options.symmetry)
-    return Problem.chains(
-        numbers["N"],
-        numbers.get("W", 1),
-        numbers.get("Pi", 3),
-        {int(symbol[1:]): count for symbol, count in numbers.items() if symbol[0] == "p"},
-        options.fractionated,
-        options.symmetry,
-    )
+    for symbol, text in given.items():
+        if not text.isdecimal():
+            raise SpecError(f"{symbol} = {text} must be a whole number for chains; with --frame it may be a range")
+    if "N" not in given:
+        raise SpecError("the number of links is missing: give --links N, or a question with a frame (see --help)")
+    asked = {symbol: int(text) for symbol, text in given.items()}
+    joints = {int(symbol[1:]): count for symbol, count in asked.items() if symbol[0] == "p"}
+    plane, mobility = asked.get("Pi", 3), asked.get("W", 1)
+    return Problem.chains(asked["N"], mobility, plane, joints, options.fractionated, options.symmetry)
 
 
 def shard(text: str) -> tuple[int, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,29 +22,25 @@ def run(options: argparse.Namespace) -> int:
     """Describe one graph, and draw it if asked."""
     graph = read_graph(options.graph, options.line)
     if options.output:
-        check_place(options.output, (*PICTURES, *_data_suffixes()))
+        from graphsynth.formats.registry import FORMATS, write
+
+        data = [suffix for entry in FORMATS.values() if entry.name != "toml" for suffix in entry.suffixes]
+        check_place(options.output, (*PICTURES, *data))
     facts = _facts(graph, options.driver)
     if options.json:
         console.put_json(facts)
     else:
-        rows = []
+        rows: list[tuple[str, str]] = []
         for name, value in facts.items():
             lines = value if isinstance(value, list) and value and isinstance(value[0], str) else [value]
-            rows += [(name if i == 0 else "", _plain(line)) for i, line in enumerate(lines)]
+            plain = [("no", "yes")[line] if isinstance(line, bool) else str(line) for line in lines]
+            rows += zip((name, *[""] * len(plain)), plain)
         console.facts(rows)
     if options.output and options.output.suffix.lower() in PICTURES:
         _draw(graph, options.output, options.view, options.driver)
     elif options.output:
-        from graphsynth.formats.registry import write
-
         write(graph, options.output)
     return 0
-
-
-def _data_suffixes() -> list[str]:
-    from graphsynth.formats.registry import FORMATS
-
-    return [suffix for entry in FORMATS.values() if entry.name != "toml" for suffix in entry.suffixes]
 
 
 def check_place(path: Path, suffixes: tuple[str, ...]) -> None:
@@ -115,16 +112,15 @@ def _facts(graph: MechanismGraph, driver: int | None) -> dict[str, Any]:
         "planar graph": graph.is_planar,
         "fractionated": graph.is_fractionated,
         "automorphisms": graph.automorphism_order,
-        "link orbits": " ".join(_set(orbit) for orbit in graph.orbits),
+        "link orbits": _sets(graph.orbits),
+        "rigid sub-chain": str(graph.rigid_subchain() or "none"),
     }
-    rigid = graph.rigid_subchain()
-    facts["rigid sub-chain"] = str(rigid) if rigid else "none"
     if graph.frame is None:
         if driver is not None:
             raise SpecError("--driver needs a mechanism: choose a frame first (text form '... f0')")
         return facts
-    facts["levels"] = " ".join(_set(level) for level in graph.levels)
-    if not rigid:
+    facts["levels"] = _sets(graph.levels)
+    if facts["rigid sub-chain"] == "none":
         facts["Assur groups"] = _groups(graph, driver)
     return facts
 
@@ -137,10 +133,9 @@ def _groups(graph: MechanismGraph, driver: int | None) -> list[str]:
         return [f"{graph.mobility} drivers needed: not listed"]
     if driver is not None:
         if driver not in graph.levels[1]:
-            raise GraphError(f"driver {driver} is not jointed to the frame; choose one of {_set(graph.levels[1])}")
-        if graph.mobility == 1:
-            return [f"driver {driver}: {decompose(graph, [driver])}"]
-        return [f"driver {driver}: one of {graph.mobility} drivers needed, groups not listed"]
+            raise GraphError(f"driver {driver} is not jointed to the frame; choose one of {_sets(graph.levels[1:2])}")
+        needed = f"one of {graph.mobility} drivers needed, groups not listed"
+        return [f"driver {driver}: {decompose(graph, [driver]) if graph.mobility == 1 else needed}"]
     lines = []
     for link in graph.levels[1]:
         try:
@@ -150,14 +145,8 @@ def _groups(graph: MechanismGraph, driver: int | None) -> list[str]:
     return lines
 
 
-def _set(links: tuple[int, ...]) -> str:
-    return "{" + ",".join(map(str, links)) + "}"
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return str(value)
+def _sets(sets: Iterable[tuple[int, ...]]) -> str:
+    return " ".join("{" + ",".join(map(str, links)) + "}" for links in sets)
 
 
 def _draw(graph: MechanismGraph, path: Path, view: str | None, driver: int | None) -> None:
@@ -166,20 +155,16 @@ def _draw(graph: MechanismGraph, path: Path, view: str | None, driver: int | Non
     from graphsynth.drawing.graphs import graph_sketch, levels_sketch
     from graphsynth.drawing.sketch import Sketch
 
-    sketches: list[Sketch] = []
-    poses: list[list[tuple[float, float, float]] | None] = []
+    drawn: list[tuple[Sketch, list[tuple[float, float, float]] | None]] = []
     if view != "levels":
         try:
-            sketch, pose = graph_sketch(graph, driver=driver, title=graph.key)
-            sketches.append(sketch)
-            poses.append(pose)
+            drawn.append(graph_sketch(graph, driver=driver, title=graph.key))
         except GraphError as error:
             if view is not None:
                 raise
             console.note(f"{error}; drawn by levels instead")
-    if view in ("levels", "both") or not sketches:
+    if view in ("levels", "both") or not drawn:
         framed = graph if graph.frame is not None else graph.with_frame(0)
-        sketches.append(levels_sketch(framed, title=graph.key))
-        poses.append(None)
+        drawn.append((levels_sketch(framed, title=graph.key), None))
     with replacing(path) as fresh:
-        save(fresh, sketches, poses)
+        save(fresh, [sketch for sketch, _ in drawn], [pose for _, pose in drawn])

@@ -6,14 +6,13 @@ import argparse
 
 from graphsynth.cli import console
 from graphsynth.cli.question import spec_of
+from graphsynth.structure.system.assortment import solutions_table
 
 MOST_DRAWN = 1000  # rows of a table with lines, which takes a millisecond a row
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the integer solutions."""
-    from graphsynth.structure.system.assortment import solutions_table
-
     spec = spec_of(options)
     solutions = spec.solve()
     if options.json:

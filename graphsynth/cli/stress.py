@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from graphsynth.cli import console
@@ -15,28 +13,6 @@ if TYPE_CHECKING:
 
 WRONG = 1
 INTERRUPTED = 130
-
-
-def add_stress(verb: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
-    """Add the arguments; ``verb`` makes the parser of a name, a module and a summary."""
-    parser = verb("stress", "stress", "Run the stiff and extreme cases and compare the results with the right values.")
-    parser.add_argument(
-        "names",
-        nargs="*",
-        metavar="NAME",
-        help="platform-12.5, or all of platform-12, of platform, or of a system, such as braider (default: all)",
-    )
-    parser.add_argument(
-        "--cases",
-        action="append",
-        default=[],
-        type=Path,
-        metavar="FILE",
-        help="run the cases of this TOML file instead (its expressions are evaluated: name only files that you trust)",
-    )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write stress.html and stress.csv there")
-    parser.add_argument("--fast", action="store_true", help="leave out cases that take more than about two seconds")
-    parser.add_argument("--list", action="store_true", help="list the cases, run none")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -54,12 +30,11 @@ def run(options: argparse.Namespace) -> int:
                 bar(f"{case.name} {case.title}", number, total)
 
         report = run_stress(_names(options), slow=not options.fast, files=options.cases, progress=told)
+    files: list[str] = []
     if options.out:
         from graphsynth.evidence.stress.page import write_report
 
-        files = [str(path) for path in write_report(report, options.out)]
-    else:
-        files = []
+        files = list(map(str, write_report(report, options.out)))
     if options.json:
         console.put_json({**report.summary(), "files": files})
     else:
@@ -105,14 +80,11 @@ def _show(report: StressReport) -> None:
     colours = {"ok": "green", "flagged": "cyan", "WRONG": "bold red", "not run": "yellow"}
     for outcome in report.outcomes:
         worst, status = outcome.worst, outcome.status.value
-        numbers = (f"{worst.error:.1e}", f"{worst.bound:.1e}") if worst and worst.error == worst.error else ("", "")
-        table.add_row(
-            outcome.case.name,
-            f"[{colours[status]}]{status}[/]",
-            *numbers,
-            f"{outcome.seconds:.2f}",
-            escape(outcome.case.title),
+        error, bound = (
+            (f"{worst.error:.1e}", f"{worst.bound:.1e}") if worst and worst.error == worst.error else ("", "")
         )
+        said, seconds = f"[{colours[status]}]{status}[/]", f"{outcome.seconds:.2f}"
+        table.add_row(outcome.case.name, said, error, bound, seconds, escape(outcome.case.title))
     if report.outcomes:
         screen.print(table)
     for outcome in report.outcomes:

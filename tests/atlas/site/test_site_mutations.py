@@ -259,8 +259,8 @@ def campaign(right, altered, top, monkeypatch, seeds, window=None):
     place, out = inside / "in", inside / "out"
     place.mkdir(parents=True)
     mutants = Mutants(right, altered)
-    parser = cli._parser()  # most of the time of a small command
-    monkeypatch.setattr(cli, "_parser", lambda: parser)
+    parser = cli.command_line()  # most of the time of a small command
+    monkeypatch.setattr(cli, "command_line", lambda: parser)
     faults, statuses, seen, told = [], {}, 0, 0
     out.mkdir()
     (inside / PRECIOUS).touch()
