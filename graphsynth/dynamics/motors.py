@@ -315,6 +315,8 @@ def torque_constant(motor: Motor) -> float:
 
 def shaft_torque(motor: Motor, shaft: NDArray[np.float64], currents: NDArray[np.float64]) -> NDArray[np.float64]:
     """Torques on the motor's own shaft at speeds (...) and currents (..., 0, 1 or 2)."""
+    if isinstance(motor, IdealTorque):
+        motor = motor.reduced()
     if isinstance(motor, LinearCharacteristic):
         return motor.stall - (motor.slope * shaft if motor.slope else np.zeros_like(shaft))
     return np.asarray(torque_constant(motor) * currents[..., -1])

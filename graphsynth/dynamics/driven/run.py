@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.setup import Plant, Prepared, output_times, prepare
-from graphsynth.dynamics.motors import IdealTorque, Motor, Train, number, shaft_torque, whole
+from graphsynth.dynamics.motors import Motor, Train, number, shaft_torque, whole
 
 Array = NDArray[np.float64]
 _EVENTS = {2: "dead centre", 3: "stall", 4: "voltage limit", 5: "direction of power flow"}
@@ -122,34 +122,30 @@ def run(
     ``angle`` (rad), ``speed`` (rad/s) and ``currents`` (A; zero by default) are those of the start.  ``regular`` uses
     the regularised form ``dt = sqrt(J) ds`` (theory/motor-drive 3), which passes dead centres without inertia.
     ``rtol`` is the tolerance per step, 1e-13 to 1e-3; ``max_steps`` and ``max_events`` are guards: exceeding one is a
-    reported failure.  ``estimate`` also runs at ``100 rtol`` with every other output, and reports the difference as
-    ``error``.
-
-    Raises
-    ------
-    SpecError
-        Bad numbers; friction, no inductance or no rotor inertia where the form chosen cannot have it.
+    reported failure.  ``estimate`` also runs at ``100 rtol`` with every other output: the difference is the ``error``.
+    `SpecError` for friction, no inductance or no rotor inertia where the form chosen cannot have it.
     """
-    begin = perf_counter()
-    out = output_times(times)
+    begin, out = perf_counter(), output_times(times)
     whole("max_steps", max_steps, "raise it for long runs")
     whole("max_events", max_events, "raise it for many events")
     if not 1e-13 <= number("rtol", rtol) <= 1e-3:
         raise SpecError(f"rtol = {rtol:g} must be from 1e-13 to 1e-3; double precision gives no more")
     ready = prepare(plant, motor, train, out, angle, speed, currents, regular)
     found = _integrate(ready, out, rtol, max_steps, max_events)
+    status, Y, turns, balance, marks, counts, _ = found
     n = ready.start.size - int(regular)
     error = np.full(n, np.nan)
-    if estimate and found[0] is RunStatus.DONE:
+    if estimate and status is RunStatus.DONE:
         # every other output: where the outputs limit the steps, the same outputs would hide the error
         shared = np.unique(np.concatenate([[0], np.arange(out.size - 1, 0, -2)]))
         second = _integrate(ready, out[shared], min(100.0 * rtol, 1e-2), max_steps, max_events)
+        gap = np.abs(Y[shared] - second[1])
+        gap[:, 0] = np.abs(Y[shared, 0] - second[1][:, 0] + math.tau * (turns[shared] - second[2]))
+        gap[:, 1] /= (math.sqrt(plant.most_inertia) or 1.0) if regular else 1.0
         if second[0] is RunStatus.DONE:
-            size = math.sqrt(plant.most_inertia) or 1.0
-            error = _difference(found, second, shared, size if regular else 1.0)[:n]
+            error = gap.max(axis=0)[:n]
         else:
             notes = (*notes, _NO_ESTIMATE)
-    status, Y, turns, balance, marks, counts, _ = found
     angles, speeds, momentum = _physical(Y, turns, ready, regular)
     amperes, reached = Y[:, 2:n], int(counts[3])
     work, moved, surplus, supplied, kinetic, magnetic = balance.T
@@ -158,7 +154,6 @@ def run(
     if status is RunStatus.DONE and not (energy <= _WARN and electric <= _WARN):
         off = float(np.fmax(energy, electric))  # NaN without a second output time only
         notes = (*notes, f"the energy balance is off by {off:.1e}; tighten rtol")
-    line = motor.reduced() if isinstance(motor, IdealTorque) else motor
     unit = f"{n - 2} current(s)" if n > 2 else "currents negligible"
     name = "S (regularised, without inertia)" if regular else "J (with inertia)"
     return DriveRun(
@@ -169,7 +164,7 @@ def run(
         reduced_angle=Y[:, 0].copy(),
         turns=turns,
         momentum=momentum,
-        motor_torque=shaft_torque(line, speeds * train.ratio, amperes),
+        motor_torque=shaft_torque(motor, speeds * train.ratio, amperes),
         kinetic_energy=kinetic,
         work=work,
         energy_error=energy,
@@ -186,14 +181,6 @@ def run(
         seconds=perf_counter() - begin,
         notes=notes,
     )
-
-
-def _difference(found: _Raw, second: _Raw, shared: NDArray[np.intp], size: float) -> Array:
-    """Largest differences of angle, speed (momentum over ``size``, the root of an inertia) and currents."""
-    gap = np.abs(found[1][shared] - second[1])
-    gap[:, 0] = np.abs(found[1][shared, 0] - second[1][:, 0] + math.tau * (found[2][shared] - second[2]))
-    gap[:, 1] /= size
-    return np.asarray(gap.max(axis=0))
 
 
 def _integrate(ready: Prepared, out: Array, rtol: float, max_steps: int, max_events: int) -> _Raw:

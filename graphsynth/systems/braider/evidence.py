@@ -100,12 +100,7 @@ def _links(bar: FourBar, t: Any) -> tuple[_Link, _Link, _Link]:
 def shape_of_four_bar(bar: FourBar, bodies: Mapping[int, Body], gravity: tuple[float, float] = (0.0, 0.0)) -> Shape:
     """Shape of a four-bar linkage: link 1 is the crank, 2 the coupler, 3 the rocker, each along its bar.
 
-    Parameters
-    ----------
-    bar : FourBar
-    bodies : mapping of int to Body
-    gravity : (float, float)
-        m/s^2; what it does is the load.
+    What gravity (m/s^2) does is the load.
 
     Examples
     --------

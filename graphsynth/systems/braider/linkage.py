@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -49,7 +50,7 @@ class ChangePoint:
 
 @dataclass(frozen=True)
 class FourBar:
-    """Crank O1A, coupler AB, rocker BO2, frame O1O2 along +x; all lengths in metres, positive.
+    """Crank O1A, coupler AB, rocker BO2, frame O1O2 along +x; lengths in m, positive (theory/braider 2, 8).
 
     Parameters
     ----------
@@ -61,10 +62,6 @@ class FourBar:
     ------
     GeometryError
         A length that is not positive and between 1e-60 and 1e60, or another branch.
-
-    Notes
-    -----
-    See theory/braider 2, 8.
 
     Examples
     --------
@@ -110,37 +107,26 @@ class FourBar:
         First derivatives keep their digits up to a change point; second derivatives are differences divided by the
         sine that vanishes there.
         """
-        a, b, c, g = self.crank, self.coupler, self.rocker, self.frame
         angle = finite_array("theta", theta, nan=True)
-        far0, near0 = self.excess
-        ct, st = np.cos(angle), np.sin(angle)
-        d = np.sqrt((g - a) ** 2 + 4.0 * a * g * np.sin(0.5 * angle) ** 2)
-        far = far0 * (b + c + a + g) + 4.0 * a * g * np.cos(0.5 * angle) ** 2
-        near = near0 + 4.0 * a * g * np.sin(0.5 * angle) ** 2
-        with np.errstate(divide="ignore", invalid="ignore"):
-            h = self.branch * np.sqrt(np.where((far >= 0.0) & (near >= 0.0), far * near, np.nan)) / (2.0 * d)
-            e = (g - a * ct - 1j * a * st) / d
-            u = (b * b - c * c + d * d) / (2.0 * d)
-            AB, OB = (u + 1j * h) * e, (u - d + 1j * h) * e
-            s32 = h * d / (b * c)
-            s3t, st2 = (ct * OB.imag - st * OB.real) / c, (st * AB.real - ct * AB.imag) / b
-            c32 = (AB.real * OB.real + AB.imag * OB.imag) / (b * c)
-            c3t, ct2 = (ct * OB.real + st * OB.imag) / c, (ct * AB.real + st * AB.imag) / b
-            k2, k3 = -a * s3t / (b * s32), a * st2 / (c * s32)
-            f2 = (a * c3t + b * k2**2 * c32 - c * k3**2) / (b * s32)
-            f3 = (a * ct2 + b * k2**2 - c * k3**2 * c32) / (c * s32)
-        A = np.asarray(a * (ct + 1j * st))
-        return FourBarState(
-            np.asarray(np.angle(AB)),
-            np.asarray(np.angle(OB)),
-            np.asarray(k2),
-            np.asarray(k3),
-            np.asarray(f2),
-            np.asarray(f3),
-            A,
-            np.asarray(AB),
-            np.asarray(OB),
-        )
+        k2, k3, f2, f3, *ends = self.table(angle)[3:11]
+        coupler, rocker = ends[0] + 1j * ends[1], ends[2] + 1j * ends[3]
+        crank = np.asarray(self.crank * (np.cos(angle) + 1j * np.sin(angle)))
+        phi2, phi3 = np.asarray(np.angle(coupler)), np.asarray(np.angle(rocker))
+        return FourBarState(phi2, phi3, k2, k3, f2, f3, crank, np.asarray(coupler), np.asarray(rocker))
+
+    def parameters(self, more: Sequence[float] = (0.0,) * 11) -> Array:
+        """Parameters of the kernel `four_bar`; ``more`` are those between the branch and the excesses."""
+        return np.array([self.crank, self.coupler, self.rocker, self.frame, self.branch, *more, *self.excess])
+
+    def table(self, theta: Array, more: Sequence[float] = (0.0,) * 11) -> Array:
+        """Return what the kernel `four_bar` gives, along the first axis, at crank angles of any shape."""
+        from graphsynth.dynamics.driven.kernels import systems as s
+
+        values, found = np.zeros(s.SIZE), np.zeros((theta.size, 16))
+        values[s.LINKAGE :] = self.parameters(more)
+        setup = np.array([s.FOUR_BAR, s.LINEAR, s.INERTIA, 0, 1])
+        s.tabulate(setup, theta.ravel(), values, np.zeros((1, 1)), found)
+        return found.T.reshape(16, *theta.shape)
 
     def reach(self) -> tuple[tuple[float, float], ...]:
         """Return the closed arcs of crank angles (rad) that can be assembled; ``(-pi, pi)`` for a full turn."""
@@ -158,7 +144,7 @@ class FourBar:
 
     @property
     def turns_fully(self) -> bool:
-        """Whether the crank makes a whole turn (a change point on the way still counts as one)."""
+        """Whether the crank makes a whole turn, maybe through a change point."""
         return self.reach() == ((-math.pi, math.pi),)
 
     def change_points(self) -> tuple[ChangePoint, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Thread:
-    """Thread from the switch tip over a guide point; a weight keeps its tension.
+    """Thread from the switch tip over a guide point; a weight keeps its tension (theory/braider 3).
 
     Parameters
     ----------
@@ -58,10 +58,6 @@ class Thread:
     ------
     SpecError
         Negative or infinite numbers, a guide that is no point.
-
-    Notes
-    -----
-    See theory/braider 3: the in-plane part of the tension acts on the switch.
 
     Examples
     --------
@@ -81,9 +77,7 @@ class Thread:
             point = complex(self.guide)
         except (TypeError, ValueError, OverflowError):
             raise SpecError(f"guide = {self.guide!r} is no point; give x + 1j * y in metres") from None
-        number("guide x", point.real)
-        number("guide y", point.imag)
-        object.__setattr__(self, "guide", point)
+        object.__setattr__(self, "guide", complex(number("guide x", point.real), number("guide y", point.imag)))
         check_fields(self, (), SpecError, small=("weight", "height", "gravity", "guide"))
 
     @checked
@@ -116,17 +110,13 @@ class Peak(NamedTuple):
     error: float
 
 
-def _motor() -> SynchronousMotor:
-    return SynchronousMotor(4, 2.0, 1e-3, 5e-3, 0.0, 2.1013, rotor_inertia=8.2e-6, friction=1e-6)
-
-
-def _train() -> Train:
-    return Train.of_teeth([(10, 44), (10, 33), (20, 80)])
+_MOTOR = SynchronousMotor(4, 2.0, 1e-3, 5e-3, 0.0, 2.1013, rotor_inertia=8.2e-6, friction=1e-6)
+_TRAIN = Train.of_teeth([(10, 44), (10, 33), (20, 80)])
 
 
 @dataclass(frozen=True, eq=False)
 class Braider:
-    """Braiding mechanism; the default numbers are those of theory/braider 1.
+    """Braiding mechanism (theory/braider); the default numbers are those of theory/braider 1.
 
     Parameters
     ----------
@@ -148,10 +138,6 @@ class Braider:
     SpecError
         Negative masses or lengths, numbers that are not finite.
 
-    Notes
-    -----
-    See theory/braider.
-
     Examples
     --------
     >>> run = Braider().simulate([0.0, 0.11])
@@ -164,8 +150,8 @@ class Braider:
     switch_angle: float = 5.0 * math.pi / 6.0
     masses: tuple[float, float, float, float] = (0.015, 0.045, 0.030, 0.020)
     thread: Thread = field(default_factory=Thread)
-    motor: Motor | IdealSpeed = field(default_factory=_motor)
-    train: Train = field(default_factory=_train)
+    motor: Motor | IdealSpeed = _MOTOR
+    train: Train = _TRAIN
     inertia: float = 0.0
 
     def __post_init__(self) -> None:
@@ -200,32 +186,14 @@ class Braider:
 
     def plant(self) -> Plant:
         """Mechanism as the integrator sees it."""
-        bar, (_, i2, i3) = self.linkage, self.moments
-        far, near = bar.excess
-        thread = self.thread
-        linkage = np.array(
-            [
-                bar.crank,
-                bar.coupler,
-                bar.rocker,
-                bar.frame,
-                bar.branch,
-                self.switch,
-                math.cos(self.switch_angle),
-                math.sin(self.switch_angle),
-                self.masses[0],
-                self.masses[1],
-                i2,
-                i3,
-                thread.weight * thread.gravity,
-                thread.guide.real,
-                thread.guide.imag,
-                thread.height,
-                far,
-                near,
-            ]
-        )
-        return Plant(np.zeros((1, 1)), base=self.inertia, linkage=linkage)
+        return Plant(np.zeros((1, 1)), base=self.inertia, linkage=self.linkage.parameters(self._parameters()))
+
+    def _parameters(self) -> tuple[float, ...]:
+        """Parameters of the kernel `four_bar` besides the linkage: switch, masses and moments, thread."""
+        angle, thread = self.switch_angle, self.thread
+        place = thread.guide.real, thread.guide.imag, thread.height
+        arm = self.switch, math.cos(angle), math.sin(angle)
+        return *arm, *self.masses[:2], *self.moments[1:], thread.weight * thread.gravity, *place
 
     @property
     def bodies(self) -> dict[int, Body]:
@@ -279,11 +247,10 @@ class Braider:
         elements: list[Element] = [Force(3, thread, self._tip)] if self.thread.weight else []
         if motor:
             train = replace(self.train, inertia=self.train.inertia + self.inertia)
-            if isinstance(self.motor, IdealSpeed):
-                idle = LinearCharacteristic(0.0, 0.0, self.motor.rotor_inertia, self.motor.friction)
-                elements.append(MotorDrive(0, 1, idle, train))
-            else:
-                elements.append(MotorDrive(0, 1, self.motor, train))
+            source = self.motor
+            if isinstance(source, IdealSpeed):
+                source = LinearCharacteristic(0.0, 0.0, source.rotor_inertia, source.friction)
+            elements.append(MotorDrive(0, 1, source, train))
         return DynamicModel(self.mechanism, self.bodies, elements, gravity=(0.0, 0.0))
 
     def motion(self, theta: ArrayLike) -> Motion:
@@ -318,21 +285,8 @@ class Braider:
 
     def effective_inertia(self, theta: ArrayLike) -> tuple[Array, Array]:
         """J at the crank with the reflected rotor, and dJ/dtheta; kg m^2."""
-        s, (_, i2, i3), bar = self.linkage.motion(theta), self.moments, self.linkage
-        m1, m2 = self.masses[:2]
-        turn = s.crank * np.conj(s.coupler)  # a b exp(i (theta - phi2))
-        linkage = (
-            m1 * bar.crank**2 / 3.0
-            + m2 * (bar.crank**2 + 0.25 * bar.coupler**2 * s.k2**2 + s.k2 * turn.real)
-            + i2 * s.k2**2
-            + i3 * s.k3**2
-        )
-        slope = (
-            m2 * (0.5 * bar.coupler**2 * s.k2 * s.f2 + s.f2 * turn.real - s.k2 * (1.0 - s.k2) * turn.imag)
-            + 2.0 * i2 * s.k2 * s.f2
-            + 2.0 * i3 * s.k3 * s.f3
-        )
-        return np.asarray(self.reflected_inertia + linkage), np.asarray(slope)
+        J, half = self.linkage.table(finite_array("theta", theta, nan=True), self._parameters())[:2]
+        return np.asarray(self.reflected_inertia + J), np.asarray(2.0 * half)
 
     def acceleration(self, theta: ArrayLike, speed: ArrayLike, motor_torque: ArrayLike) -> Array:
         """Crank acceleration for a motor torque (N m) at the driving shaft, rad/s^2."""
@@ -360,11 +314,7 @@ class Braider:
 
         A motion that reaches a change point of the linkage ends there with the status CHANGE_POINT: no continuation
         is chosen silently.  A crank that meets the end of its reach ends with NOT_FINITE or STEP_TOO_SMALL.
-
-        Raises
-        ------
-        SpecError
-            Options or numbers that make no sense, L = 0 with the unreduced model, a start out of reach.
+        `SpecError` for options or numbers that make no sense, L = 0 with the unreduced model, a start out of reach.
         """
         if not math.isfinite(float(self.linkage.motion(number("angle", angle)).k3)):
             raise SpecError(f"the linkage cannot be assembled at angle = {angle:g} rad; start within linkage.reach()")
@@ -390,13 +340,7 @@ class Braider:
 
     @checked
     def inductance_study(self, times: ArrayLike, inductances: tuple[float, ...]) -> ReductionStudy:
-        """Distance to the limit L -> 0 for several inductances (theory/braider 6), from rest.
-
-        Raises
-        ------
-        SpecError
-            For an ideal speed, which has no inductance.
-        """
+        """Distance to the limit L -> 0 for several inductances (theory/braider 6), from rest."""
         return inductance_study(self.plant(), self.motor, self.train, times, inductances)
 
     def link_motion(self, found: DriveRun) -> LinkMotion:
@@ -438,18 +382,10 @@ class Braider:
         k = int(np.argmax(np.abs(found.currents[:, -1])))
         if k in (0, found.time.size - 1):
             return Peak(float(found.time[k]), float(found.currents[k, -1]), math.nan)
-        near = np.linspace(found.time[k - 1], found.time[k + 1], 401)[1:]
-        start = tuple(map(float, found.currents[k - 1]))
-        fine = self.simulate(
-            [float(found.time[k - 1]), *near],
-            angle=float(found.angle[k - 1]),
-            speed=float(found.speed[k - 1]),
-            currents=start,
-            reduce=False,
-            rtol=found.rtol,
-            estimate=False,
-        )
-        best = min(max(int(np.argmax(np.abs(fine.currents[:, -1]))), 1), near.size - 1)
+        near = np.linspace(found.time[k - 1], found.time[k + 1], 401)
+        start: dict[str, Any] = {name: getattr(found, name)[k - 1] for name in ("angle", "speed", "currents")}
+        fine = self.simulate(near, **start, reduce=False, rtol=found.rtol, estimate=False)
+        best = min(max(int(np.argmax(np.abs(fine.currents[:, -1]))), 1), near.size - 2)
         left, middle, right = fine.currents[best - 1 : best + 2, -1]
         bend = left - 2.0 * middle + right
         shift = 0.5 * (left - right) / bend if bend != 0.0 else 0.0
@@ -464,18 +400,12 @@ class Braider:
         """First time after which ``|w / target - 1| <= band`` up to ``end``, from rest.
 
         The last crossing between samples is solved on the cubic through speeds and accelerations.
-
-        Raises
-        ------
-        SpecError
-            For ``target = 0``.
         """
         number("band", band, least=0.0, above=True)
         if number("target", target) == 0.0:
             raise SpecError("target = 0 has no relative band; give the speed that is to be reached, rad/s")
-        times = np.linspace(
-            0.0, number("end", end, least=0.0, above=True), whole("samples", samples, "give some hundreds")
-        )
+        count, last = whole("samples", samples, "give some hundreds"), number("end", end, least=0.0, above=True)
+        times = np.linspace(0.0, last, count)
         found = self.simulate(times, rtol=rtol, estimate=False)
         outside = np.nonzero(~(np.abs(found.speed / target - 1.0) <= band))[0]
         if not found.complete or outside.size == 0 or outside[-1] == times.size - 1:

@@ -77,7 +77,14 @@ def reactions(braider: Braider, theta: ArrayLike, speed: ArrayLike, acceleration
     """
     from graphsynth.dynamics.inverse import inverse_dynamics
 
-    theta, w, alpha = _together(theta, speed, acceleration)
+    given = {"theta": theta, "speed": speed, "acceleration": acceleration}
+    # rows of a run that ended early are NaN
+    parts = [np.atleast_1d(numbers(name, value, finite=False)) for name, value in given.items()]
+    try:
+        theta, w, alpha = (x.copy() for x in np.broadcast_arrays(*parts))
+    except ValueError:
+        shapes = ", ".join(str(x.shape) for x in parts)
+        raise SpecError(f"theta, speed and acceleration of shapes {shapes} do not fit; give equal lengths") from None
     there = np.flatnonzero(braider.motion(theta).assembled & np.isfinite(w) & np.isfinite(alpha))
     motion = braider.motion(theta[there])
     found = inverse_dynamics(braider.model(motor=False), motion, w[there], alpha[there], times=0.0)
@@ -92,19 +99,6 @@ def reactions(braider: Braider, theta: ArrayLike, speed: ArrayLike, acceleration
     size = float(np.nanmax(np.abs(powers), initial=0.0))
     error = float(np.nanmax(np.abs(powers.sum(axis=0)), initial=0.0)) / size if size > 0.0 else 0.0
     return JointForces(theta, w, alpha, F01, F12, F23, F03, T[:, 0], error, found.newton_euler)
-
-
-def _together(*given: ArrayLike) -> tuple[Array, Array, Array]:
-    """Three arrays of one length."""
-    names = ("theta", "speed", "acceleration")
-    # rows of a run that ended early are NaN
-    parts = [np.atleast_1d(numbers(name, value, finite=False)) for name, value in zip(names, given)]
-    try:
-        theta, speed, acceleration = (x.copy() for x in np.broadcast_arrays(*parts))
-    except ValueError:
-        shapes = ", ".join(str(x.shape) for x in parts)
-        raise SpecError(f"theta, speed and acceleration of shapes {shapes} do not fit; give equal lengths") from None
-    return theta, speed, acceleration
 
 
 def run_reactions(braider: Braider, found: DriveRun) -> JointForces:

@@ -6,33 +6,34 @@ import math
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from graphsynth.core.errors import GeometryError, SpecError
+from graphsynth.dynamics.motors import SynchronousMotor, Train
 from graphsynth.pipeline.display import TURN, balance_rows, chart, limit_table, quantity_table, table
 from graphsynth.pipeline.products import Finding, Picture, Quantity, Record, Table
 from graphsynth.pipeline.stages import Context
+from graphsynth.systems.braider.linkage import FourBar
+from graphsynth.systems.braider.model import Braider, Thread
+from graphsynth.systems.braider.reactions import JointForces, reactions, run_reactions
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from graphsynth.drawing.plots import Line
     from graphsynth.dynamics.driven.reduction import ReductionStudy
     from graphsynth.dynamics.driven.run import DriveRun
-    from graphsynth.systems.braider.model import Braider
-    from graphsynth.systems.braider.reactions import JointForces
 
 #: Joint, body that is acted on and by which.
 JOINTS = ("O1: frame on crank", "A: crank on coupler", "B: coupler on rocker", "O2: frame on rocker")
 _SHORT = ("O1", "A", "B", "O2")
 _SHOWN = 6  # crank angles drawn one by one
-_CRANK = "crank angle [°]"
+_CRANK, _ANGLE, _RATE = "crank angle [°]", "angle of the link [°]", "angular velocity [rad/s]"
+_SIZE = "size of the reaction [mN]"
+_ROTOR = "In the frame of the rotor; i_q makes the torque."
 
 
 def braider_of(context: Context) -> Braider:
     """Build the mechanism of the scene; a number that makes no sense is an error of the scene."""
-    from graphsynth.dynamics.motors import SynchronousMotor, Train
-    from graphsynth.systems.braider.linkage import FourBar
-    from graphsynth.systems.braider.model import Braider, Thread
 
     def values(part: Any) -> list[Any]:
         return [getattr(part, item.name) for item in fields(part)]
@@ -54,8 +55,6 @@ def braider_of(context: Context) -> Braider:
 
 def start_up(context: Context) -> DriveRun:
     """Integrate from rest with all currents."""
-    import numpy as np
-
     start: Any = context.scene.mechanism.start
     braider = braider_of(context)
     try:
@@ -67,18 +66,12 @@ def start_up(context: Context) -> DriveRun:
 
 def sensors(context: Context) -> JointForces:
     """Return the reactions of the four joints over a turn at constant crank speed."""
-    import numpy as np
-
-    from graphsynth.systems.braider.reactions import reactions
-
     own: Any = context.scene.mechanism
     return reactions(braider_of(context), np.linspace(0.0, math.tau, own.positions + 1), own.speed, 0.0)
 
 
 def inductance(context: Context) -> ReductionStudy | None:
     """Compare several inductances with the limit L -> 0; None if the scene names none."""
-    import numpy as np
-
     own: Any = context.scene.mechanism
     if not own.inductances_H:
         return None
@@ -99,9 +92,8 @@ def assess(
     else:
         margins = _margins(context, braider, run)
         record = _verdict(context, margins)
-        tables.insert(
-            0, quantity_table("Start-up", margins, "Settling: the first time after which the speed stays inside.")
-        )
+        note = "Settling: the first time after which the speed stays inside."
+        tables.insert(0, quantity_table("Start-up", margins, note))
         tables.append(_along_table(braider, run))
     tables += [_sensor_table(braider, turn), _second_way_table(braider, turn)]
     if study is not None:
@@ -109,27 +101,27 @@ def assess(
     return (record,), tuple(tables)
 
 
+def _band(start: Any) -> str:
+    return f"±{100 * start.band:g} % of {start.target:g} rad/s"
+
+
 def _verdict(context: Context, margins: tuple[Quantity, ...]) -> Record:
     start: Any = context.scene.mechanism.start
-    settling = margins[0].value
-    band = f"±{100 * start.band:g} % of {start.target:g} rad/s"
+    settling, band = margins[0].value, _band(start)
     good = math.isfinite(settling)
     words = f"stays within {band} from {settling:.4f} s on" if good else f"does not stay within {band}"
     return Record(recognised_as="braider", verdict=f"{words} (estimated)", good=good, margins=margins)
 
 
 def _margins(context: Context, braider: Braider, run: DriveRun) -> tuple[Quantity, ...]:
-    import numpy as np
-
     start: Any = context.scene.mechanism.start
     w_error, inertia, ratio = float(run.error[1]), braider.reflected_inertia, braider.train.ratio
     bands = (start.band, start.band / 2)
     fine, coarse = (
         [braider.settling(start.target, band, start.end, samples=n).time for band in bands] for n in (2001, 1001)
     )
-    steady, rough = (braider.steady_range(samples=n) for n in (720, 500))
-    peak = braider.largest_current(run)
-    spacing = float(np.diff(run.time).max())
+    (least, most), rough = (braider.steady_range(samples=n) for n in (720, 500))
+    peak, spacing = braider.largest_current(run), float(np.diff(run.time).max())
     moment = float(np.nanmax(np.abs(braider.load_moment(np.linspace(0.0, math.tau, 361)))))
     settled = [
         Quantity(f"settling time, ±{100 * band:g} %", a, "s", "estimated", abs(a - b) + 1e-12)
@@ -139,8 +131,8 @@ def _margins(context: Context, braider: Braider, run: DriveRun) -> tuple[Quantit
         *settled,
         Quantity(f"crank speed at {start.end:g} s", float(run.speed[-1]), "rad/s", "estimated", w_error),
         Quantity(f"crank angle at {start.end:g} s", float(run.angle[-1]), "rad", "estimated", float(run.error[0])),
-        Quantity("least speed of the steady motion", steady[0], "rad/s", "estimated", abs(steady[0] - rough[0])),
-        Quantity("largest speed of the steady motion", steady[1], "rad/s", "estimated", abs(steady[1] - rough[1])),
+        Quantity("least speed of the steady motion", least, "rad/s", "estimated", abs(least - rough[0])),
+        Quantity("largest speed of the steady motion", most, "rad/s", "estimated", abs(most - rough[1])),
         Quantity("largest current i_q", peak.value, "A", "estimated", peak.error + float(run.error[-1])),
         Quantity("time of the largest current", peak.time, "s", "estimated", spacing / 200.0),
         Quantity("largest moment of the thread about O2", 0.0 if moment < 1e-15 else moment, "N m", "estimated", 1e-15),
@@ -151,8 +143,6 @@ def _margins(context: Context, braider: Braider, run: DriveRun) -> tuple[Quantit
 
 def _along_table(braider: Braider, run: DriveRun) -> Table:
     """Reactions during the start-up at a few of its times."""
-    from graphsynth.systems.braider.reactions import run_reactions
-
     found = run_reactions(braider, run)
     last = run.time.size - 1
     shares = (0.002, 0.01, 0.02, 0.04, 0.1, 0.22, 0.5, 1.0)
@@ -172,8 +162,6 @@ def _along_table(braider: Braider, run: DriveRun) -> Table:
 
 def _largest(when: str, found: JointForces) -> tuple[Finding, ...]:
     """Say what each joint carries at most; nothing if the linkage is never assembled."""
-    import numpy as np
-
     sizes = found.magnitudes()
     sizes = sizes[np.isfinite(sizes).all(axis=1)]
     if not sizes.size:
@@ -202,8 +190,6 @@ def _sensor_table(braider: Braider, turn: JointForces) -> Table:
 
 def _relative(braider: Braider, turn: JointForces) -> NDArray[np.float64]:
     """Angular velocities of the two links of each joint against each other, (n, 4)."""
-    import numpy as np
-
     state = braider.linkage.motion(turn.theta)
     w2, w3 = state.k2 * turn.speed, state.k3 * turn.speed
     return np.stack([turn.speed, w2 - turn.speed, w3 - w2, w3], axis=1)
@@ -227,8 +213,6 @@ def _second_way_table(braider: Braider, turn: JointForces) -> Table:
 
 def solvers(context: Context) -> tuple[Table, ...]:
     """Error against run time of the integrator and of scipy's; not part of the shipped outputs."""
-    import numpy as np
-
     from graphsynth.evidence.drives import drive_work_precision
     from graphsynth.pipeline.display import work_table
 
@@ -238,8 +222,6 @@ def solvers(context: Context) -> tuple[Table, ...]:
 
 def sketches(context: Context) -> tuple[Picture, ...]:
     """Draw the linkage large with its names and the path of the tip, then small at six crank angles."""
-    import numpy as np
-
     braider = braider_of(context)
     turn = np.linspace(0.0, math.tau, 361)
     reached = turn[np.isfinite(braider.linkage.motion(turn).k3)]
@@ -295,9 +277,9 @@ def _sketch(braider: Braider, angle: float, reached: NDArray[np.float64], width:
     sketch.dot(guide, "b", 4.0)
     if large:
         middle = (A + B + C + far) / 4
-        for name, point in {"O1": -0.2 - 1j, "A": A - middle, "B": B - middle, "C": C - middle}.items():
-            at = 0j if name == "O1" else {"A": A, "B": B, "C": C}[name]
-            sketch.label(at, name, 20 * point / abs(point) if name != "O1" else -24 + 4j)
+        sketch.label(0j, "O1", -24 + 4j)
+        for name, at in (("A", A), ("B", B), ("C", C)):
+            sketch.label(at, name, 20 * (at - middle) / abs(at - middle))
         sketch.label(far, "O2", 26 + 4j)
         same = abs(guide - far) < 0.2 * braider.linkage.frame
         sketch.label(guide, "G", (24 + 22j) if same else (14 + 14j))
@@ -306,8 +288,6 @@ def _sketch(braider: Braider, angle: float, reached: NDArray[np.float64], width:
 
 def animations(context: Context) -> tuple[Picture, ...]:
     """Let the linkage turn in the page at the crank speed of the sensors."""
-    import numpy as np
-
     from graphsynth.drawing.animation import animated_svg
 
     own: Any = context.scene.mechanism
@@ -326,10 +306,15 @@ def animations(context: Context) -> tuple[Picture, ...]:
 
 def plots(context: Context, run: DriveRun, turn: JointForces, study: ReductionStudy | None) -> tuple[Picture, ...]:
     """Curves of the start-up, then of the turn, then the limit L -> 0."""
+    from graphsynth.drawing.drive_pictures import reduction_picture
+    from graphsynth.drawing.plots import themed_svg
+
     braider = braider_of(context)
     pictures = [*_start_pictures(context, braider, run), *_turn_pictures(braider, turn)]
     if study is not None:
-        pictures.append(_inductance_picture(study))
+        svg = themed_svg(reduction_picture(study, size=(5.4, 3.4)))
+        words = "Largest differences from the motor without inductance after the electrical transient"
+        pictures.append(Picture("The limit L -> 0", svg, f"{words}: of first order in L."))
     return tuple(pictures)
 
 
@@ -341,60 +326,29 @@ def _lines(x: Any, columns: Any, names: tuple[str, ...]) -> list[Line]:
 
 
 def _start_pictures(context: Context, braider: Braider, run: DriveRun) -> list[Picture]:
-    import numpy as np
-
     from graphsynth.drawing.plots import Line
-    from graphsynth.systems.braider.reactions import run_reactions
 
     start: Any = context.scene.mechanism.start
-    t, found, links = run.time, run_reactions(braider, run), braider.link_motion(run).speed
-    edges = [
-        Line((), start.target * (1.0 + sign * start.band), "band" if sign > 0 else "", "soft", "--") for sign in (1, -1)
-    ]
-    share = f"±{100 * start.band:g} % of {start.target:g} rad/s"
-    phase = [Line(run.currents[:, -1], run.speed)]
+    t, x, found, links = run.time, "time [ms]", run_reactions(braider, run), braider.link_motion(run).speed
+    low, high = (Line((), start.target * (1.0 + sign * start.band), "", "soft", "--") for sign in (-1, 1))
     torques = _lines(t, np.column_stack([found.torque, run.motor_torque]), ("on the crank", "of the motor"))
-    begun = [Line(t, run.speed, "crank speed")]
-    x = "time [ms]"
-    return [
-        chart(
-            "Start-up: crank speed",
-            begun,
-            x,
-            "[rad/s]",
-            f"From rest by a step of the voltage; dashed: {share}.",
-            levels=edges,
-        ),
-        chart(
-            "Start-up: currents of the motor",
-            _lines(t, run.currents, ("i_d", "i_q")),
-            x,
-            "current [A]",
-            "In the frame of the rotor; i_q makes the torque.",
-        ),
-        chart(
-            "Start-up: phase portrait",
-            phase,
-            "current i_q [A]",
-            "crank speed [rad/s]",
-            "From rest (0, 0): the current rises at once, then the speed takes it down.",
-        ),
-        chart(
-            "Start-up: angular velocities of the links",
-            _lines(t, links, ("crank", "coupler", "rocker, switch")),
-            x,
-            "[rad/s]",
-        ),
-        chart(
-            "Start-up: reactions in the joints", _lines(t, found.magnitudes(), _SHORT), x, "size of the reaction [mN]"
-        ),
-        chart("Start-up: torque", torques, x, "torque [mN m]", "Behind the train, and of the motor before it."),
-    ]
+    step = f"From rest by a step of the voltage; dashed: {_band(start)}."
+    rest = "From rest (0, 0): the current rises at once, then the speed takes it down."
+    phase, crank = [Line(run.currents[:, -1], run.speed)], [Line(t, run.speed, "crank speed")]
+    names = ("crank", "coupler", "rocker, switch")
+    shown: tuple[tuple[Any, ...], ...] = (
+        ("currents of the motor", _lines(t, run.currents, ("i_d", "i_q")), x, "current [A]", _ROTOR),
+        ("phase portrait", phase, "current i_q [A]", "crank speed [rad/s]", rest),
+        ("angular velocities of the links", _lines(t, links, names), x, "[rad/s]", ""),
+        ("reactions in the joints", _lines(t, found.magnitudes(), _SHORT), x, _SIZE, ""),
+        ("torque", torques, x, "torque [mN m]", "Behind the train, and of the motor before it."),
+    )
+    band = [replace(high, label="band"), low]
+    first = chart("Start-up: crank speed", crank, x, "[rad/s]", step, levels=band)
+    return [first, *(chart(f"Start-up: {title}", lines, *labels) for title, lines, *labels in shown)]
 
 
 def _turn_pictures(braider: Braider, turn: JointForces) -> list[Picture]:
-    import numpy as np
-
     from graphsynth.drawing.plots import Line
 
     theta, state, forces = turn.theta, braider.linkage.motion(turn.theta), turn.forces()
@@ -404,75 +358,24 @@ def _turn_pictures(braider: Braider, turn: JointForces) -> list[Picture]:
         Line(state.phi3, state.k3 * turn.speed, "rocker, switch", "a"),
         Line(state.phi2, state.k2 * turn.speed, "coupler", "b", "--"),
     ]
-    inertia = braider.effective_inertia(theta)[0] - braider.reflected_inertia
     sizes, relative = _lines(theta, turn.magnitudes(), _SHORT), _lines(theta, _relative(braider, turn), _SHORT)
-    pictures = [
-        chart(
-            "Sensors: relative angular velocities",
-            relative,
-            _CRANK,
-            "[rad/s]",
-            f"{at} Of the two links of each joint.",
-            xticks=TURN,
-        ),
-        chart(
-            "Sensors: reactions", sizes, _CRANK, "size of the reaction [mN]", f"{at} {'; '.join(JOINTS)}.", xticks=TURN
-        ),
-        chart(
-            "Sensors: polar plot of the reactions",
-            paths,
-            "F_x [mN]",
-            "F_y [mN]",
-            f"{at} Paths of the force vectors in the fixed frame.",
-            equal=True,
-            size=(5.4, 4.2),
-        ),
-        chart(
-            "Sensors: torque on the crank",
-            [Line(theta, turn.torque)],
-            _CRANK,
-            "torque on the crank [µN m]",
-            at,
-            xticks=TURN,
-        ),
-        chart(
-            "Phase portraits of coupler and rocker",
-            swings,
-            "angle of the link [°]",
-            "angular velocity [rad/s]",
-            f"{at} Each closes after a turn.",
-        ),
-        chart(
-            "Inertia of the links at the crank",
-            [Line(theta, inertia)],
-            _CRANK,
-            "inertia of the links [kg mm²]",
-            "The rotor behind the train adds a constant that is far larger.",
-            xticks=TURN,
-        ),
-    ]
+    inertia = [Line(theta, braider.effective_inertia(theta)[0] - braider.reflected_inertia)]
     moment = braider.load_moment(theta)
-    if np.nanmax(np.abs(moment)) > 1e-12:  # a guide above O2 leaves no moment
-        both = _lines(theta, np.column_stack([moment, moment * state.k3]), ("on the switch", "at the crank"))
-        pictures.append(
-            chart(
-                "Load of the thread",
-                both,
-                _CRANK,
-                "moment of the thread [mN m]",
-                "At the crank: positive where it drives.",
-                xticks=TURN,
-            )
-        )
-    return pictures
-
-
-def _inductance_picture(study: ReductionStudy) -> Picture:
-    from graphsynth.drawing.drive_pictures import reduction_picture
-    from graphsynth.drawing.plots import themed_svg
-
-    svg = themed_svg(reduction_picture(study, size=(5.4, 3.4)))
-    caption = (
-        "Largest differences from the motor without inductance after the electrical transient: of first order in L."
-    )
-    return Picture("The limit L -> 0", svg, caption)
+    both = _lines(theta, np.column_stack([moment, moment * state.k3]), ("on the switch", "at the crank"))
+    pairs, drives = f"{at} Of the two links of each joint.", "At the crank: positive where it drives."
+    constant = "The rotor behind the train adds a constant that is far larger."
+    torque = "torque on the crank [µN m]"
+    over, polar = {"xticks": TURN}, {"equal": True, "size": (5.4, 4.2)}
+    vectors = f"{at} Paths of the force vectors in the fixed frame."
+    shown: list[tuple[Any, ...]] = [
+        ("Sensors: relative angular velocities", relative, _CRANK, "[rad/s]", pairs, over),
+        ("Sensors: reactions", sizes, _CRANK, _SIZE, f"{at} {'; '.join(JOINTS)}.", over),
+        ("Sensors: polar plot of the reactions", paths, "F_x [mN]", "F_y [mN]", vectors, polar),
+        ("Sensors: torque on the crank", [Line(theta, turn.torque)], _CRANK, torque, at, over),
+        ("Phase portraits of coupler and rocker", swings, _ANGLE, _RATE, f"{at} Each closes after a turn.", {}),
+        ("Inertia of the links at the crank", inertia, _CRANK, "inertia of the links [kg mm²]", constant, over),
+        ("Load of the thread", both, _CRANK, "moment of the thread [mN m]", drives, over),
+    ]
+    if not np.nanmax(np.abs(moment)) > 1e-12:  # a guide above O2 leaves no moment
+        shown.pop()
+    return [chart(*parts, **options) for *parts, options in shown]
