@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
+from graphsynth.dynamics import kernels
 from graphsynth.dynamics.forms.one_coordinate import OneCoordinateForm, one_coordinate_obstacle
 from graphsynth.dynamics.friction.motion import FrictionAt
 from graphsynth.dynamics.model import Rack, Rigid
@@ -54,8 +55,6 @@ def balance_at(
     fit: FrictionAt | None = None,
 ) -> Balance:
     """Evaluate one state; ``own`` are accelerations of another formulation, used where masses vanish."""
-    from graphsynth.dynamics import kernels
-
     T = compiled.tables
     driven = compiled.driven(t)
     x = kernels.state_rows(T, q, v)
@@ -289,8 +288,6 @@ def newton_euler(
 
 
 def _loads(compiled: Compiled, t: float, q: Array, v: Array, currents: Array) -> Array:
-    from graphsynth.dynamics import kernels
-
     T = compiled.tables
     x = kernels.state_rows(T, q, v)
     Q, _, _, _, _ = kernels.load_vector(T, x, applied_loads(compiled, t, q, v), currents)

@@ -180,11 +180,9 @@ class _Run:
     def show(self, form: Form, k: int, t: float, y: Array, senses: Senses | None = None) -> None:
         """Keep the state at an output time."""
         self.q[k], self.v[k] = form.state(t, y)
-        self.slots[k] = getattr(form, "slots", self.report.slots)
+        self.slots[k] = self.report.slots if form.slots is None else form.slots
         self.tail[k], self.modes[k] = y[len(y) - len(self.compiled.tail) :], form.compiled.tables.modes
-        own = getattr(form, "accelerations", None)
-        self.own[k] = None if own is None else own(t, y)
-        self.senses[k] = senses
+        self.own[k], self.senses[k] = form.accelerations(t, y), senses
         self.done = k + 1
 
 
@@ -275,12 +273,8 @@ def scales(compiled: Compiled, report: StartReport, form: Form) -> Array:
     gravity = np.sqrt(float(np.abs(T.gravity).max()) / T.size)
     rate = max(speed, turn, gravity) or 1.0
     energy = max(0.5 * rate**2 * float((np.diag(T.mass) * unit**2).max()), 1e-300)
-    own = getattr(form, "unit", unit)
-    if form.name == "one-coordinate":
-        joint = compiled.model.mechanism.joint(*compiled.model.mechanism.drivers[0].pair)
-        own = np.array([T.size if joint.kind == "P" else 1.0])
     currents = [size for drive in compiled.drives for size in [current_scale(drive.equation)] * len(drive.currents)]
-    return np.concatenate([own, rate * own, currents, [energy] * (len(compiled.tail) - len(currents))])
+    return np.concatenate([form.unit, rate * form.unit, currents, [energy] * (len(compiled.tail) - len(currents))])
 
 
 def _result(

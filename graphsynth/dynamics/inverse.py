@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import Shown
+from graphsynth.dynamics import kernels
 from graphsynth.dynamics.checks import newton_euler_difference
 from graphsynth.dynamics.elements import Force, MotorDrive, Torque
 from graphsynth.dynamics.friction.loads import FrictionElement, FrictionRows, fitting_loads, sliding_loads
@@ -236,8 +237,6 @@ def balance(compiled: Compiled, times: Array, q: Array, v: Array, a: Array) -> B
     All samples are solved at once; those where friction returns to itself with a factor of 1 or more, or where a row is
     redundant, are then looked at one by one.
     """
-    from graphsynth.dynamics import kernels
-
     T = compiled.tables
     elements = FrictionRows(compiled).elements if T.friction.size else ()
     n = len(q)

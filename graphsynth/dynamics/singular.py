@@ -156,7 +156,7 @@ def lock(form: Any, t: float, y: Array) -> str:
 
 def _values(form: Any, t: float, y: Array) -> tuple[Values, Array]:
     q = np.ascontiguousarray(form.state(t, y)[0])
-    return Values(form.compiled, t, initial_slots(form.compiled, q, getattr(form, "slots", None))), q
+    return Values(form.compiled, t, initial_slots(form.compiled, q, form.slots)), q
 
 
 def _least(J: Array) -> float:

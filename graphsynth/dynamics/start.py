@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import finite, finite_array
 from graphsynth.core.errors import GeometryError
+from graphsynth.dynamics import kernels
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.singular import BranchTangents, PoseClass, classify_pose
 from graphsynth.dynamics.tables import Compiled, compile_model, coordinate_row
@@ -461,8 +462,6 @@ def _accelerations(values: Values, q: Array, v: Array, applied: Array) -> tuple[
 
     NaN with massless links, and where friction leaves no or several motions.
     """
-    from graphsynth.dynamics import kernels
-
     T = values.compiled.tables
     nothing = np.full(len(q), np.nan), np.full(len(values.compiled.info), np.nan)
     if not T.lower.size:

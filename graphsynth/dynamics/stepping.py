@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.core.extras import need
+from graphsynth.dynamics.friction.problem import NO_LOADS
 from graphsynth.dynamics.result import DynamicEvent
 from graphsynth.dynamics.singular import lock, stalled
 from graphsynth.dynamics.tables import Compiled
+from graphsynth.dynamics.values import initial_slots
 
 Array = NDArray[np.float64]
 Output = Callable[[int, float, Array], None]
@@ -58,29 +60,93 @@ class SolverStatistics:
     events: list[DynamicEvent] = field(default_factory=list)
 
 
-class Form(Protocol):
-    """What a formulation gives the integrator."""
+#: ``(t, y, h, A, K) -> new state``: fills the rows of K after the first with the rates at ``y + h A[s] K``.
+Stages = Callable[[float, Array, float, Array, Array], Array]
+#: What a kernel reports in ``out[6]``.
+_WRONG = (
+    "",
+    "a spring has length 0, so its direction is not defined",
+    NO_LOADS,
+    "the dependent coordinates cannot be solved: the mechanism cannot be assembled there",
+)
 
-    name: str
-    compiled: Compiled
-    why: str
-    stall: str
-    loss: float
-    pivot: float
-    contraction: float
-    changes: list[tuple[float, str]]
+
+class Form:
+    """What a formulation gives the integrator; a solver workspace, not a result.
+
+    ``why`` is the reason of a failure, ``stall`` what steps that become ever shorter mean; ``loss`` the kinetic energy
+    removed by projection so far (J); ``pivot`` the smallest pivot of the constraints; ``contraction`` the largest
+    factor with which a load of friction returned to itself; ``slots`` those of gears and racks, None where they are
+    found at every pose; ``unit`` the units of the coordinates in the state.
+    """
+
+    name = why = ""
+    stall = (
+        "at the singular pose there branches meet or nearly meet, and the equations do not tell how the motion goes "
+        "on; change the dimensions, or start elsewhere"
+    )
+    loss = contraction = 0.0
+    pivot = 1.0
+    slots: Array | None = None
+
+    def __init__(self, compiled: Compiled, begin: Array) -> None:
+        self.compiled, self.unit, self._begin = compiled, compiled.unit, begin
+        self.changes: list[tuple[float, str]] = []
+        self.out, self._none = np.zeros(7), np.zeros(compiled.n)
+
+    @property
+    def stages(self) -> Stages | None:
+        """A compiled Runge-Kutta step, if no load is given as a function."""
+        return None if self.compiled.applied else self.step
 
     def begin(self) -> Array:
         """State of the form at the start."""
+        return self._begin.copy()
+
+    def slots_at(self, q: Array) -> Array:
+        """Slots of gears and racks at a pose."""
+        return initial_slots(self.compiled, q) if self.slots is None else self.slots
 
     def rates(self, t: float, y: Array) -> Array:
         """Rate of that state."""
+        raise NotImplementedError
 
-    def accept(self, t: float, y: Array) -> Array:
-        """State that the next step starts from."""
+    def step(self, t: float, y: Array, h: float, A: Array, K: Array) -> Array:
+        """Return the end of a compiled Runge-Kutta step, see `Stages`."""
+        raise NotImplementedError
 
     def state(self, t: float, y: Array) -> tuple[Array, Array]:
         """Coordinates and velocities of the mechanism."""
+        raise NotImplementedError
+
+    def accelerations(self, t: float, y: Array) -> Array | None:
+        """Accelerations of all coordinates, where the form has them without multipliers."""
+
+    def accept(self, t: float, y: Array) -> Array:
+        """State that the next step starts from."""
+        return y
+
+    def refuses(self, t: float, y: Array) -> bool:
+        """Whether the formulation does not hold over the step just made."""
+        return False
+
+    def proposed_step(self, t: float, step: float) -> float:
+        """Length of the next step."""
+        return step
+
+    def cross(self, stats: SolverStatistics, bound: float) -> tuple[float, Array, Callable[[float], Array]] | None:
+        """Time and state beyond a singular pose, and the way there; None if no step is to lead over one."""
+
+    def watch(self, stats: SolverStatistics, before: float, solver: Any) -> None:
+        """Look for singular poses in the step just made."""
+
+    def _note(self) -> None:
+        """Note what the kernels found wrong."""
+        if self.out[6] > 0.0:
+            self.why = _WRONG[int(self.out[6])]
+        else:
+            self.contraction = max(self.contraction, float(self.out[3]))
+        self.out[6] = 0.0
 
 
 class Finding(NamedTuple):
@@ -135,7 +201,7 @@ class Stepper:
             return CvodeStepper(self.rates, t, y, bound, **options)
         if first is not None:
             options["first_step"] = min(first, bound - t)
-        stages = getattr(self.form, "stages", None)
+        stages = self.form.stages
         if method != "DOP853" or stages is None:
             return getattr(scipy_integrate, method)(self.rates, t, y, bound, **options)
         solver = _stepper_class()(self.rates, t, y, bound, **options)
@@ -163,14 +229,16 @@ class Stepper:
             if solver is None or solver.status == "finished":
                 solver = self._next(solver, stats.time, y, bound, step)
             before = stats.time
-            cross = self._cross(solver) if self.options.method == "DOP853" else None
-            if cross is not None:
-                stats.time, y, path = cross
-                while k < len(grid) and grid[k] <= stats.time:
-                    output(k, float(grid[k]), path(float(grid[k])))
-                    k += 1
-                step, solver = stats.last_step or None, None
-                continue
+            if self.options.method == "DOP853":
+                solver.h_abs = self.form.proposed_step(before, solver.h_abs)
+                crossed = self.form.cross(stats, self.end)
+                if crossed is not None:
+                    stats.time, y, path = crossed
+                    while k < len(grid) and grid[k] <= stats.time:
+                        output(k, float(grid[k]), path(float(grid[k])))
+                        k += 1
+                    step, solver = stats.last_step or None, None
+                    continue
             if self.guard is not None and hasattr(solver, "h_abs"):
                 solver.h_abs = min(solver.h_abs, self.guard.longest())
             message = self._step(solver)
@@ -179,7 +247,11 @@ class Stepper:
                 said = str(message or "the solver gave no finite state").rstrip(".")
                 stats.message = ": ".join(filter(None, (said, lock(self.form, before, y))))
                 return None
-            if self._stalls(float(solver.t) - before, float(grid[-1] - grid[0])):
+            self.longest = max(self.longest, float(solver.t) - before)
+            least = max(_STALL * self.longest, _TINY * float(grid[-1] - grid[0]))
+            short = float(solver.t) - before < least and self.form.pivot < 0.05
+            self.stalled = self.stalled + 1 if short else 0
+            if self.stalled > _STALLED:
                 stats.message = f"no way past t = {float(solver.t):.9g} s: {stalled(self.form, before, y)}"
                 return None
             if stats.steps >= self.options.max_steps:
@@ -194,13 +266,14 @@ class Stepper:
                     self.end = self.end if found.event is None else found.event
                     solver, step = None, found.step
                     continue
-            if self._refused(solver):
+            if self.form.refuses(float(solver.t), np.asarray(solver.y)):
                 stats.message = "the formulation does not hold beyond this time"
                 return None
             k = self._outputs(solver, before, grid, k, output)
             stats.time, stats.last_step = float(solver.t), float(solver.t) - before
             y, step, keep = self._accepted(solver, step)
-            self._watch(before, solver)
+            if self.options.method in _RUNGE_KUTTA:
+                self.form.watch(stats, before, solver)
             solver = solver if keep else None
         return y
 
@@ -213,27 +286,6 @@ class Stepper:
                 raise
             solver.status, message = "failed", "the equations of motion have no value on the way"
         return message
-
-    def _stalls(self, step: float, span: float) -> bool:
-        """Whether steps have become hopelessly short next to a singular pose."""
-        self.longest = max(self.longest, step)
-        short = step < max(_STALL * self.longest, _TINY * span) and self.form.pivot < 0.05
-        self.stalled = self.stalled + 1 if short else 0
-        return self.stalled > _STALLED
-
-    def _cross(self, solver: Any) -> Any:
-        """Propose the next step; where a singular pose is ahead, the state beyond it."""
-        propose = getattr(self.form, "proposed_step", None)
-        if propose is None:
-            return None
-        solver.h_abs = propose(self.stats.time, solver.h_abs)
-        found: Any = getattr(self.form, "cross", lambda *_: None)(self.stats, self.end)
-        return found
-
-    def _refused(self, solver: Any) -> bool:
-        """Whether the formulation does not hold over the step just made."""
-        refuses = getattr(self.form, "refuses", None)
-        return refuses is not None and bool(refuses(float(solver.t), np.asarray(solver.y)))
 
     def _next(self, solver: Any, t: float, y: Array, bound: float, step: float | None) -> Any:
         """Return a solver to go on; a Runge-Kutta solver is taken on with its proposed step."""
@@ -277,15 +329,7 @@ class Stepper:
             return changed, step or None, True
         return changed, (step or None) if self.options.method == "Radau" else None, False
 
-    def _watch(self, before: float, solver: Any) -> None:
-        """Let the formulation look for singular poses in the step just made."""
-        watch = getattr(self.form, "watch", None)
-        if watch is not None and self.options.method in _RUNGE_KUTTA:
-            watch(self.stats, before, solver)
 
-
-#: ``(t, y, h, A, K) -> new state``: fills the rows of K after the first with the rates at ``y + h A[s] K``.
-Stages = Callable[[float, Array, float, Array, Array], Array]
 #: The table of a "step" that only evaluates the rates at a state.
 ONE_STAGE: Array = np.zeros((1, 1))
 

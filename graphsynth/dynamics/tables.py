@@ -183,15 +183,23 @@ class Compiled:
             "what hardly weighs, or use form='one-coordinate'"
         )
 
+    @cached_property
+    def _still(self) -> Array:
+        """Prescribed coordinates besides those that follow a law, shape (1, drivers, 3); at least one row."""
+        count = len(self.laws)
+        found = np.zeros((1, max(1, count + len(self.held)), 3))
+        found[:, count : count + len(self.held), 0] = self.held
+        return found
+
     def driven(self, t: float) -> Array:
         """Prescribed coordinates and their two derivatives, shape (drivers, 3); at least one row."""
         return np.asarray(self.driven_at(np.array([t]))[0])
 
     def driven_at(self, times: Array) -> Array:
         """Return `driven` at several times, shape (times, drivers, 3); one for all if nothing depends on time."""
-        count = len(self.laws)
-        found = np.zeros((len(times) if count else 1, max(1, count + len(self.held)), 3))
-        found[:, count : count + len(self.held), 0] = self.held
+        if not self.laws:
+            return self._still
+        found = np.repeat(self._still, len(times), axis=0)
         for k, law in enumerate(self.laws):
             for c, part in enumerate(law(times)):
                 found[:, k, c] = part

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.checks import called
 from graphsynth.core.errors import GeometryError
+from graphsynth.dynamics import kernels
 from graphsynth.dynamics.elements import Force, TorqueSource
 from graphsynth.dynamics.tables import RACK, Compiled
 from graphsynth.kinematics.engine import codes
@@ -83,8 +84,6 @@ def _number(value: Any, element: Any) -> float:
 
 def jacobians(compiled: Compiled, q: Array, v: Array) -> Array:
     """Jacobians of all rows at n states, shape (n, rows, coordinates)."""
-    from graphsynth.dynamics import kernels
-
     T, still = compiled.tables, np.zeros((max(1, len(compiled.laws) + len(compiled.held)), 3))
     found = np.zeros((len(q), len(compiled.info), compiled.n))
     rolling, slots = bool((T.slots >= 0).any()), np.zeros(1)
@@ -155,8 +154,6 @@ class Values:
 
     def system(self, q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
         """Constraint values, Jacobian, right sides of accelerations and velocities."""
-        from graphsynth.dynamics import kernels
-
         T = self.compiled.tables
         found = kernels.constraint_system(T, kernels.state_rows(T, q, v), self.slots, self.driven)
         return found[0], found[1], found[2], found[3]
@@ -170,8 +167,6 @@ class Values:
         """Values and Jacobian of additional prescribed coordinates."""
         if not rows:
             return np.empty(0), np.empty((0, len(q)))
-        from graphsynth.dynamics import kernels
-
         T = self.compiled.tables
         table = np.zeros((len(rows), T.table.shape[1]))
         for k, row in enumerate(rows):

@@ -87,7 +87,7 @@ def test_the_second_form_is_that_of_the_planar_engine_where_there_is_one(monkeyp
 def test_rates_are_measured_by_the_fastest():
     compiled = compile_model(g1())
     report = consistent_start(g1(), keep={(0, 1): 0.3})
-    sizes = scales(compiled, report, SimpleNamespace(name="augmented"))
+    sizes = scales(compiled, report, SimpleNamespace(unit=compiled.unit))
     n = compiled.n
     rate = sizes[n] / sizes[0]
     speed = np.abs(report.v / sizes[:n]).max()

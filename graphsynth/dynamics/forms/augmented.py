@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.dynamics.friction.problem import NO_LOADS
+from graphsynth.dynamics import kernels
 from graphsynth.dynamics.result import DynamicEvent
 from graphsynth.dynamics.singular import GaussStep, HermiteGuess, gauss_step, passed_singular_pose
 from graphsynth.dynamics.start import StartReport
-from graphsynth.dynamics.stepping import ONE_STAGE, Stages
+from graphsynth.dynamics.stepping import ONE_STAGE, Form
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import applied_loads, initial_slots
 
@@ -36,21 +36,13 @@ _LANDED, _KEPT = 1e-9, 1e-11
 _LENGTHS, _NODES = (2.0, 1.75, 2.3), 3
 
 
-class AugmentedForm:
-    """State ``(q, v, currents, work)``; a solver workspace, not a result.
-
-    ``loss`` is the kinetic energy removed by velocity projection so far (J).
-    """
+class AugmentedForm(Form):
+    """State ``(q, v, currents, work)``."""
 
     name = "augmented"
-    stall = (
-        "at the singular pose there branches meet or nearly meet, and the equations do not tell how the motion goes "
-        "on; change the dimensions, or start elsewhere"
-    )
+    slots: Array
 
     def __init__(self, compiled: Compiled, start: StartReport, project: bool = True) -> None:
-        from graphsynth.dynamics import kernels
-
         if compiled.model.massless:
             raise GeometryError(
                 f"links {list(compiled.model.massless)} have no mass or no inertia; give them some, or use "
@@ -58,47 +50,25 @@ class AugmentedForm:
             )
         if start.message.endswith(compiled.spread_words):  # the start could not tell the accelerations
             raise GeometryError(compiled.spread_words)
-        self.compiled = compiled
-        self.project = project
-        self.slots = start.slots.copy()
-        self.loss = 0.0
-        self.changes: list[tuple[float, str]] = []
-        self.why = ""
-        self.out = np.zeros(7)
+        super().__init__(compiled, np.concatenate([start.q, start.v, compiled.tail]))
+        self.project, self.slots = project, start.slots.copy()
         self._history: list[tuple[float, float]] = []
         self._dense: Any = None
         self._largest = 0.0
         self._due, self._blocked, self._from_singular = 0.0, -np.inf, start.pose_class == "singular"
         self._nodes: list[tuple[float, Array]] = []
         self._follows = bool((compiled.tables.slots >= 0).any())
-        self.contraction = 0.0
-        self.pivot = 1.0
-        self._kernels = kernels
-        self._fixed = compiled.driven(0.0)
-        self._none, self._one = np.zeros(compiled.n), np.empty((1, 2 * compiled.n + len(compiled.tail)))
-        self._unit = compiled.unit
-        self._begin = np.concatenate([start.q, start.v, compiled.tail])
-
-    def begin(self) -> Array:
-        """Start state."""
-        return self._begin.copy()
-
-    def driven(self, t: float) -> Array:
-        """Prescribed coordinates at time t."""
-        return self.compiled.driven(t) if self.compiled.laws else self._fixed
-
-    def applied(self, t: float, y: Array) -> Array:
-        """Return the loads given as functions."""
-        n = self.compiled.n
-        return applied_loads(self.compiled, t, y[:n], y[n : 2 * n]) if self.compiled.applied else self._none
+        self._one = np.empty((1, len(self._begin)))
 
     def rates(self, t: float, y: Array) -> Array:
         """Return the derivative of the state; NaN where no friction loads fit."""
-        self._run(t, np.ascontiguousarray(y), 0.0, ONE_STAGE, self._one, 0, 1, self.applied(t, y))
+        n = self.compiled.n
+        applied = applied_loads(self.compiled, t, y[:n], y[n : 2 * n])
+        self._run(t, np.ascontiguousarray(y), 0.0, ONE_STAGE, self._one, 0, 1, applied)
         return np.array(self._one[0])
 
     def _run(self, t: float, y: Array, h: float, A: Array, K: Array, low: int, high: int, applied: Array) -> Array:
-        fresh, _ = self._kernels.augmented_stages(
+        fresh, _ = kernels.augmented_stages(
             self.compiled.tables,
             y,
             h,
@@ -111,30 +81,19 @@ class AugmentedForm:
             applied,
             self.out,
         )
-        self._look()
+        self._note()
         return np.asarray(fresh)
 
-    @property
-    def stages(self) -> Stages | None:
-        """A compiled Runge-Kutta step, if no load is given as a function."""
-        if self.compiled.applied:
-            return None
-        return lambda t, y, h, A, K: self._run(t, y, h, A, K, 1, len(A), self._none)
+    def step(self, t: float, y: Array, h: float, A: Array, K: Array) -> Array:
+        """Return the end of a compiled Runge-Kutta step."""
+        return self._run(t, y, h, A, K, 1, len(A), self._none)
 
-    def _look(self) -> None:
-        """Note what the kernel found wrong."""
-        if self.out[6] == 1.0:
-            self.why = "a spring has length 0, so its direction is not defined"
-        elif self.out[6] == 2.0:
-            self.why = NO_LOADS
-        else:
-            self.contraction = max(self.contraction, float(self.out[3]))
-        self.out[6] = 0.0
-
-    def _halves(self, y: Array) -> tuple[Array, Array]:
-        """Coordinates and velocities, in memory of their own where a solver gives strided states."""
-        n = self.compiled.n
-        return np.ascontiguousarray(y[:n]), np.ascontiguousarray(y[n : 2 * n])
+    def _projected(self, t: float, y: Array) -> tuple[Array, Array, float, float]:
+        """Coordinates and velocities on the constraints, kinetic energy lost on the way, smallest pivot."""
+        n = self.compiled.n  # a solver may give strided states
+        q, v = np.ascontiguousarray(y[:n]), np.ascontiguousarray(y[n : 2 * n])
+        q, v, loss, pivot = kernels.project_state(self.compiled.tables, q, v, self.slots, self.compiled.driven(t))
+        return q, v, loss, pivot
 
     def accept(self, t: float, y: Array) -> Array:
         """Project an accepted state onto the constraints; gears are followed."""
@@ -143,37 +102,35 @@ class AugmentedForm:
             self.slots = initial_slots(self.compiled, y[:n], self.slots)
         if not self.project:
             return y
-        q, v, loss, self.pivot = self._kernels.project_state(
-            self.compiled.tables, *self._halves(y), self.slots, self.driven(t)
-        )
+        q, v, loss, self.pivot = self._projected(t, y)
         self.loss += loss
         self._history.append((t, self.pivot))
         fresh = np.concatenate([q, v, y[2 * n :]])
-        self._note(t, fresh)
+        self._nodes = [*self._nodes[1 - _NODES :], (t, fresh)]
         return fresh
-
-    def _note(self, t: float, y: Array) -> None:
-        """Keep a state on the constraints."""
-        self._nodes = [*self._nodes[1 - _NODES :], (t, y)]
 
     def state(self, t: float, y: Array) -> tuple[Array, Array]:
         """Coordinates and velocities of a state between steps, on the constraints."""
         n = self.compiled.n
-        if not self.project:
-            return y[:n], y[n : 2 * n]
-        q, v, _, _ = self._kernels.project_state(self.compiled.tables, *self._halves(y), self.slots, self.driven(t))
-        return q, v
+        return self._projected(t, y)[:2] if self.project else (y[:n], y[n : 2 * n])
 
     def pivot_at(self, t: float, y: Array) -> tuple[float, Array]:
         """Smallest pivot of the constraints at a state, and the coordinates on the constraints."""
-        q, _, _, pivot = self._kernels.project_state(self.compiled.tables, *self._halves(y), self.slots, self.driven(t))
+        q, _, _, pivot = self._projected(t, y)
         return float(pivot), q
 
     def proposed_step(self, t: float, step: float) -> float:
         """Look for a singular pose within the next step, which no step may end next to; see `cross`."""
         self._due = 0.0
         if not self._history and self.project:
-            return self._away_from_start(t, step)
+            # a step away from a start at a singular pose, along its velocity
+            y = self._begin
+            self.pivot = self._largest = self.pivot_at(t, y)[0]
+            self._history, self._nodes = [(t, self.pivot)], [(t, y)]
+            speed = float(np.abs(y[self.compiled.n : 2 * self.compiled.n] / self.unit).max())
+            if self._from_singular and speed > 0.0:
+                self._due = _AWAY / speed
+            return step
         if t <= self._blocked:
             return min(step, 1.01 * (self._blocked - t))
         if len(self._nodes) < 2 or self._nodes[-1][0] != t or self.pivot > _AHEAD * self._largest:
@@ -210,17 +167,6 @@ class AugmentedForm:
                 return True
         return False
 
-    def _away_from_start(self, t: float, step: float) -> float:
-        """Prepare a step away from a start at a singular pose, along its velocity."""
-        y = self._begin
-        self.pivot = self.pivot_at(t, y)[0]
-        self._history, self._largest = [(t, self.pivot)], self.pivot
-        self._note(t, y)
-        speed = float(np.abs(y[self.compiled.n : 2 * self.compiled.n] / self._unit).max())
-        if self._from_singular and speed > 0.0:
-            self._due = _AWAY / speed
-        return step
-
     def cross(self, stats: SolverStatistics, bound: float) -> tuple[float, Array, GaussStep] | None:
         """Time and state beyond a singular pose, and the polynomial that leads there; None if no cross is due."""
         ahead, t = self._due, stats.time
@@ -238,7 +184,7 @@ class AugmentedForm:
                     stats.events += [DynamicEvent(*event) for event in passed]
                 self._history, self._dense, self.pivot = [(landing, pivot)], None, pivot
                 self._largest = max(self._largest, pivot)
-                self._note(landing, fresh)
+                self._nodes = [*self._nodes[1 - _NODES :], (landing, fresh)]
                 return landing, fresh, path
         # nearer first; next to the pose the ordinary steps must do
         self._blocked = t + (0.5 if self.pivot > 0.1 * self._largest else 3.0) * ahead
@@ -259,23 +205,18 @@ class AugmentedForm:
         y, n = self._nodes[-1][1], self.compiled.n
 
         def evaluate(at: float, q: Array, v: Array, tail: Array) -> tuple[Array, Array]:
-            q, v, _, pivot = self._kernels.project_state(self.compiled.tables, q, v, self.slots, self.driven(at))
+            q, v, _, pivot = self._projected(at, np.concatenate([q, v]))
             found = self.rates(at, np.concatenate([q, v, tail]))
             return found[n : 2 * n] if pivot > _REGULAR else np.full(n, np.nan), found[2 * n :]
 
-        path = gauss_step(evaluate, t, y, h, guess, self._unit)
+        path = gauss_step(evaluate, t, y, h, guess, self.unit)
         if path is None:
             return None
         raw = path(t + h)
-        q, v, loss, pivot = self._kernels.project_state(
-            self.compiled.tables, *self._halves(raw), self.slots, self.driven(t + h)
-        )
+        q, v, loss, pivot = self._projected(t + h, raw)
         fresh = np.concatenate([q, v, raw[2 * n :]])
-        speed = float(np.abs(v / self._unit).max())
-        missed = max(
-            float(np.abs((q - raw[:n]) / self._unit).max()),
-            float(np.abs((v - raw[n : 2 * n]) / self._unit).max()) / speed,
-        )
+        speed = float(np.abs(v / self.unit).max())
+        missed = max(np.abs((q - raw[:n]) / self.unit).max(), np.abs((v - raw[n : 2 * n]) / self.unit).max() / speed)
         kept = abs(self._energy(t + h, fresh) - self._energy(t, y) - float(raw[-1] - y[-1]))
         if not missed < _LANDED or not kept <= _KEPT * float(v @ self.compiled.tables.mass @ v):
             return None
@@ -283,11 +224,9 @@ class AugmentedForm:
         return t + h, fresh, float(pivot), path
 
     def _energy(self, t: float, y: Array) -> float:
-        q, v = self._halves(y)
-        T = self.compiled.tables
-        _, _, potential, _, _ = self._kernels.load_vector(
-            T, self._kernels.state_rows(T, q, v), self._none, self.compiled.currents
-        )
+        T, n = self.compiled.tables, self.compiled.n
+        q, v = y[:n].copy(), y[n : 2 * n].copy()
+        potential = kernels.load_vector(T, kernels.state_rows(T, q, v), self._none, self.compiled.currents)[2]
         return 0.5 * float(v @ T.mass @ v) + float(potential)
 
     def watch(self, stats: SolverStatistics, before: float, solver: Any) -> None:

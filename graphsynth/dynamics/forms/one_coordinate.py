@@ -10,15 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import checked
 from graphsynth.core.errors import GeometryError
+from graphsynth.dynamics import kernels
 from graphsynth.dynamics.friction.loads import FrictionRows
 from graphsynth.dynamics.friction.problem import NO_LOADS, FrictionProblem
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.start import StartReport
-from graphsynth.dynamics.stepping import ONE_STAGE, Stages
+from graphsynth.dynamics.stepping import ONE_STAGE, Form, Stages
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import applied_loads, initial_slots, joint_coordinate
-from graphsynth.kinematics.engine.follow import Trace, Tracker
-from graphsynth.kinematics.engine.program import Program, compile_program
+from graphsynth.kinematics.engine.follow import Tracker
+from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.engine.start import started
 from graphsynth.mechanism.laws import Linear
 
@@ -102,113 +103,72 @@ def one_coordinate_obstacle(model: DynamicModel) -> str:
     return ""
 
 
-def free_program(model: DynamicModel) -> Program:
-    """Compile the mechanism with its driver's coordinate as input."""
-    driver = model.mechanism.drivers[0]
-    return compile_program(replace(model.mechanism, drivers=(replace(driver, law=Linear()),)))
-
-
-class OneCoordinateForm:
-    """State ``(theta, omega, currents, work)``; a solver workspace, not a result."""
+class OneCoordinateForm(Form):
+    """State ``(theta, omega, currents, work)``."""
 
     name = "one-coordinate"
-    loss = 0.0
     stall = (
         "the input is next to a fold or a change point, where two assembly modes merge or meet, and is no coordinate "
         "there; use form='augmented' or 'partitioned'"
     )
 
     def __init__(self, compiled: Compiled, start: StartReport) -> None:
-        from graphsynth.dynamics import kernels
-
         obstacle = one_coordinate_obstacle(compiled.model)
         if obstacle:
             raise GeometryError(
                 f"there is no one-coordinate form: {obstacle}; use form='augmented' or form='partitioned'"
             )
-        self.compiled = compiled
-        self.changes: list[tuple[float, str]] = []
-        self.why = ""
-        self.contraction = 0.0
-        self.pivot = 1.0
         self.inertia = float("nan")
         self._slopes: dict[int, float] = {}
         self._rows: FrictionRows | None = None
-        self._kernels = kernels
-        driver = compiled.model.mechanism.drivers[0]
-        theta, omega = (
-            float(part)
-            for part in joint_coordinate(
-                compiled.model.mechanism, driver.base, driver.link, start.poses, start.velocities
-            )
-        )
-        self.tracker = started(free_program(compiled.model), theta, {}, np.asarray(start.poses))
-        self.program = self.tracker.program
-        self.trace = self.tracker.blank(np.array([theta, theta]))
-        self.E, self.S = engine_tables(self.tracker), engine_buffers(self.trace, compiled.n)
-        self._seed(theta, start.poses)
-        self._begin = np.concatenate([[theta, omega], compiled.tail])
-        self._none, self._out, self._one = np.zeros(compiled.n), np.zeros(4), np.empty((1, len(self._begin)))
-
-    def _seed(self, theta: float, poses: Array) -> None:
-        """Start the engine at the start pose, in its sample 0."""
-        first = self.tracker.blank(np.array([theta]))
-        self.tracker.seed(first, poses)
-        done, _, _ = self.tracker.run(first, 0)
-        if done < 1:
+        mechanism = compiled.model.mechanism
+        driver = replace(mechanism.drivers[0], law=Linear())  # its coordinate is the input
+        found = joint_coordinate(mechanism, driver.base, driver.link, start.poses, start.velocities)
+        theta, omega = (float(part) for part in found)
+        super().__init__(compiled, np.concatenate([[theta, omega], compiled.tail]))
+        self.unit = np.array([compiled.tables.size if mechanism.joint(*driver.pair).kind == "P" else 1.0])
+        self._out, self._one = np.zeros(4), np.empty((1, len(self._begin)))
+        tracker = started(compile_program(replace(mechanism, drivers=(driver,))), theta, {}, np.asarray(start.poses))
+        self.program, trace = tracker.program, tracker.blank(np.array([theta, theta]))
+        X, TH, V, W, PHI, M = trace.memory
+        done, why = np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
+        self.S = EngineState(trace.u, trace.q, X, TH, V, W, PHI, M, done, why, np.zeros((3, compiled.n)))
+        self.E = engine_tables(tracker)
+        # start the engine at the start pose, in its sample 0
+        first = tracker.blank(np.array([theta]))
+        tracker.seed(first, start.poses)
+        if tracker.run(first, 0)[0] < 1:
             raise GeometryError(f"the planar engine does not reach the start pose at the input {theta:.6g}")
-        for target, source in zip(self.trace.row(0), first.row(0)):
+        for target, source in zip(trace.row(0), first.row(0)):
             target[...] = source
         self.S.u[0] = theta
-        for link in self.compiled.moving:
+        for link in compiled.moving:
             if not self.program.tables.need_angle[link]:
-                self.trace.TH[0, link] = poses[link, 2]
-
-    def begin(self) -> Array:
-        """Start state."""
-        return self._begin.copy()
+                trace.TH[0, link] = start.poses[link, 2]
 
     def rates(self, t: float, y: Array) -> Array:
         """Return the derivative of the state; NaN where the mechanism cannot be assembled."""
         if self.compiled.applied or self.compiled.tables.friction.size:
             return self._loaded_rates(t, y)
         self._run(y, 0.0, ONE_STAGE, self._one, 0, 1)
-        return self._one[0].copy() if self._good() else self._failed(y)
+        return self._one[0].copy() if self._out[0] > 0.0 and self._out[3] == 1.0 else self._failed(y)
 
     def _run(self, y: Array, h: float, A: Array, K: Array, low: int, high: int) -> Array:
-        found = self._kernels.one_coordinate_stages(
-            self.compiled.tables,
-            self.E,
-            self.S,
-            self.compiled.centres,
-            self._none,
-            np.ascontiguousarray(y),
-            h,
-            A,
-            K,
-            low,
-            high,
-            self._out,
-        )
-        return np.asarray(found)
-
-    def _good(self) -> bool:
-        """Whether the last rates had a value."""
-        return bool(self._out[0] > 0.0 and self._out[3] == 1.0)
+        model = self.compiled.tables, self.E, self.S, self.compiled.centres, self._none
+        run = kernels.one_coordinate_stages
+        return np.asarray(run(*model, np.ascontiguousarray(y), h, A, K, low, high, self._out))
 
     @property
     def stages(self) -> Stages | None:
         """A compiled Runge-Kutta step, if no load is given as a function and there is no friction."""
-        if self.compiled.applied or self.compiled.tables.friction.size:
-            return None
+        return None if self.compiled.tables.friction.size else super().stages
 
-        def run(t: float, y: Array, h: float, A: Array, K: Array) -> Array:
-            fresh = self._run(y, h, A, K, 1, len(A))
-            if not np.isfinite(K).all():
-                self.rates(0.0, fresh)  # says why
-            return fresh
-
-        return run
+    def step(self, t: float, y: Array, h: float, A: Array, K: Array) -> Array:
+        """Return the end of a compiled Runge-Kutta step."""
+        fresh = self._run(y, h, A, K, 1, len(A))
+        if not np.isfinite(K).all():
+            self.rates(0.0, fresh)  # says why
+        return fresh
 
     def _failed(self, y: Array) -> Array:
         """Say why; the integrator tries a shorter step, and gives up where none is short enough."""
@@ -247,8 +207,8 @@ class OneCoordinateForm:
         y, T = np.ascontiguousarray(y), self.compiled.tables
         w = float(y[1])
         v = q1 * w
-        x = self._kernels.state_rows(T, q, v)
-        Q, _, _, P, good = self._kernels.load_vector(T, x, applied_loads(self.compiled, t, q, v), y[2:])
+        x = kernels.state_rows(T, q, v)
+        Q, _, _, P, good = kernels.load_vector(T, x, applied_loads(self.compiled, t, q, v), y[2:])
         Mq = T.mass @ q1
         inertia = float(Mq @ q1)
         self._out[0], self._out[3] = inertia, float(good)
@@ -258,11 +218,11 @@ class OneCoordinateForm:
                 self.why = NO_LOADS
                 return np.full(len(y), np.nan)
             P += rubbed
-        if not self._good():
+        if not (inertia > 0.0 and good):
             return self._failed(y)
         found = np.empty((1, len(y)))
         found[0, :2] = w, float(Q @ q1 - Mq @ q2 * w * w) / inertia
-        self._kernels.finish(T, x, y, found, 0, 2, float(P))
+        kernels.finish(T, x, y, found, 0, 2, float(P))
         return np.asarray(found[0])
 
     def _rub(self, t: float, q: Array, v: Array, x: Array, Q: Array) -> float:
@@ -278,11 +238,11 @@ class OneCoordinateForm:
                 return float("nan")
             Q += problem.W.T @ fit.forces
             return float(problem.rates @ fit.forces)
-        _, J, gam, _ = self._kernels.constraint_system(T, x, slots, np.zeros((1, 3)))
+        _, J, gam, _ = kernels.constraint_system(T, x, slots, np.zeros((1, 3)))
         out = np.zeros(7)
-        _, lam = self._kernels.accelerate(T, x, J, gam, Q, out)
+        _, lam = kernels.accelerate(T, x, J, gam, Q, out)
         self.contraction = max(self.contraction, float(out[3]))
-        return float(self._kernels.friction_loads(T, x, J, lam, Q)) if out[4] >= 0.0 else float("nan")
+        return float(kernels.friction_loads(T, x, J, lam, Q)) if out[4] >= 0.0 else float("nan")
 
     def refuses(self, t: float, y: Array) -> bool:
         """Whether two assembly modes met within the step: the sign of a mode says nothing of how it goes on there.
@@ -333,31 +293,10 @@ class OneCoordinateForm:
 def engine_tables(tracker: Tracker) -> EngineTables:
     """Pack the program for the kernel."""
     p = tracker.program
-    empty4, empty3, none = np.empty((0, 0, 0, 0)), np.empty((0, 0, 0)), np.empty(0, np.int64)
-    return EngineTables(
-        *p.tables,
-        np.ones(p.mechanism.graph.links, dtype=np.bool_),
-        tracker.modes,
-        empty3,
-        np.empty((0, 0)),
-        none,
-        none,
-        empty4,
-        empty4,
-        empty4,
-        empty3,
-        1,
-        p.Lc,
-        p.far,
-        True,
-    )
-
-
-def engine_buffers(trace: Trace, n: int) -> EngineState:
-    """Pack a two-sample trace for the kernel; it shares the trace's memory.  ``n`` is the number of coordinates."""
-    X, TH, V, W, PHI, M = trace.memory
-    done, why = np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
-    return EngineState(trace.u, trace.q, X, TH, V, W, PHI, M, done, why, np.zeros((3, n)))
+    empty2, empty3, empty4 = np.empty((0, 0)), np.empty((0, 0, 0)), np.empty((0, 0, 0, 0))
+    wanted, none = np.ones(p.mechanism.graph.links, dtype=np.bool_), np.empty(0, np.int64)
+    kept = empty3, empty2, none, none, empty4, empty4, empty4, empty3
+    return EngineTables(*p.tables, wanted, tracker.modes, *kept, 1, p.Lc, p.far, True)
 
 
 @checked

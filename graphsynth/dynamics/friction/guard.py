@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from graphsynth.dynamics.friction.problem import FrictionProblem
 from graphsynth.dynamics.friction.state import Piece, decide, state_values
 from graphsynth.dynamics.stepping import Finding
-from graphsynth.dynamics.values import initial_slots
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.stepping import Form, Stepper
@@ -69,10 +68,7 @@ class Guard:
 
     def _values(self, t: float, y: Array) -> tuple[Array, Array, float]:
         q, v = self.form.state(t, y)
-        slots = getattr(self.form, "slots", None)
-        if slots is None:
-            slots = initial_slots(self.piece.rows.compiled, q)
-        return state_values(self.piece, t, q, v, slots)
+        return state_values(self.piece, t, q, v, self.form.slots_at(q))
 
     def look(self, stepper: Stepper, t0: float, y0: Array, solver: Any) -> Finding:
         """Look at a step from ``(t0, y0)`` that the solver has made."""
@@ -118,8 +114,7 @@ class Guard:
     def _still_one(self, t: float, y: Array) -> str:
         """Say why the motion is no longer the only one; empty if it is."""
         q, v = self.form.state(t, y)
-        slots = getattr(self.form, "slots", self._slots)
-        problem = FrictionProblem(self.piece.rows, t, q, v, slots)
+        problem = FrictionProblem(self.piece.rows, t, q, v, self.form.slots_at(q))
         sliding = {f: s for f, s in enumerate(self.piece.senses) if s or self.piece.rows.elements[f].smooth}
         return decide(problem, sliding, self.piece.stuck).message
 

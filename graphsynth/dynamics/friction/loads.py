@@ -13,6 +13,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.dynamics import kernels
 from graphsynth.dynamics.elements import JointFriction
 from graphsynth.dynamics.tables import Compiled, RowInfo, driver_row
 from graphsynth.kinematics.engine import codes
@@ -295,8 +296,6 @@ class FrictionRows:
 
         The sliding rates are ``u = W v`` (of b relative to a), and W^T phi is the generalised force of friction phi.
         """
-        from graphsynth.dynamics import kernels
-
         T, m = self.all.tables, len(self.compiled.info)
         C, J, gam, _ = kernels.constraint_system(T, kernels.state_rows(T, q, v), slots, self.all.driven(t))
         return J[:m], gam[:m], J[m:], C[m:], -gam[m:]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,8 @@ from graphsynth.dynamics.friction.problem import NO_LOADS, FrictionProblem, Sens
 from graphsynth.dynamics.friction.state import Piece, decide, make_piece, state_values
 from graphsynth.dynamics.result import DynamicEvent, FrictionHistory
 from graphsynth.dynamics.start import StartReport
-from graphsynth.dynamics.stepping import SolverStatistics, StepOptions, Stepper
+from graphsynth.dynamics.stepping import Form, SolverStatistics, StepOptions, Stepper
 from graphsynth.dynamics.tables import Compiled
-from graphsynth.dynamics.values import initial_slots
-
-if TYPE_CHECKING:
-    from graphsynth.dynamics.friction.guard import Guard
-    from graphsynth.dynamics.stepping import Form
 
 Array = NDArray[np.float64]
 
@@ -32,29 +27,14 @@ _LONGEST, _FIRST = 1.0 / 400.0, 1e-5
 _BENT = 0.02
 
 
-class RestForm:
-    """State ``(work,)`` of a mechanism whose every joint is held: a workspace that looks like the other forms."""
+class RestForm(Form):
+    """State ``(work,)`` of a mechanism whose every joint is held."""
 
-    name, why, stall = "rest", "", ""
-    loss = contraction = 0.0
-    pivot = 1.0
+    name = "rest"
 
     def __init__(self, compiled: Compiled, q: Array, slots: Array) -> None:
-        self.compiled = compiled
-        self.changes: list[tuple[float, str]] = []
+        super().__init__(compiled, np.zeros(1))
         self.slots, self._q = slots, q
-
-    def begin(self) -> Array:
-        """Start state."""
-        return np.zeros(1)
-
-    def rates(self, t: float, y: Array) -> Array:
-        """Nothing changes."""
-        return np.zeros_like(y)
-
-    def accept(self, t: float, y: Array) -> Array:
-        """Nothing to mend."""
-        return y
 
     def state(self, t: float, y: Array) -> tuple[Array, Array]:
         """Coordinates and velocities."""
@@ -182,7 +162,7 @@ class DryMotion:
             return None if guard.hit is None else (guard.hit, guard.uncertainty)
         scaled = options.scaled(self.scales(form))
         last = Stepper(form, self.stats, scaled, ends[0], len(ends) > 1, guard).run(y, grid, output)
-        self.loss += getattr(form, "loss", 0.0)
+        self.loss += form.loss
         self.contraction = max(self.contraction, form.contraction, guard.factor)
         self.changes += form.changes
         if last is None:
@@ -193,8 +173,7 @@ class DryMotion:
             return None
         q, v = form.state(self.stats.time, last)
         self._q, self._v, self._work = q.copy(), v.copy(), float(last[-1])
-        followed = getattr(form, "slots", None)
-        self._slots = initial_slots(self.rows.compiled, q) if followed is None else followed
+        self._slots = form.slots_at(q)
         self._speed = max(self._speed, self._problem(self.stats.time).speed)
         return None if guard.hit is None else (guard.hit, guard.uncertainty)
 

@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.dynamics import kernels
 from graphsynth.dynamics.friction.loads import FrictionRows, fitting_loads
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import applied_loads
@@ -65,8 +66,6 @@ class FrictionProblem:
     """
 
     def __init__(self, rows: FrictionRows, t: float, q: Array, v: Array, slots: Array, speed: float = 0.0) -> None:
-        from graphsynth.dynamics import kernels
-
         self.rows, self.elements = rows, rows.elements
         compiled = rows.compiled
         T = compiled.tables
