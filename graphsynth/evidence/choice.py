@@ -19,16 +19,8 @@ _NOISE = 1.25
 _SMALLER = 0.5
 
 
-#: Errors below this are rounding where the error is relative or an angle; they count as equal.
-_ROUNDING = 1e-15
-
-
 def _size(row: Row, floor: float = FLOOR) -> float:
     return max(row.error, floor)
-
-
-def _floor(problem: Problem) -> float:
-    return _ROUNDING if problem.unit in ("relative", "rad") else FLOOR
 
 
 def front(rows: Iterable[Row], floor: float = FLOOR) -> tuple[Row, ...]:
@@ -82,19 +74,19 @@ class Knee:
     @property
     def sentence(self) -> str:
         """The verdict in words."""
-        k = self.knee
-        at = f"{k.setting} ({k.error:.1e} in {seconds_text(k.seconds)})"
-        if self.default is None:
-            return f"{self.method}: the knee is {at}"
-        d = self.default
+        k, d = self.knee, self.default
+        at = f"the knee is {k.setting} ({k.error:.1e} in {seconds_text(k.seconds)})"
+        if d is None:
+            return f"{self.method}: {at}"
         if self.verdict == "failed":
-            return f"{self.method}: the default {d.setting} {d.status.value} here; the knee is {at}"
-        own = f"the default {d.setting} ({d.error:.1e} in {seconds_text(d.seconds)})"
+            return f"{self.method}: the default {d.setting} {d.status.value} here; {at}"
+        own = f"{self.method}: the default {d.setting} ({d.error:.1e} in {seconds_text(d.seconds)})"
         if self.verdict == "at the knee":
-            return f"{self.method}: {own} lies at the knee"
+            return f"{own} lies at the knee"
+        than = f"{self.verdict} than the knee"
         if self.verdict == "slower, no gain":
-            return f"{self.method}: {own} is slower than the knee and gains nothing; the knee is {at}"
-        return f"{self.method}: {own} is {self.verdict} than the knee; the knee is {at}"
+            than = "slower than the knee and gains nothing"
+        return f"{own} is {than}; {at}"
 
 
 def knee(rows: Sequence[Row], floor: float = FLOOR) -> Row | None:
@@ -148,7 +140,7 @@ def knees(problem: Problem) -> tuple[Knee, ...]:
     found = []
     for method in problem.methods:
         rows = problem.of(method)
-        at = knee(rows, _floor(problem))
+        at = knee(rows, problem.floor)
         if at is None or len(rows) < 3 or problem.count or problem.over:
             continue
         default = next((row for row in rows if row.default), None)
@@ -209,13 +201,12 @@ def advice(problem: Problem) -> dict[str, str]:
     """
     if problem.sentences:
         return dict(problem.sentences)
-    floor = _floor(problem)
-    best = front(problem.rows, floor)
-    proved = front((row for row in problem.rows if row.proved), floor)
-    return {method: _sentence(problem, method, best, proved, floor) for method in problem.methods}
+    best = front(problem.rows, problem.floor)
+    proved = front((row for row in problem.rows if row.proved), problem.floor)
+    return {method: _sentence(problem, method, best, proved) for method in problem.methods}
 
 
-def _sentence(problem: Problem, method: str, best: tuple[Row, ...], proved: tuple[Row, ...], floor: float) -> str:
+def _sentence(problem: Problem, method: str, best: tuple[Row, ...], proved: tuple[Row, ...]) -> str:
     rows = problem.of(method)
     good = [row for row in rows if row.good]
     if not good:
@@ -228,7 +219,7 @@ def _sentence(problem: Problem, method: str, best: tuple[Row, ...], proved: tupl
         own = [row for row in proved if row.method == method]
         text = f"fastest with a proof, {_range(own, proved, problem.unit)}"
     else:
-        text = _beaten(good, best, problem.unit, floor)
+        text = _beaten(good, best, problem)
     lost = [row for row in rows if row.status is not RowStatus.OK]
     tail = _settings(rows)
     if lost:
@@ -249,7 +240,8 @@ def _settings(rows: Sequence[Row]) -> str:
 def _range(mine: list[Row], best: tuple[Row, ...], unit: str) -> str:
     """Say for which wanted errors the rows of a method are the fastest."""
     first, last = best.index(mine[0]), best.index(mine[-1])
-    low = f"{_error(mine[-1].error, unit)} ({_setting(mine[-1])}{seconds_text(mine[-1].seconds)})"
+    setting = f"{mine[-1].setting}, " if mine[-1].setting else ""
+    low = f"{_error(mine[-1].error, unit)} ({setting}{seconds_text(mine[-1].seconds)})"
     between = sorted({row.method for row in best[first : last + 1]} - {mine[0].method})
     text = f"for errors down to {low}"
     if first > 0:
@@ -263,7 +255,8 @@ def _range(mine: list[Row], best: tuple[Row, ...], unit: str) -> str:
     return text
 
 
-def _beaten(good: list[Row], best: tuple[Row, ...], unit: str, floor: float) -> str:
+def _beaten(good: list[Row], best: tuple[Row, ...], problem: Problem) -> str:
+    floor, unit = problem.floor, problem.unit
     own = min(good, key=lambda row: (_size(row, floor), row.seconds))
     other = next((row for row in best if _SMALLER * _size(row, floor) <= _size(own, floor)), best[-1])
     times = own.seconds / other.seconds
@@ -274,10 +267,6 @@ def _beaten(good: list[Row], best: tuple[Row, ...], unit: str, floor: float) -> 
         f"{other.label} is better: {than}, {_two(times)} times faster than {_error(own.error, unit)} in "
         f"{seconds_text(own.seconds)} here"
     )
-
-
-def _setting(row: Row) -> str:
-    return f"{row.setting}, " if row.setting else ""
 
 
 def _error(error: float, unit: str) -> str:

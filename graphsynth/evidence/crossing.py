@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 _DIGITS = 50
 #: Parts of the search by boxes after which it is stopped.
 _PARTS = (0.3, 0.6, 0.75, 0.85, 0.92, 0.97)
-_NO_SHARE = "the enclosure is wider than the area itself, {:.3g} mm²"
 
 
 def precise_crossing(problem: CircleEllipse) -> tuple[Any, Any]:
@@ -184,11 +183,9 @@ def area_problem(bearing: Bearing, sine: str, effort: Effort | None = None) -> P
     Parameters
     ----------
     bearing : Bearing
-        The bearing.
     sine : str
         Sine of the tilt, exact text.
     effort : Effort, optional
-        Rounds and sizes of the measurement.
 
     Returns
     -------
@@ -201,85 +198,71 @@ def area_problem(bearing: Bearing, sine: str, effort: Effort | None = None) -> P
     >>> len(area_problem(Bearing(), "0.0133308643347", Effort(rounds=1, quick=True)).methods)
     5
     """
+    from graphsynth.intervals import Interval
+    from graphsynth.jamming.bearing.areas import ellipse_circle, surrogate_areas
+    from graphsynth.jamming.bearing.areas_enclosed import enclose_surrogate_areas
+    from graphsynth.jamming.intersection.readings import crescent_boxes, crescent_points, interval_shoelace
+
     effort = effort or Effort()
     truth = precise_area(bearing, sine)
-    many = (1, 10, 100) if effort.quick else (1, 100, 10_000)
-    corners = effort.some((16, 64, 250, 1000, 4000))
-    rows = [_enclosed_area(bearing, sine, n, truth, effort) for n in (1, 10, 100)]
-    S = float(sine)
+    S, R, one = float(sine), bearing.Rb, Interval(sine)
     C, a = math.sqrt((1.0 - S) * (1.0 + S)), bearing.Rh
     b = a * C - bearing.h * S
-    for n in many:
-        run = partial(_stable_areas, bearing, np.full(n, S), np.full(n, C))
-        rows.append(_doubles_row("closed form, doubles", f"{n} at once", run, n, truth, effort))
-    for n in many:
-        run = partial(_direct_areas, np.full(n, bearing.Rb), np.full(n, a), np.full(n, b))
-        rows.append(_doubles_row("direct formula, doubles", f"{n} at once", run, n, truth, effort))
-    rows += [
-        _doubles_row("polygon, doubles", f"{n} corners", partial(_polygon, bearing.Rb, a, b, n), 1, truth, effort)
-        for n in corners
-    ]
-    rows += [_shoelace_row(bearing.Rb, a, b, n, truth, effort) for n in corners]
+
+    def enclosed(n: int) -> Callable[[], Interval]:
+        low, high = (np.full(n, float(end)) for end in (one.lo, one.hi))
+        given: Any = sine if n == 1 else Interval.from_bounds(low, high)
+        sizes = repr(R), repr(bearing.clearance), repr(bearing.h)
+        return lambda: enclose_surrogate_areas(*sizes, given).ellipse_only
+
+    def stable(n: int) -> Callable[[], Any]:
+        sines, cosines = np.full(n, S), np.full(n, C)
+        return lambda: surrogate_areas(bearing, sines, cosines).ellipse_only
+
+    def direct(n: int) -> Callable[[], Any]:
+        radii = [np.full(n, radius) for radius in (R, a, b)]
+        return lambda: ellipse_circle(*radii).ellipse_only
+
+    def polygon(n: int) -> Callable[[], float]:
+        def run() -> float:
+            """Shoelace sum of points on both crescents of the ellipse outside the circle."""
+            x, y = crescent_points(R, a, b, n).T
+            return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+        return run
+
+    def shoelace(n: int) -> Callable[[], Interval]:
+        return lambda: interval_shoelace(crescent_boxes(R, a, b, n)) * 2
+
+    many = (1, 10, 100) if effort.quick else (1, 100, 10_000)
+    corners = effort.some((16, 64, 250, 1000, 4000))
+    rows = []
+    for method, unit, made, sizes in (
+        ("closed form, enclosed", "at once", enclosed, (1, 10, 100)),
+        ("closed form, doubles", "at once", stable, many),
+        ("direct formula, doubles", "at once", direct, many),
+        ("polygon, doubles", "corners", polygon, corners),
+        ("interval shoelace sum", "boxes", shoelace, corners),
+    ):
+        for n in sizes:
+            found, *timed = best_of(made(n), effort)
+            share = n if unit == "at once" else 1
+            rows.append(_area_row(method, f"{n} {unit}", found, truth, timed, many=share))
     question = f"Area between bearing and hole of the source's figure at the tilt asin({S:.6g})"
     return Problem("areas", question, "mm²", tuple(rows), "area")
 
 
-_AREA_REFERENCE = f"quadrature in polar coordinates with {_DIGITS} digits"
-
-
-def _stable_areas(bearing: Bearing, S: Any, C: Any) -> Any:
-    from graphsynth.jamming.bearing.areas import surrogate_areas
-
-    return surrogate_areas(bearing, S, C).ellipse_only
-
-
-def _direct_areas(R: Any, a: Any, b: Any) -> Any:
-    from graphsynth.jamming.bearing.areas import ellipse_circle
-
-    return ellipse_circle(R, a, b).ellipse_only
-
-
-def _polygon(R: float, a: float, b: float, count: int) -> float:
-    """Shoelace sum of points on both crescents of the ellipse outside the circle."""
-    from graphsynth.jamming.intersection.readings import crescent_points
-
-    x, y = crescent_points(R, a, b, count).T
-    return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-
-
-def _doubles_row(method: str, setting: str, run: Callable[[], Any], many: int, truth: Any, effort: Effort) -> Row:
-    found, *timed = best_of(run, effort)
-    error = max(float(abs(truth - value)) for value in {float(v) for v in np.atleast_1d(found)})
-    error = max(error, math.ulp(float(truth)) / 2)
-    return Row.of(method, setting, error, timed, many=many, reference=_AREA_REFERENCE)
-
-
-def _area_row(method: str, setting: str, run: Callable[[], Interval], many: int, truth: Any, effort: Effort) -> Row:
-    """Row of an enclosure of the area: it must hold the reference, and say more than that there is an area."""
-    found, *timed = best_of(run, effort)
-    width = float(np.max(found.width))
-    why = "" if width < float(truth) else _NO_SHARE.format(float(truth))
-    why = why if _holds(found, truth) else "the enclosure does not hold the area"
-    against = f"none needed; checked to hold the {_AREA_REFERENCE}"
-    more = {"many": many, "kind": "width of the enclosure", "reference": against, "proved": True}
-    return Row.of(method, setting, width, timed, why, **more)
-
-
-def _enclosed_area(bearing: Bearing, sine: str, many: int, truth: Any, effort: Effort) -> Row:
+def _area_row(method: str, setting: str, found: Any, truth: Any, timed: Sequence[float], **more: Any) -> Row:
+    """Row of areas: an enclosure must hold the reference, and say more than that there is an area."""
     from graphsynth.intervals import Interval
-    from graphsynth.jamming.bearing.areas_enclosed import enclose_surrogate_areas
 
-    R, c, h = repr(bearing.Rb), repr(bearing.clearance), repr(bearing.h)
-    one = Interval(sine)
-    given: Any = sine if many == 1 else Interval.from_bounds(np.full(many, float(one.lo)), np.full(many, float(one.hi)))
-    run = partial(enclose_surrogate_areas, R, c, h, given)
-    return _area_row("closed form, enclosed", f"{many} at once", lambda: run().ellipse_only, many, truth, effort)
-
-
-def _shoelace_row(R: float, a: float, b: float, boxes: int, truth: Any, effort: Effort) -> Row:
-    from graphsynth.jamming.intersection.readings import crescent_boxes, interval_shoelace
-
-    def run() -> Interval:
-        return interval_shoelace(crescent_boxes(R, a, b, boxes)) * 2
-
-    return _area_row("interval shoelace sum", f"{boxes} boxes", run, 1, truth, effort)
+    reference = f"quadrature in polar coordinates with {_DIGITS} digits"
+    if not isinstance(found, Interval):
+        error = max(float(abs(truth - value)) for value in {float(v) for v in np.atleast_1d(found)})
+        error = max(error, math.ulp(float(truth)) / 2)
+        return Row.of(method, setting, error, timed, reference=reference, **more)
+    width = float(np.max(found.width))
+    why = "" if width < float(truth) else f"the enclosure is wider than the area itself, {float(truth):.3g} mm²"
+    why = why if _holds(found, truth) else "the enclosure does not hold the area"
+    more |= {"kind": "width of the enclosure", "reference": f"none needed; checked to hold the {reference}"}
+    return Row.of(method, setting, width, timed, why, proved=True, **more)

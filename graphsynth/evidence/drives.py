@@ -85,28 +85,12 @@ def work_precision(
 ) -> Problem:
     """Error against run time over tolerances, failures included.
 
-    Parameters
-    ----------
-    plant, motor, train, times
-        From rest, as for `graphsynth.dynamics.driven.run.run`; without events (voltage limit, efficiency) on the way.
-    tolerances : sequence of float
-    solvers : sequence of str
-        Of `scipy.integrate.solve_ivp`, on the same compiled right-hand side.
-    rounds : int
-        Runs for the wall time.
-    most_calls : int
-        A solver that needs more calls of the right-hand side is shown as failed.
+    Plant, motor, train and times as for `graphsynth.dynamics.driven.run.run`, from rest; a `SpecError` refuses events
+    on the way: an ideal speed, a voltage limit, an efficiency below one.  `solvers` are those of scipy's ``solve_ivp``,
+    on the same compiled right-hand side; one that needs more than `most_calls` calls is shown as failed.
 
-    Returns
-    -------
-    Problem
-        The reference is DOP853 at 3e-14, another method on the same equations; for a stiff motor, which no explicit
-        method can follow, a run at 1e-13, and ``reference`` of the rows says so.
-
-    Raises
-    ------
-    SpecError
-        An ideal speed, a voltage limit or an efficiency below one.
+    The reference is DOP853 at 3e-14, another method on the same equations; for a stiff motor, which no explicit method
+    can follow, a run at 1e-13, and ``reference`` of the rows says so.
     """
     out = output_times(times)
     whole("rounds", rounds, "the best of them is taken")
@@ -114,12 +98,18 @@ def work_precision(
         raise SpecError("the comparison is for motions without events: no ideal speed, voltage limit or efficiency")
     drive, effort = _Drive(plant, motor, train, out), Effort(rounds)
     truth = _reference(drive)
-    rows = [_own_row(drive, rtol, truth, effort) for rtol in tolerances]
+    rows = []
+    for rtol in tolerances:
+        found, *timed = best_of(partial(drive.run, rtol), effort)
+        error = truth.error(_states(found)) if found.complete else math.nan
+        more: dict[str, Any] = {"kind": _KIND, "reference": truth.name, "value": rtol}
+        more |= {"more": {_WORK: float(found.steps + found.rejected)}}
+        more |= {"status": RowStatus.UNRELIABLE if found.complete else RowStatus.FAILED}
+        rows.append(Row.of(_OWN, f"rtol {rtol:.0e}", error, timed, found.reason, **more))
     rows += [_scipy_row(name, drive, rtol, truth, effort, most_calls) for name in solvers for rtol in tolerances]
     question = f"Speed and currents of the drive up to {out[-1]:g} s, at {out.size} times"
-    return Problem(
-        "drive", question, "relative", tuple(rows), note=f"Error of speed and currents against {truth.name}."
-    )
+    note = f"Error of speed and currents against {truth.name}."
+    return Problem("drive", question, "relative", tuple(rows), note=note)
 
 
 def drive_work_precision(machine: Any, times: ArrayLike, **options: Any) -> Problem:
@@ -145,14 +135,6 @@ def _reference(drive: _Drive) -> _Truth:
         raise SpecError(f"there is no reference to compare with: {own.reason}")
     name = "graphsynth itself with tolerance 1e-13, because the motor is too stiff for an explicit method"
     return _Truth(states, name)
-
-
-def _own_row(drive: _Drive, rtol: float, truth: _Truth, effort: Effort) -> Row:
-    found, *timed = best_of(lambda: drive.run(rtol), effort)
-    error = truth.error(_states(found)) if found.complete else math.nan
-    status = RowStatus.UNRELIABLE if found.complete else RowStatus.FAILED
-    more = {"value": rtol, "kind": _KIND, "reference": truth.name, "more": {_WORK: float(found.steps + found.rejected)}}
-    return Row.of(_OWN, f"rtol {rtol:.0e}", error, timed, found.reason, status=status, **more)
 
 
 def _states(found: Any) -> Array:
@@ -220,16 +202,11 @@ def drive_problem(
     slow = (1e-4, 1e-6, 1e-8)
     tolerances = tuple(sorted({*slow, 1e-10, 1e-12, default} if not effort.quick else {1e-4, 1e-8, default}))[::-1]
 
-    def measured(solvers: Sequence[str], asked: Sequence[float], rounds: int) -> tuple[Row, ...]:
-        found = work_precision(
-            plant, motor, train, times, tolerances=asked, solvers=solvers, rounds=rounds, most_calls=_MOST_CALLS
-        )
-        return found.rows
-
-    rows = list(measured(("LSODA",), tolerances, effort.rounds))
+    measured = partial(work_precision, plant, motor, train, times, most_calls=_MOST_CALLS)
+    rows = list(measured(tolerances=tolerances, solvers=("LSODA",), rounds=effort.rounds).rows)
     for solver in () if effort.quick else ("DOP853", "BDF", "Radau"):
         asked = tolerances if solver == "DOP853" else slow
-        rows += measured((solver,), asked, 1)[len(asked) :]
+        rows += measured(tolerances=asked, solvers=(solver,), rounds=1).rows[len(asked) :]
     reference = rows[0].reference
     rows = [replace(row, default=row.method == _OWN and row.value == default) for row in rows]
     truth = _precise(plant, motor, train, times, shape)
@@ -243,8 +220,12 @@ def drive_problem(
             "the same right-hand side."
         )
     else:
-        drive = _Drive(plant, motor, train, times)
-        rows = [_against(row, _Truth(truth, _PRECISE), drive) for row in rows]
+        drive, precise = _Drive(plant, motor, train, times), _Truth(truth, _PRECISE)
+        for k, row in enumerate(rows):
+            if row.method == _OWN and row.good:
+                more = {**row.more, "distance from scipy DOP853": row.error}
+                error = precise.error(_states(drive.run(row.value)))
+                rows[k] = replace(row, error=error, reference=_PRECISE, more=more)
     question = f"Speed and currents of the drive from rest to {end:g} s, at eleven times"
     return Problem("drive", question, "relative", tuple(rows), "run", note)
 
@@ -260,15 +241,6 @@ def _precise(plant: Any, motor: Any, train: Any, times: Any, shape: Shape | None
         return None
 
 
-def _against(row: Row, truth: _Truth, drive: _Drive) -> Row:
-    """Row of the own integrator with its error against the precise motion; others as they are."""
-    if row.method != _OWN or not row.good:
-        return row
-    found = drive.run(row.value)
-    error = truth.error(_states(found))
-    return replace(row, error=error, reference=truth.name, more={**row.more, "distance from scipy DOP853": row.error})
-
-
 def reduction_problem(machine: Any, times: Any, inductances: Sequence[float], effort: Effort | None = None) -> Problem:
     """Leave the inductance out: what the limit L -> 0 costs in accuracy, and what keeping it costs in time.
 
@@ -280,33 +252,21 @@ def reduction_problem(machine: Any, times: Any, inductances: Sequence[float], ef
     found = machine.inductance_study(times, chosen)
     least = replace(machine, motor=replace(machine.motor, inductance=float(found.inductance.min())))
     limit, _, rounds = best_of(lambda: least.simulate(times, reduce=True), effort)
-    study = {
-        "kind": "largest error of the speed behind the electrical transient",
-        "reference": "run with the inductance",
-    }
-    kept = {"kind": "estimated error of the speed", "reference": "the same integrator at a tighter tolerance"}
-    rows = [
-        Row.of(
-            "model without inductance",
-            f"L = {L:g} H",
-            wrong,
-            (limit.seconds, rounds),
-            value=L,
-            **study,
-            more={"steps": float(limit.steps), _L: L},
-        )
-        for L, wrong in zip(found.inductance.tolist(), found.speed.tolist())
-    ]
-    for L in found.inductance.tolist():
+    study = ("model without inductance", "largest error of the speed behind the electrical transient")
+    kept = ("model with inductance", "estimated error of the speed")
+
+    def row(named: tuple[str, str], against: str, L: float, error: float, run: Any, rounds: int) -> Row:
+        more = {"kind": named[1], "reference": against, "value": L, "more": {"steps": float(run.steps), _L: L}}
+        why = "" if run.complete else run.reason
+        return Row.of(named[0], f"L = {L:g} H", error, (run.seconds, rounds), why, **more)
+
+    pairs = list(zip(found.inductance.tolist(), found.speed.tolist()))
+    rows = [row(study, "run with the inductance", L, wrong, limit, rounds) for L, wrong in pairs]
+    for L, _ in pairs:
         full = replace(machine, motor=replace(machine.motor, inductance=L))
         run, _, rounds = best_of(partial(full.simulate, times, reduce=False), effort)
         error = float(run.error[1]) if run.complete else math.nan
-        more = {"steps": float(run.steps), _L: L}
-        why = "" if run.complete else run.reason
-        setting = f"L = {L:g} H"
-        rows.append(
-            Row.of("model with inductance", setting, error, (run.seconds, rounds), why, value=L, more=more, **kept)
-        )
+        rows.append(row(kept, "the same integrator at a tighter tolerance", L, error, run, rounds))
     question = "The motor without its inductance: error of the speed after the electrical transient"
     note = (
         "The settings are inductances, not accuracies. Errors with the inductance are the integrator's own estimate: "

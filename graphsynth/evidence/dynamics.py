@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from inspect import signature
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -121,26 +122,22 @@ def _row(
     truth: DynamicMotion,
     effort: Effort,
 ) -> Row:
-    rtol, name = options["rtol"], f"{options['form']}, {options['method']}"
-    row = Row(name, f"rtol {rtol:.0e}", math.nan, math.nan, 1, _KIND, value=rtol)
+    rtol = options["rtol"]
+    row = partial(Row.of, f"{options['form']}, {options['method']}", f"rtol {rtol:.0e}", kind=_KIND, value=rtol)
 
     def run() -> DynamicMotion:
         return simulate_dynamics(model, times, start=start, outputs="exact", **options)
 
     try:
-        found, seconds, rounds = best_of(run, effort, warm=False)
+        found, *timed = best_of(run, effort, warm=False)
     except GeometryError as refusal:
-        return replace(row, status=RowStatus.FAILED, reason=str(refusal), more={"steps": 0.0})
-    row = replace(row, seconds=seconds, rounds=rounds, more={"steps": float(found.steps)})
+        return row(math.nan, (math.nan, 1), str(refusal), more={"steps": 0.0})
+    row = partial(row, timed=timed, more={"steps": float(found.steps)})
     if not found.completed:
-        return replace(row, status=RowStatus.FAILED, reason=found.message)
-    unit = np.tile([found.compiled.tables.size, found.compiled.tables.size, 1.0], found.compiled.n // 3)
-    error = float(np.abs((found.q - truth.q) / unit).max())
-    if error > _MISSED * rtol:
-        return replace(
-            row, error=error, status=RowStatus.UNRELIABLE, reason=f"more than {_MISSED:g} times the tolerance"
-        )
-    return replace(row, error=error)
+        return row(math.nan, why=found.message)
+    error = _away(found, truth.q, turns=False)
+    why = f"more than {_MISSED:g} times the tolerance" if error > _MISSED * rtol else ""
+    return row(error, why=why, status=RowStatus.UNRELIABLE)
 
 
 def dynamics_problem(
@@ -167,16 +164,9 @@ def dynamics_problem(
     for method in ("DOP853",) if effort.quick else ("DOP853", "RK45", "LSODA"):
         # the forms are told apart by the default integrator, the integrators by the form that takes least time
         forms, asked = (every, tolerances) if method == "DOP853" else (("one-coordinate",), (1e-4, 1e-6, 1e-8))
-        found = dynamics_work_precision(
-            model,
-            start,
-            times,
-            forms=forms,
-            methods=(method,),
-            tolerances=asked,
-            rounds=min(2, effort.rounds),
-            max_steps=5_000,
-        )
+        options: dict[str, Any] = {"forms": forms, "methods": (method,), "tolerances": asked}
+        options |= {"rounds": min(2, effort.rounds), "max_steps": 5_000}
+        found = dynamics_work_precision(model, start, times, **options)
         rows += [_with_drift(model, start, times, row, right, truth) for row in found]
     note = "Drift and energy are those of a further run; positions are projected onto the joints (the default)."
     if truth is None:
@@ -197,21 +187,19 @@ def _with_drift(
         found = simulate_dynamics(model, times, start=start, **options)
     except GraphsynthError:
         return row
-    more = {
-        **row.more,
-        "position drift": found.checks.position_drift,
-        "velocity drift": found.checks.velocity_drift,
-        "energy error": found.checks.energy,
-    }
+    checks = found.checks
+    drift = {"position drift": checks.position_drift, "velocity drift": checks.velocity_drift}
+    more = {**row.more, **drift, "energy error": checks.energy}
     if right is None or truth is None:
         return replace(row, more=more)
     more["distance from " + row.reference] = row.error
-    return replace(row, error=_away(found, right), reference=truth.name, more=more)
+    return replace(row, error=_away(found, right, turns=True), reference=truth.name, more=more)
 
 
-def _away(found: DynamicMotion, right: Array) -> float:
-    """Largest error of all coordinates; lengths over the characteristic length, angles up to full turns."""
+def _away(found: DynamicMotion, right: Array, *, turns: bool) -> float:
+    """Largest error of all coordinates; lengths over the characteristic length, angles up to full turns if asked."""
     gap = (found.q - right).reshape(len(right), -1, 3)
-    gap[..., 2] = np.angle(np.exp(1j * gap[..., 2]))
+    if turns:
+        gap[..., 2] = np.angle(np.exp(1j * gap[..., 2]))
     size = found.compiled.tables.size
     return float(np.abs(gap / np.array([size, size, 1.0])).max())

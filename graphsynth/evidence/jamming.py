@@ -142,8 +142,15 @@ def arc_problem(box: ToleranceBox, condition: Condition = "A", effort: Effort | 
         rows.append(replace(row, error=math.tau * swept.undecided_part, default=resolution == default))
     given = {"kind": "length of the steps in which the sign changes", "status": RowStatus.UNRELIABLE}
     given["reference"] = f"ends with {_DIGITS} digits lie in these steps"
+    linkage, bearing = box.nominal()
+
+    def sign_changes(count: int) -> int:
+        path = linkage.positions(np.linspace(0.0, math.tau, count + 1))
+        jams = bearing.interference(path.sin_theta, path.cos_theta, condition) > 0.0
+        return int((jams[1:] != jams[:-1]).sum())
+
     for count in (100, 300, 1000) if effort.quick else (100, 1000, 10_000, 100_000):
-        changes, *timed = best_of(partial(_sign_changes, box, condition, count), effort)
+        changes, *timed = best_of(partial(sign_changes, count), effort)
         # ends that share a step hide each other
         seen = changes == len({math.floor(end * count / math.tau) for end in ends}) == len(ends)
         why = "" if seen else "an arc lies between two samples and is not seen"
@@ -156,22 +163,15 @@ def _proved_row(method: str, setting: str, left: Any, ends: Sequence[float], tim
     """Row of a proof: the length of the angles left undecided, which must hold the ends."""
     from graphsynth.jamming.bearing.arcs import total_length
 
-    why = "" if all(_held(left, end) for end in ends) else "an end lies outside the angles left undecided"
+    def held(end: float) -> bool:
+        slack = 4.0 * math.ulp(end)  # the reference is rounded once
+        places = [end + turn for turn in (-math.tau, 0.0, math.tau)]
+        return any(low - slack <= at <= high + slack for low, high in left for at in places)
+
+    why = "" if all(map(held, ends)) else "an end lies outside the angles left undecided"
     against = f"none needed; checked to hold the ends with {_DIGITS} digits"
     more = {"kind": "length of the angles left undecided", "reference": against, "proved": True}
     return Row.of(method, setting, total_length(left), timed, why, **more)
-
-
-def _sign_changes(box: ToleranceBox, condition: Condition, count: int) -> int:
-    linkage, bearing = box.nominal()
-    path = linkage.positions(np.linspace(0.0, math.tau, count + 1))
-    jams = bearing.interference(path.sin_theta, path.cos_theta, condition) > 0.0
-    return int((jams[1:] != jams[:-1]).sum())
-
-
-def _held(spans: Sequence[Any], end: float) -> bool:
-    slack = 4.0 * math.ulp(end)  # the reference is rounded once
-    return any(low - slack <= end + turn <= high + slack for low, high in spans for turn in (-math.tau, 0.0, math.tau))
 
 
 def exact_largest(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A") -> Any:
@@ -244,7 +244,7 @@ def coupled_problem(
     from graphsynth.kinematics.simulation import simulate
 
     effort = effort or Effort()
-    rounds = Effort(1 if effort.quick else min(2, effort.rounds), effort.patience, effort.quick)
+    rounds = replace(effort, rounds=1 if effort.quick else min(2, effort.rounds))
 
     def turn(count: int) -> Motion:
         return simulate(mechanism, np.linspace(*inputs, count), events=False)

@@ -7,7 +7,7 @@ shares no formula with the closed forms or the kernels of the engine, which tell
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +32,6 @@ Closed = tuple[str, Callable[[Array], Complex]]
 _DIGITS = 50
 NODES = 12  # the reference is computed at these intervals of the range
 _REFERENCE = f"Newton's method with {_DIGITS} digits on the joint equations"
-_Made = tuple[Mechanism, Closed]
 _PROVED = "proved radius about every link's origin"
 _STEP = 6
 _POSITIONS = _STEP * NODES + 1
@@ -155,10 +154,14 @@ def position_problem(
     grids = [np.linspace(*inputs, n) for n in counts]
     rows: list[Row] = []
     if closed is not None:
-        rows += [_closed_row(closed, grid, truth, motion.Lc, effort) for grid in grids]
-        if not effort.quick:
-            rows.append(_closed_row(closed, np.linspace(*inputs, 120_001), truth, motion.Lc, effort))
-    rows += [_engine_row(mechanism, grid, truth, watched, motion.Lc, effort) for grid in grids]
+        more_grids = grids if effort.quick else [*grids, np.linspace(*inputs, 120_001)]
+        rows += [_closed_row(closed, grid, truth, motion.Lc, effort) for grid in more_grids]
+    for grid in grids:
+        found, *timed = best_of(partial(simulate, mechanism, grid), effort)
+        error, n = _gap(_point(found.poses, watched), truth, motion.Lc), len(grid)
+        more = {"many": n, "reference": _REFERENCE, "more": {"residual": found.residual}}
+        method = "engine, with events and derivatives"
+        rows.append(Row.of(method, f"{n} at once", error, timed, found.reason, **more))
     rows += [_root_row(mechanism, truth, watched, motion, tol, effort) for tol in (1e-4, 1e-8, 1e-12)]
     rows += [_proof_row(mechanism, grid, truth, watched, motion.Lc, effort) for grid in grids[:3]]
     return Problem("positions", f"Positions of {name} over the range of its input", "relative", tuple(rows), "position")
@@ -166,22 +169,18 @@ def position_problem(
 
 def precise_points(mechanism: Mechanism, inputs: Array) -> Complex:
     """Watched point at inputs (n,) with 50 digits, rounded once, shape (n,); the branch is that of `simulate`."""
+    import mpmath
+
     motion, watched = simulate(mechanism, inputs), _watched(mechanism)
     if not motion.completed:
         raise GeometryError(f"the motion ends: {motion.reason}")
-    return np.array(
-        [_precise_point(precise_poses(mechanism, float(u), p), watched) for u, p in zip(inputs, motion.poses)]
-    )
-
-
-def _precise_point(pose: list[list[Any]], watched: tuple[int, tuple[float, float]]) -> complex:
-    """Point of a 50-digit pose, rounded once."""
-    import mpmath
-
     link, at = watched
+    found = []
     with mpmath.workdps(_DIGITS):
-        x, y, theta = pose[link]
-        return complex(mpmath.mpc(x, y) + mpmath.expj(theta) * mpmath.mpc(*at))
+        for u, guess in zip(inputs, motion.poses):
+            x, y, theta = precise_poses(mechanism, float(u), guess)[link]
+            found.append(complex(mpmath.mpc(x, y) + mpmath.expj(theta) * mpmath.mpc(*at)))
+    return np.array(found)
 
 
 def _gap(found: Complex, truth: Complex, Lc: float) -> float:
@@ -194,13 +193,6 @@ def _closed_row(closed: Closed, grid: Array, truth: Complex, Lc: float, effort: 
     found, *timed = best_of(lambda: closed[1](grid), effort)
     n = len(grid)
     return Row.of(closed[0], f"{n} at once", _gap(found, truth, Lc), timed, many=n, reference=_REFERENCE)
-
-
-def _engine_row(mechanism: Mechanism, grid: Array, truth: Complex, watched: Any, Lc: float, effort: Effort) -> Row:
-    found, *timed = best_of(lambda: simulate(mechanism, grid), effort)
-    error, n = _gap(_point(found.poses, watched), truth, Lc), len(grid)
-    more = {"many": n, "reference": _REFERENCE, "more": {"residual": found.residual}}
-    return Row.of("engine, with events and derivatives", f"{n} at once", error, timed, found.reason, **more)
 
 
 def _root_row(mechanism: Mechanism, truth: Complex, watched: Any, motion: Motion, tol: float, effort: Effort) -> Row:
@@ -219,19 +211,16 @@ def _root_row(mechanism: Mechanism, truth: Complex, watched: Any, motion: Motion
         pose[free] = x.reshape(-1, 3) * size
         return pose
 
-    def driven(pose: Array, u: float) -> float:
-        (angle, _, _) = driver.law(np.array([u]))
-        return float(pose[driver.link, 2] - pose[driver.base, 2] - angle[0])
+    def left(x: Array, u: float) -> Array:
+        pose, (angle, _, _) = full(x), driver.law(np.array([u]))
+        driven = pose[driver.link, 2] - pose[driver.base, 2] - angle
+        return np.append(residual(mechanism.joints, pose) / motion.Lc, driven)
 
     def run() -> tuple[list[Array], str]:
         x = (motion.poses[0][free] / size).ravel()
         found: list[Array] = []
         for u in fine:
-            answer = root(
-                lambda y, u=u: np.append(residual(mechanism.joints, full(y)) / motion.Lc, driven(full(y), u)),
-                x,
-                tol=tol,
-            )
+            answer = root(left, x, args=(u,), tol=tol)
             if not answer.success:
                 return found, " ".join(answer.message.split())
             x = answer.x
@@ -284,7 +273,14 @@ def batch_problem(crank: float, largest: float, effort: Effort | None = None) ->
     True
     """
     effort = effort or Effort()
-    linkages = _crank_rockers(crank, largest, 4 if effort.quick else 12)
+    # crank-rockers well away from change points, always the same ones
+    random = np.random.default_rng(0)
+    linkages: list[TiltedFourBar] = []
+    while len(linkages) < (4 if effort.quick else 12):
+        l1, l3, l4 = random.uniform(1.2 * crank, largest, 3)
+        sides = sorted((l1, l3, l4))
+        if crank + sides[2] < sides[0] + sides[1] - 0.05 * crank:
+            linkages.append(TiltedFourBar(float(l1), crank, float(l3), float(l4)))
     f = np.linspace(0.0, math.tau, _POSITIONS)
     made = [four_bar(linkage) for linkage in linkages]
     truth = np.array([precise_points(mechanism, f[::_STEP]) for mechanism, _ in made])
@@ -298,26 +294,20 @@ def batch_problem(crank: float, largest: float, effort: Effort | None = None) ->
         more = {"kind": "largest distance from the reference over the longest link", "reference": _REFERENCE}
         return Row.of(method, f"{sets} sets", error, timed, why, many=sets * len(f), **more)
 
+    def engine(count: int) -> Complex:
+        return np.array([_point(simulate(mechanism, f).poses, _watched(mechanism)) for mechanism, _ in made[:count]])
+
+    def closed(count: int) -> Complex:
+        return np.array([form(f) for _, (_, form) in made[:count]])
+
     rows = []
     for sets in (len(made), 40, 400) if effort.quick else (1, len(made), 240, 2400, 24_000):
         for name, rates in (("batch engine", False), ("batch engine with derivatives", True)):
             rows.append(row(name, sets, partial(_batch, [m for m, _ in made], f, sets, rates)))
-    for name, each in (("engine, set by set", _engine), ("closed form, set by set", _closed)):
-        rows += [row(name, n, partial(each, made[:n], f)) for n in (1, len(made) // 2, len(made))]
+    for name, each in (("engine, set by set", engine), ("closed form, set by set", closed)):
+        rows += [row(name, n, partial(each, n)) for n in (1, len(made) // 2, len(made))]
     question = f"Positions of crank-rockers of many dimensions, {len(f)} crank angles each"
     return Problem("many-sets", question, "relative", tuple(rows), "position")
-
-
-def _crank_rockers(crank: float, largest: float, count: int) -> list[TiltedFourBar]:
-    """Draw crank-rockers well away from change points, always the same ones."""
-    random = np.random.default_rng(0)
-    found: list[TiltedFourBar] = []
-    while len(found) < count:
-        l1, l3, l4 = random.uniform(1.2 * crank, largest, 3)
-        sides = sorted((l1, l3, l4))
-        if crank + sides[2] < sides[0] + sides[1] - 0.05 * crank:
-            found.append(TiltedFourBar(float(l1), crank, float(l3), float(l4)))
-    return found
 
 
 def _batch(mechanisms: list[Mechanism], f: Array, sets: int, rates: bool) -> Complex:
@@ -328,11 +318,3 @@ def _batch(mechanisms: list[Mechanism], f: Array, sets: int, rates: bool) -> Com
     x, y, cosine, sine = np.moveaxis(found.frames[: len(mechanisms), :, 0], -1, 0)
     ends = np.array([_watched(mechanism)[1][0] for mechanism in mechanisms])[: len(x), None]
     return np.asarray(x + 1j * y + ends * (cosine + 1j * sine))
-
-
-def _engine(made: Sequence[_Made], f: Array) -> Complex:
-    return np.array([_point(simulate(mechanism, f).poses, _watched(mechanism)) for mechanism, _ in made])
-
-
-def _closed(made: Sequence[_Made], f: Array) -> Complex:
-    return np.array([closed(f) for _, (_, closed) in made])

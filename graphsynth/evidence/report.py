@@ -8,6 +8,7 @@ import os
 import platform
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -69,24 +70,18 @@ class AccuracyReport:
 
     def document(self) -> dict[str, Any]:
         """Return everything as plain data for JSON; numbers that do not exist are null."""
-        problems = []
-        for problem in self.problems:
-            rows = problem.to_pandas().to_dict("records")
-            problems.append(
-                {
-                    "name": problem.name,
-                    "question": problem.question,
-                    "unit": problem.unit,
-                    "per": problem.per,
-                    "note": problem.note,
-                    "rows": [{key: _plain(v) for key, v in row.items()} for row in rows],
-                    "advice": self.advice[problem.name],
-                    "knees": [
-                        {"method": k.method, "knee": k.knee.setting, "verdict": k.verdict, "sentence": k.sentence}
-                        for k in self.knees[problem.name]
-                    ],
-                }
-            )
+        problems = [
+            {
+                **{key: getattr(problem, key) for key in ("name", "question", "unit", "per", "note")},
+                "rows": [{k: _plain(v) for k, v in row.items()} for row in problem.to_pandas().to_dict("records")],
+                "advice": self.advice[problem.name],
+                "knees": [
+                    {"method": k.method, "knee": k.knee.setting, "verdict": k.verdict, "sentence": k.sentence}
+                    for k in self.knees[problem.name]
+                ],
+            }
+            for problem in self.problems
+        ]
         return {
             "scene": self.scene,
             "machine": self.machine,
@@ -172,29 +167,20 @@ def _why(error: BaseException) -> str:
 
 
 def _machine() -> str:
-    from importlib.metadata import version
+    from importlib.metadata import PackageNotFoundError, version
 
-    packages = ("numpy", "scipy", "numba", "mpmath", "python-flint")
-    versions = ", ".join(f"{name} {version(name)}" for name in packages if _installed(name))
-    return f"{_processor()}, {os.cpu_count()} threads (one used), Python {platform.python_version()}, {versions}"
-
-
-def _installed(name: str) -> bool:
-    from importlib.metadata import PackageNotFoundError, distribution
-
-    try:
-        distribution(name)
-    except PackageNotFoundError:
-        return False
-    return True
-
-
-def _processor() -> str:
+    versions = []
+    for name in ("numpy", "scipy", "numba", "mpmath", "python-flint"):
+        with suppress(PackageNotFoundError):
+            versions.append(f"{name} {version(name)}")
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+        processor = next(names, sys.platform)
     except OSError:
-        return platform.processor() or platform.machine()
-    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), sys.platform)
+        processor = platform.processor() or platform.machine()
+    python = f"Python {platform.python_version()}"
+    return f"{processor}, {os.cpu_count()} threads (one used), {python}, {', '.join(versions)}"
 
 
 def summary(report: AccuracyReport) -> Iterable[str]:
@@ -262,19 +248,18 @@ def page(report: AccuracyReport, pictures: Mapping[str, str]) -> str:
 
     title = f"Error against run time: {report.scene}"
 
+    def number(value: float) -> str:
+        if math.isnan(value):
+            return ""
+        return f"{value:.0f}" if value == round(value) and abs(value) < 1e6 else f"{value:.2e}"
+
     def more(problem: Problem) -> list[str]:
         return list(dict.fromkeys(name for row in problem.rows for name in row.more))
 
-    body = template(_PAGE, number=_number, seconds=seconds_text).render(
+    body = template(_PAGE, number=number, seconds=seconds_text).render(
         report=report, title=title, pictures=pictures, more=more, nan=math.nan
     )
     return whole_page(title, _CSS + STYLE, body)
-
-
-def _number(value: float) -> str:
-    if math.isnan(value):
-        return ""
-    return f"{value:.0f}" if value == round(value) and abs(value) < 1e6 else f"{value:.2e}"
 
 
 def write_report(report: AccuracyReport, folder: Path) -> tuple[Path, ...]:

@@ -147,6 +147,11 @@ class Problem:
     sentences: Mapping[str, str] = field(default_factory=dict)
 
     @property
+    def floor(self) -> float:
+        """Errors below it count as equal: rounding, where the error is relative or an angle."""
+        return 1e-15 if self.unit in ("relative", "rad") else FLOOR
+
+    @property
     def methods(self) -> tuple[str, ...]:
         """Methods in the order of their first row."""
         return tuple(dict.fromkeys(row.method for row in self.rows))
@@ -288,13 +293,7 @@ def plans(module: str, *names: str) -> tuple[Plan, ...]:
 
 
 def imported(text: str, who: str) -> Callable[..., Any]:
-    """Import a function named as ``"package.module:function"``.
-
-    Raises
-    ------
-    SceneError
-        If the text does not name a function; it begins with `who`.
-    """
+    """Import a function named as ``"package.module:function"``; a `SceneError` that begins with `who` if it is none."""
     module, _, name = text.partition(":")
     try:
         function = getattr(import_module(module), name)

@@ -18,6 +18,7 @@ import re
 import runpy
 import tomllib
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cache
@@ -105,10 +106,7 @@ class Case:
 def read_cases(path: Path) -> list[Case]:
     """Read the cases of a TOML file; nothing of it is evaluated.
 
-    Raises
-    ------
-    SpecError
-        The file cannot be read, or a case is written wrongly: the sentence names file, case and key.
+    A `SpecError` names file, case and key if the file cannot be read, or a case is written wrongly.
     """
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -132,11 +130,8 @@ def read_cases(path: Path) -> list[Case]:
         }
         title = PAGES.get(table["id"].partition("-")[0]) or document.get("about", "").strip() or path.stem
         about = " ".join(table.get("about", "").split())
-        cases.append(
-            Case(
-                table["id"], table["title"], table.get("slow", False), about, title, path, tuple(table["step"]), common
-            )
-        )
+        own = (table["id"], table["title"], table.get("slow", False), about, title)
+        cases.append(Case(*own, path, tuple(table["step"]), common))
     return cases
 
 
@@ -257,11 +252,12 @@ def _functions(path: Path) -> dict[str, Any]:
 def _carry_out(step: dict[str, Any], names: dict[str, Any], checks: Checks) -> None:
     """Carry out a step; with ``for`` once for each set of values, whose names end with the step."""
     loops = step.get("for")
-    if loops is None:
-        _once(step, names, checks)
-        return
-    for scope in _scopes([loops] if isinstance(loops, str) else loops, names):
-        _once(step, scope, checks)
+    scopes = [names] if loops is None else _scopes([loops] if isinstance(loops, str) else loops, names)
+    for scope in scopes:
+        if "when" in step and not _value(step["when"], scope):
+            continue
+        with scope["mp"].workdps(step["digits"]) if "digits" in step else nullcontext():
+            _act(step, scope, checks)
 
 
 def _scopes(loops: list[str], names: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -273,16 +269,6 @@ def _scopes(loops: list[str], names: dict[str, Any]) -> Iterator[dict[str, Any]]
         scope = dict(names)
         _bind(targets, value, scope)
         yield from _scopes(loops[1:], scope)
-
-
-def _once(step: dict[str, Any], names: dict[str, Any], checks: Checks) -> None:
-    if "when" in step and not _value(step["when"], names):
-        return
-    if "digits" in step:
-        with names["mp"].workdps(step["digits"]):
-            _act(step, names, checks)
-    else:
-        _act(step, names, checks)
 
 
 def _act(step: dict[str, Any], names: dict[str, Any], checks: Checks) -> None:

@@ -114,25 +114,10 @@ class Checks:
     def value(
         self, what: str, given: Any, right: Any, *, relative: float = 0.0, absolute: float = 0.0, source: str = ""
     ) -> None:
-        """Compare a number; it may be off by ``relative * |right| + absolute``.
+        """Compare a number; it may be off by ``relative * |right| + absolute``, and must be equal if both are zero.
 
-        Parameters
-        ----------
-        what : str
-            What is compared.
-        given : number
-            What the library gave.
-        right : number or str
-            What is right; decimal text is read exactly.
-        relative, absolute : float
-            Allowed distance.  Both zero: the numbers must be equal.
-        source : str
-            Where ``right`` comes from, if not the source of the case.
-
-        Raises
-        ------
-        ValueError
-            If ``right`` is not finite: the case is written wrongly.
+        What is right may be decimal text, which is read exactly; `source` says where it comes from, if not from the
+        source of the case.  A `ValueError` says that it is not finite: the case is written wrongly.
         """
         wanted, found = exact(right), exact(given)
         if wanted is None:
@@ -140,10 +125,11 @@ class Checks:
         bound = Fraction(relative) * abs(wanted) + Fraction(absolute)
         error = math.inf if found is None else abs(found - wanted)
         status = Status.OK if error <= bound else Status.WRONG
-        shown = _as_float(error)
-        self.rows.append(
-            Check(what, _text(right), _text(given), source or self.source, shown, _as_float(bound), status)
-        )
+        self._add(status, what, _text(right), _text(given), source, _as_float(error), _as_float(bound))
+
+    def _add(self, status: Status, what: str, right: str, given: str, source: str, *numbers: float) -> None:
+        error, bound = numbers or (math.nan, math.nan)
+        self.rows.append(Check(what, right, given, source or self.source, error, bound, status))
 
     def values(
         self,
@@ -160,11 +146,8 @@ class Checks:
         for k, (found, wanted) in enumerate(zip_longest(given, right, fillvalue=missing)):
             name = f"{what} [{k}]"
             if found is missing or wanted is missing:
-                self.reports(
-                    name,
-                    "missing" if found is missing else _text(found),
-                    "nothing" if wanted is missing else _text(wanted),
-                )
+                shown = "missing" if found is missing else _text(found)
+                self.reports(name, shown, "nothing" if wanted is missing else _text(wanted))
             else:
                 self.value(name, found, wanted, relative=relative, absolute=absolute, source=source)
 
@@ -174,28 +157,22 @@ class Checks:
 
     def reports(self, what: str, given: Any, right: Any, *, source: str = "") -> None:
         """Require a report of something extreme: a status, an event, a flag, a proof withheld; others: `equals`."""
-        good = bool(given == right)
-        status = Status.FLAGGED if good else Status.WRONG
-        self.rows.append(Check(what, _text(right), _text(given), source or self.source, math.nan, math.nan, status))
+        self._add(Status.FLAGGED if given == right else Status.WRONG, what, _text(right), _text(given), source)
 
     def equals(self, what: str, given: Any, right: Any, *, source: str = "") -> None:
         """Require an answer that is no number with an error: a count, a list, a proved verdict; OK if it is right."""
-        good = bool(given == right)
-        status = Status.OK if good else Status.WRONG
-        self.rows.append(Check(what, _text(right), _text(given), source or self.source, math.nan, math.nan, status))
+        self._add(Status.OK if given == right else Status.WRONG, what, _text(right), _text(given), source)
 
     def holds(self, what: str, good: object, given: Any = "", right: str = "yes", *, source: str = "") -> None:
         """Require a statement to hold; ``given`` shows what was found."""
         shown = _text(given) if given != "" else ("yes" if good else "no")
-        status = Status.OK if good else Status.WRONG
-        self.rows.append(Check(what, right, shown, source or self.source, math.nan, math.nan, status))
+        self._add(Status.OK if good else Status.WRONG, what, right, shown, source)
 
     def mentions(self, what: str, given: str, *words: str, source: str = "") -> None:
         """Require a sentence for a person that contains all the words."""
-        lost = [word for word in words if word not in given]
+        good = given and all(word in given for word in words)
         right = " ... ".join(f"“{word}”" for word in words)
-        status = Status.WRONG if lost or not given else Status.FLAGGED
-        self.rows.append(Check(what, right, given, source or self.source, math.nan, math.nan, status))
+        self._add(Status.FLAGGED if good else Status.WRONG, what, right, given, source)
 
     def refused(self, what: str, call: Callable[[], object], *words: str, source: str = "") -> None:
         """Require a refusal: an exception of the library with one line that contains all the words."""
@@ -208,8 +185,7 @@ class Checks:
             else:
                 self.mentions(what, text, *words, source=source)
         else:
-            given = f"no refusal but {type(found).__name__}"
-            self.rows.append(Check(what, "a refusal", given, source or self.source, math.nan, math.nan, Status.WRONG))
+            self._add(Status.WRONG, what, "a refusal", f"no refusal but {type(found).__name__}", source)
 
 
 def _as_float(value: Any) -> float:

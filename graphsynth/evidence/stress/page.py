@@ -100,7 +100,9 @@ def _class(status: Status) -> str:
 
 def _case(outcome: Outcome) -> str:
     status, worst = outcome.status, outcome.worst
-    error = _error(worst) if worst and not math.isnan(worst.error) else ""
+    error = ""
+    if worst and not math.isnan(worst.error):
+        error = f"{worst.error:.1e} of {worst.bound:.1e}" if worst.error or worst.bound else "none: exact"
     opened = " open" if status is Status.WRONG else ""
     rows = "".join(map(_row, outcome.checks))
     reason = f'<p class="{_class(status)}">{escape(outcome.reason)}</p>' if outcome.reason else ""
@@ -113,20 +115,14 @@ def _case(outcome: Outcome) -> str:
     )
 
 
-def _error(check: Check) -> str:
-    return f"{check.error:.1e} of {check.bound:.1e}" if check.error or check.bound else "none: exact"
-
-
 def _row(check: Check) -> str:
-    numbers = ("", "") if math.isnan(check.error) else (f"{check.error:.2e}", f"{check.bound:.2e}")
+    numbers = ""
+    for name, value in (("error", check.error), ("allowed", check.bound)):
+        missing = math.isnan(check.error)
+        numbers += "<td></td>" if missing else f'<td class="num" data-name="{name}">{value:.2e}</td>'
     return (
         f'<tr><td>{escape(check.what)}</td><td data-name="right">{escape(check.right)}</td>'
-        f'<td data-name="given">{escape(check.given)}</td>{_number("error", numbers[0])}'
-        f"{_number('allowed', numbers[1])}"
+        f'<td data-name="given">{escape(check.given)}</td>{numbers}'
         f'<td class="{_class(check.status)}">{check.status.value}</td>'
         f'<td data-name="source of the right value">{escape(check.source)}</td></tr>'
     )
-
-
-def _number(name: str, text: str) -> str:
-    return f'<td class="num" data-name="{name}">{text}</td>' if text else "<td></td>"

@@ -29,9 +29,7 @@ class Outcome:
     Attributes
     ----------
     case : Case
-        The case.
     checks : tuple of Check
-        Its comparisons.
     seconds : float
         Wall time, with imports and compilation if they came first here.
     reason : str
@@ -61,7 +59,7 @@ class Outcome:
         numbers = [check for check in self.checks if not math.isnan(check.error)]
         if wrong or not numbers:
             return wrong[0] if wrong else None
-        return max(numbers, key=_nearness)
+        return max(numbers, key=lambda c: c.error and (c.error / c.bound if c.bound else math.inf))
 
     def summary(self) -> dict[str, Any]:
         """Plain data of the outcome with all its checks; numbers that are none are None."""
@@ -149,12 +147,6 @@ class StressReport:
             "seconds": round(self.seconds, 3),
             "cases": [outcome.summary() for outcome in self.outcomes],
         }
-
-
-def _nearness(check: Check) -> float:
-    if check.error == 0.0:
-        return 0.0
-    return check.error / check.bound if check.bound else math.inf
 
 
 def run_case(case: Case) -> Outcome:

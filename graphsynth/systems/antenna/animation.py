@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.moving import Moving
 from graphsynth.drawing.svg import painted, words
+from graphsynth.systems.antenna.model import Poses, crank_direction, joints, legs
 
 if TYPE_CHECKING:
     from graphsynth.systems.antenna.mechanism import PointingMechanism
@@ -53,7 +54,7 @@ def pointing_animation(
     if poses.a.ndim != 1 or poses.a.size < 2 or not poses.assembled.all():
         raise GeometryError("an animation needs at least two poses, all of which can be assembled; shorten the scan")
     drawing = Moving(620.0, 400.0, seconds, int(poses.a.size // 8))
-    _Space(mechanism, poses.phi_x, poses.phi_y, poses.rotation).draw(drawing)
+    _Space(mechanism, poses).draw(drawing)
     _beam(drawing, np.degrees(poses.b), np.degrees(poses.a))
     return drawing.svg(title)
 
@@ -61,21 +62,14 @@ def pointing_animation(
 class _Space:
     """Both legs and the reflector, projected to the left part of the page."""
 
-    def __init__(self, mechanism: PointingMechanism, x: Array, y: Array, R: Array) -> None:
-        l1, l2, l3, l4, l5 = mechanism.lengths
-        zero = np.zeros_like(x)
+    def __init__(self, mechanism: PointingMechanism, poses: Poses) -> None:
+        l1, R = mechanism.l1, poses.rotation
         self.l1, self.R, self.order = l1, R, mechanism.order
-        self.pivot = np.array([[0.0, l1 - l3, -l2], [l1 - l5, 0.0, -l4]])
-        arm_y = np.stack([zero, l3 * np.cos(x), l3 * np.sin(x)], -1)
-        arm_x = np.stack([l5 * np.cos(y), zero, -l5 * np.sin(y)], -1)
-        self.ball = [self.pivot[0] + arm_y, self.pivot[1] + arm_x]
-        self.cardan = [l1 * R[..., :, 1], l1 * R[..., :, 0]]
+        self.pivot, self.ball, self.cardan = zip(*joints(mechanism, poses))
         turn = np.linspace(0.0, math.tau, _CIRCLE, endpoint=False)
-        C, S, Z = np.cos(turn), np.sin(turn), np.zeros_like(turn)
-        self.rim = l1 * np.stack([C, S, Z], -1)
+        self.rim = l1 * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], -1)
         self.circles = [
-            self.pivot[0] + l3 * np.stack([Z, C, S], -1),
-            self.pivot[1] + l5 * np.stack([C, Z, -S], -1),
+            pivot + leg.crank * crank_direction(leg.name, turn) for pivot, leg in zip(self.pivot, legs(mechanism))
         ]
         everything = project(
             np.concatenate([*self.ball, *self.cardan, *self.circles, self.rim, l1 * R[..., :, 2], -l1 * R[..., :, 1]])
@@ -131,17 +125,14 @@ def _beam(drawing: Moving, azimuth: Array, elevation: Array) -> None:
     x, y = middle
     drawing.fixed(words("azimuth", x + half, y + 18.0, size=13.0, anchor="end"))
     drawing.fixed(words("elevation", x + 6.0, y - half + 4.0, size=13.0))
-    step = _nice(largest)
+    ticks = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 90.0)
+    step = max((tick for tick in ticks if tick <= 0.85 * largest), default=0.5)
     for sign in (-1, 1):
         at = half * step / largest * sign
         drawing.fixed(_still(np.array([[x + at, y - 4], [x + at, y + 4]]), "soft"))
         drawing.fixed(_still(np.array([[x - 4, y - at], [x + 4, y - at]]), "soft"))
         drawing.fixed(words(f"{sign * step:g}°", x + at, y - 9.0, size=13.0, anchor="middle"))
         drawing.fixed(words(f"{sign * step:g}°", x - 9.0, y - at + 4.0, size=13.0, anchor="end"))
-
-
-def _nice(largest: float) -> float:
-    return max((s for s in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 90.0) if s <= 0.85 * largest), default=0.5)
 
 
 def _still(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,45 +38,41 @@ def crank_arrays(phi_x: ArrayLike, phi_y: ArrayLike) -> tuple[Array, Array]:
     return x, y
 
 
-def poses(mechanism: PointingDimensions, phi_x: ArrayLike, phi_y: ArrayLike, s_y: int = 1, s_x: int = -1) -> Poses:
-    """Reflector angles at the given crank angles; see `PointingMechanism.poses`."""
+def poses(self: PointingDimensions, phi_x: ArrayLike, phi_y: ArrayLike, s_y: int = 1, s_x: int = -1) -> Poses:
+    """Reflector angles for crank angles, on one assembly mode (closed form, theory/antenna 5).
+
+    Accurate to a few units of rounding divided by ``margin_y`` and ``margin_x`` (estimated).  A pose that cannot be
+    assembled has NaN, a status and the deficit in length.
+
+    Parameters
+    ----------
+    phi_x, phi_y : array_like
+        Angles of the cranks of legs Y and X, radians, finite, broadcast against each other.
+    s_y, s_x : {+1, -1}
+        Branch signs; the defaults contain the rest pose.
+    """
     from graphsynth.systems.antenna.kernels.poses import triangular
 
     x, y = crank_arrays(phi_x, phi_y)
     signs = {"Y": sign("s_y", s_y), "X": sign("s_x", s_x)}
-    scale = scale_of(mechanism)
-    first, second = solution_order(mechanism, scale)
+    scale = scale_of(self)
+    first, second = solution_order(self, scale)
     inputs = {"Y": np.array(x).ravel(), "X": np.array(y).ravel()}  # writable copies: one compiled kernel
-    count = x.size
-    u, v, deficit, margin1, margin2 = np.empty((5, count))
-    status, close = np.empty(count, dtype=np.int8), np.empty(count, dtype=np.bool_)
+    u, v, deficit, margin1, margin2 = np.empty((5, x.size))
+    status, close = np.empty(x.size, dtype=np.int8), np.empty(x.size, dtype=np.bool_)
     triangular(
-        mechanism.l1 / scale,
+        self.l1 / scale,
         *(first.crank, first.rod, first.side, float(signs[first.name])),
         *(second.crank, second.rod, second.side, float(signs[second.name])),
         *(inputs[first.name], inputs[second.name]),
         *(u, v, status, deficit, margin1, margin2, close),
     )
-    status = np.array(_CODES[mechanism.order], dtype=np.int8)[status]
-    if mechanism.order == "YX":
-        a, b, margin_y, margin_x = v, u, margin2, margin1
-    else:
-        a, b, margin_y, margin_x = u, v, margin1, margin2
-    shape = x.shape
-    return Poses(
-        phi_x=x,
-        phi_y=y,
-        a=a.reshape(shape),
-        b=b.reshape(shape),
-        status=status.reshape(shape),
-        deficit=(deficit * scale).reshape(shape),
-        margin_y=margin_y.reshape(shape),
-        margin_x=margin_x.reshape(shape),
-        near_limit=close.reshape(shape),
-        s_y=int(s_y),
-        s_x=int(s_x),
-        order=mechanism.order,
-    )
+    status = np.array(_CODES[self.order], dtype=np.int8)[status]
+    outputs = {first.name: (u, margin1), second.name: (v, margin2)}
+    (a, margin_y), (b, margin_x) = outputs["Y"], outputs["X"]
+    found: tuple[Any, ...] = (a, b, status, deficit * scale, margin_y, margin_x, close)
+    a, b, status, deficit, margin_y, margin_x, close = (part.reshape(x.shape) for part in found)
+    return Poses(x, y, a, b, status, deficit, margin_y, margin_x, close, int(s_y), int(s_x), self.order)
 
 
 #: Branch signs ``(s_y, s_x)`` of the four modes; the rest pose lies on the first.
@@ -113,9 +110,16 @@ class PointingModes:
         return np.asarray(self.distinct.sum(axis=-1))
 
 
-def solve(mechanism: PointingDimensions, phi_x: ArrayLike, phi_y: ArrayLike) -> PointingModes:
-    """All assembly modes; see `PointingMechanism.solve`."""
-    found = [poses(mechanism, phi_x, phi_y, *signs) for signs in SIGNS]
+def solve(self: PointingDimensions, phi_x: ArrayLike, phi_y: ArrayLike) -> PointingModes:
+    """All assembly modes at the given crank angles: up to four, none twice.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.antenna import PointingMechanism
+    >>> PointingMechanism().solve(0.2, 0.3).count
+    array(4)
+    """
+    found = [poses(self, phi_x, phi_y, *signs) for signs in SIGNS]
     a, b, status, deficit = (
         np.stack([getattr(mode, name) for mode in found], axis=-1) for name in ("a", "b", "status", "deficit")
     )
@@ -187,8 +191,12 @@ class CrankAngles:
         )
 
 
-def _one_leg(leg: Leg, l1: float, point: Array, elbow: int) -> tuple[Array, ...]:
-    """Crank angle, status, deficit, margin of a leg whose cardan lies at ``point`` (P, Q, across), shape (..., 3)."""
+def _one_leg(leg: Leg, l1: float, point: Array, axis: Array, elbow: int, scale: float) -> tuple[Any, ...]:
+    """Crank angle, status, deficit, margin, branch sign of a leg whose cardan lies at ``point`` (P, Q, across).
+
+    ``point`` has the shape (..., 3), and so may ``axis``, the direction of its gimbal axis: the branch is the sense in
+    which turning about it stretches the rod.
+    """
     p, q, across = point[..., 0] - (l1 - leg.crank), point[..., 1] - leg.side * leg.rod, point[..., 2]
     reach = np.hypot(p, q)
     k = (p * p + q * q + across * across + (leg.crank - leg.rod) * (leg.crank + leg.rod)) / (2.0 * leg.crank)
@@ -197,62 +205,53 @@ def _one_leg(leg: Leg, l1: float, point: Array, elbow: int) -> tuple[Array, ...]
     status = np.where(rest < 0.0, CrankStatus.OUT_OF_REACH, status)
     status = np.where((reach == 0.0) & (k == 0.0), CrankStatus.INDETERMINATE, status).astype(np.int8)
     root = np.sqrt(np.where(status <= CrankStatus.DEAD_POINT, np.maximum(rest, 0.0), np.nan))
-    angle = np.arctan2(q * k + elbow * p * root, p * k - elbow * q * root)
+    phi = np.arctan2(q * k + elbow * p * root, p * k - elbow * q * root)
     deficit = np.where(status == CrankStatus.OUT_OF_REACH, np.abs(k) - reach, 0.0)
-    return angle, status, deficit, root / np.where(reach > 0.0, reach, np.nan)
-
-
-def _branch(leg: Leg, l1: float, phi: Array, point: Array, axis: Array) -> NDArray[np.int8]:
-    """Branch sign of a leg from the sense in which turning about its gimbal axis stretches the rod."""
-    ball = np.stack(
-        [l1 - leg.crank + leg.crank * np.cos(phi), leg.side * leg.rod + leg.crank * np.sin(phi), np.zeros_like(phi)], -1
-    )
-    pull = np.einsum("...i,...i->...", np.cross(axis, point), ball)
-    return np.asarray(np.nan_to_num(-np.sign(pull)), dtype=np.int8)
+    ball = l1 - leg.crank + leg.crank * np.cos(phi), leg.side * leg.rod + leg.crank * np.sin(phi), np.zeros_like(phi)
+    pull = np.einsum("...i,...i->...", np.cross(axis, point), np.stack(ball, -1))
+    branch = np.asarray(np.nan_to_num(-np.sign(pull)), dtype=np.int8)
+    return phi, status, deficit * scale, root / np.where(reach > 0.0, reach, np.nan), branch
 
 
 def cranks(
-    mechanism: PointingDimensions, a: ArrayLike, b: ArrayLike, elbow_y: int | None, elbow_x: int | None
+    self: PointingDimensions, a: ArrayLike, b: ArrayLike, elbow_y: int | None = None, elbow_x: int | None = None
 ) -> CrankAngles:
-    """Crank angles for a wanted pose; see `PointingMechanism.cranks`."""
+    """Crank angles that point the reflector (closed form, each leg by itself).
+
+    With the assembly mode on which `poses` returns to the wanted pose.
+
+    Parameters
+    ----------
+    a, b : array_like
+        Wanted elevation and azimuth, radians.
+    elbow_y, elbow_x : {+1, -1}, optional
+        Which of the two settings of each crank; by default those of the rest pose (-1 and +1).
+
+    Examples
+    --------
+    >>> from graphsynth.systems.antenna import PointingMechanism
+    >>> import numpy as np
+    >>> found = PointingMechanism().cranks(np.radians(10), np.radians(-5))
+    >>> np.degrees([found.phi_x, found.phi_y]).round(6).tolist()
+    [17.001794, -8.466231]
+    """
     wanted_a, wanted_b = np.broadcast_arrays(finite_array("a", a), finite_array("b", b))
-    scale = scale_of(mechanism)
-    leg_y, leg_x = legs(mechanism, scale)
+    scale = scale_of(self)
+    leg_y, leg_x = legs(self, scale)
     elbow_y = sign("elbow_y", leg_y.side if elbow_y is None else elbow_y)
     elbow_x = sign("elbow_x", leg_x.side if elbow_x is None else elbow_x)
-    l1 = mechanism.l1 / scale
-    R = orientation(wanted_a, wanted_b, mechanism.order)
+    l1 = self.l1 / scale
+    R = orientation(wanted_a, wanted_b, self.order)
     # coordinates (P, Q, across) of each leg: (y, z, x) for leg Y, (x, -z, y) for leg X; both are right-handed or not
     to_y, to_x = np.array([1, 2, 0]), np.array([0, 2, 1])
     flip = np.array([1.0, -1.0, 1.0])
     point_y, point_x = l1 * R[..., :, 1][..., to_y], l1 * R[..., :, 0][..., to_x] * flip
-    phi_x, status_y, deficit_y, margin_y = _one_leg(leg_y, l1, point_y, elbow_y)
-    phi_y, status_x, deficit_x, margin_x = _one_leg(leg_x, l1, point_x, elbow_x)
-    axis_y, axis_x = _gimbal_axes(wanted_a, wanted_b, mechanism.order)
-    s_y = _branch(leg_y, l1, phi_x, point_y, axis_y[..., to_y])
-    s_x = _branch(leg_x, l1, phi_y, point_x, axis_x[..., to_x] * flip)
-    return CrankAngles(
-        a=wanted_a,
-        b=wanted_b,
-        phi_x=phi_x,
-        phi_y=phi_y,
-        status_y=status_y.astype(np.int8),
-        status_x=status_x.astype(np.int8),
-        deficit_y=deficit_y * scale,
-        deficit_x=deficit_x * scale,
-        margin_y=margin_y,
-        margin_x=margin_x,
-        s_y=s_y,
-        s_x=s_x,
-    )
-
-
-def _gimbal_axes(a: Array, b: Array, order: str) -> tuple[Array, Array]:
-    """Directions in the ground about which the elevation and the azimuth turn the reflector."""
-    zero, one = np.zeros_like(a), np.ones_like(a)
-    if order == "YX":
-        return np.stack([np.cos(b), zero, -np.sin(b)], -1), np.stack([zero, one, zero], -1)
-    return np.stack([one, zero, zero], -1), np.stack([zero, np.cos(a), np.sin(a)], -1)
+    # the elevation turns the reflector about axis_y, the azimuth about axis_x: one is fixed, the other one carried
+    fixed = np.eye(3)
+    axis_y, axis_x = (R[..., :, 0], fixed[1]) if self.order == "YX" else (fixed[0], R[..., :, 1])
+    y = _one_leg(leg_y, l1, point_y, axis_y[..., to_y], elbow_y, scale)
+    x = _one_leg(leg_x, l1, point_x, axis_x[..., to_x] * flip, elbow_x, scale)
+    return CrankAngles(wanted_a, wanted_b, *(part for both in zip(y, x) for part in both))
 
 
 @dataclass(frozen=True)
@@ -345,15 +344,34 @@ def read_angles(
 
 
 def compare(
-    mechanism: PointingDimensions,
+    self: PointingDimensions,
     other: PointingDimensions,
     phi_x: ArrayLike,
-    phi_y: ArrayLike | None,
-    reading: Convention,
-    other_reading: Convention,
+    phi_y: ArrayLike | None = None,
+    *,
+    reading: Convention | None = None,
+    other_reading: Convention | None = None,
 ) -> ModelComparison:
-    """Compare two models; see `PointingMechanism.compare`."""
+    """Difference of two models over a sweep: gimbal order, lengths, senses, mounting, reading (theory/antenna 8).
+
+    Parameters
+    ----------
+    other : PointingMechanism
+    phi_x, phi_y : array_like
+        Crank angles, radians; ``phi_y = phi_x`` unless given.
+    reading, other_reading : Convention, optional
+        Conventions of each model.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.antenna import PointingMechanism
+    >>> import numpy as np
+    >>> found = PointingMechanism().compare(PointingMechanism(order="XY"), np.radians([15, 40]))
+    >>> found.arcminutes.round(6).tolist()
+    [0.656059, 30.989576]
+    """
     x, y = crank_arrays(phi_x, phi_x if phi_y is None else phi_y)
-    one, two = read_angles(mechanism, reading, x, y), read_angles(other, other_reading, x, y)
+    one = read_angles(self, reading or Convention(), x, y)
+    two = read_angles(other, other_reading or Convention(), x, y)
     a, b = np.stack([one[0], two[0]]), np.stack([one[1], two[1]])
     return ModelComparison(x, y, a, b, np.stack([one[2], two[2]]))

@@ -115,15 +115,6 @@ def _critical_points(c1: float, s1: float, c2: float, s2: float) -> list[float]:
     return points
 
 
-class AtFold(NamedTuple):
-    """Outputs at a fold, its square-root coefficient, and the side on which the mechanism can be assembled."""
-
-    a: float
-    b: float
-    coefficient: float
-    side: int
-
-
 class _Own(NamedTuple):
     """P, Q, K of a leg and their derivatives along the path."""
 
@@ -133,6 +124,16 @@ class _Own(NamedTuple):
     dp: float
     dq: float
     dk: float
+
+    def touching(self) -> tuple[float, float, int]:
+        """Output of the leg at its fold, from ``atan2`` without the square root; coefficient and assembled side.
+
+        ``C = sqrt(2 |dF/dt| / |d2F/dy2|)`` with ``F = A cos y + B sin y - K``; there ``d2F/dy2 = -K``.  The root is
+        real for growing t if ``dF + F_yy dy^2 / 2 = 0`` says so.
+        """
+        y = math.remainder(math.atan2(self.q, self.p) + (0.0 if self.k > 0.0 else math.pi), math.tau)
+        slope = self.dp * math.cos(y) + self.dq * math.sin(y) - self.dk
+        return y, math.sqrt(2.0 * abs(slope / self.k)), 1 if slope * self.k > 0.0 else -1
 
 
 @dataclass(frozen=True)
@@ -164,66 +165,42 @@ class Path:
         k = 0.5 * (l1 * l1 + p * p + s * (2.0 * leg.side * leg.rod + s)) / l1
         return _Own(p, q, k, -s * rate, c * rate, rate * (q * c - p * s) / l1)
 
-    def first(self, t: float) -> float:
-        """Angle u of the fixed gimbal axis; NaN out of reach."""
-        leg, _, l1 = self.legs()
-        own = self._own(leg, l1, t)
-        square = own.p * own.p + own.q * own.q
-        rest = square - own.k * own.k
+    def _output(self, leg: Leg, own: _Own, factor: float = 1.0) -> float:
+        """Output of a leg whose Q counts ``factor`` times; NaN out of reach."""
+        p, q, k = own.p, factor * own.q, own.k
+        square = p * p + q * q
+        rest = square - k * k
         if rest < 0.0 or square == 0.0:
             return math.nan
         root = self.sign(leg) * math.sqrt(rest)
-        return math.atan2(own.q * own.k + own.p * root, own.p * own.k - own.q * root)
+        return math.atan2(q * k + p * root, p * k - q * root)
 
-    def discriminant(self, t: float, which: int) -> float:
-        """``A^2 + B^2 - K^2`` of the first (0) or second (1) leg, scaled; NaN where the first is out of reach."""
-        first, second, l1 = self.legs()
-        if which == 0:
-            own = self._own(first, l1, t)
-            return own.p * own.p + own.q * own.q - own.k * own.k
-        u = self.first(t)
-        own = self._own(second, l1, t)
-        q = own.q * math.cos(u)
+    def first(self, t: float) -> float:
+        """Angle u of the fixed gimbal axis; NaN out of reach."""
+        leg, _, l1 = self.legs()
+        return self._output(leg, self._own(leg, l1, t))
+
+    def discriminant(self, t: float, leg: Leg) -> float:
+        """``A^2 + B^2 - K^2`` of a leg, scaled; NaN for the second one where the first is out of reach."""
+        first, _, l1 = self.legs()
+        own = self._own(leg, l1, t)
+        q = own.q if leg == first else own.q * math.cos(self.first(t))
         return own.p * own.p + q * q - own.k * own.k
 
-    def at_fold(self, name: str, t: float) -> AtFold:
-        """Return what happens at a fold of leg ``name``; its own output comes from ``atan2`` without the square root.
-
-        ``C = sqrt(2 |dF/dt| / |d2F/dy2|)`` with ``F = A cos y + B sin y - K``; there ``d2F/dy2 = -K``.
-        """
+    def at_fold(self, name: str, t: float) -> tuple[float, float, float, int]:
+        """Elevation, azimuth, square-root coefficient and assembled side (+1: for growing t) at a fold of a leg."""
         first, second, l1 = self.legs()
-        one = self._own(first, l1, t)
-        turned = 0.0 if one.k > 0.0 else math.pi
+        one, two = self._own(first, l1, t), self._own(second, l1, t)
         if first.name == name:
-            u = math.remainder(math.atan2(one.q, one.p) + turned, math.tau)
-            slope = one.dp * math.cos(u) + one.dq * math.sin(u) - one.dk
-            v = self._second_output(second, l1, t, u)
-            coefficient, side = _square_root(slope, one.k)
+            u, coefficient, side = one.touching()
+            v = self._output(second, two, math.cos(u))
         else:
             u = self.first(t)
-            two = self._own(second, l1, t)
-            f_u = -one.p * math.sin(u) + one.q * math.cos(u)
-            du = -(one.dp * math.cos(u) + one.dq * math.sin(u) - one.dk) / f_u if f_u != 0.0 else math.nan
-            b = two.q * math.cos(u)
-            db = two.dq * math.cos(u) - two.q * math.sin(u) * du
-            v = math.remainder(math.atan2(b, two.p) + (0.0 if two.k > 0.0 else math.pi), math.tau)
-            slope = two.dp * math.cos(v) + db * math.sin(v) - two.dk
-            coefficient, side = _square_root(slope, two.k)
-        return AtFold(u, v, coefficient, side) if first.name == "Y" else AtFold(v, u, coefficient, side)
-
-    def _second_output(self, second: Leg, l1: float, t: float, u: float) -> float:
-        own = self._own(second, l1, t)
-        q = own.q * math.cos(u)
-        rest = own.p * own.p + q * q - own.k * own.k
-        if rest < 0.0:
-            return math.nan
-        root = self.sign(second) * math.sqrt(rest)
-        return math.atan2(q * own.k + own.p * root, own.p * own.k - q * root)
-
-
-def _square_root(slope: float, k: float) -> tuple[float, int]:
-    """Return the coefficient, and +1 if the root is real for growing t: ``dF + F_yy dy^2 / 2 = 0``."""
-    return math.sqrt(2.0 * abs(slope / k)), 1 if slope * k > 0.0 else -1
+            c, s = math.cos(u), math.sin(u)
+            f_u = -one.p * s + one.q * c
+            du = -(one.dp * c + one.dq * s - one.dk) / f_u if f_u != 0.0 else math.nan
+            v, coefficient, side = two._replace(q=two.q * c, dq=two.dq * c - two.q * s * du).touching()
+        return (u, v, coefficient, side) if first.name == "Y" else (v, u, coefficient, side)
 
 
 @dataclass(frozen=True)
@@ -268,13 +245,12 @@ class Fold:
     @property
     def message(self) -> str:
         """One sentence for the user."""
-        output = (
-            f"{'elevation' if self.leg == 'Y' else 'azimuth'} {math.degrees(self.a if self.leg == 'Y' else self.b):.6f}"
-        )
+        name, angle = ("elevation", self.a) if self.leg == "Y" else ("azimuth", self.b)
         where = f"phi_x = {math.degrees(self.phi_x):.6f} deg, phi_y = {math.degrees(self.phi_y):.6f} deg"
         first, second = self.merging
         what = "meet" if self.order == 2 else "cross, and which one the motion takes is not determined"
-        return f"fold of leg {self.leg} at {where}, {output} deg: modes {first} and {second} {what}"
+        where += f", {name} {math.degrees(angle):.6f} deg"
+        return f"fold of leg {self.leg} at {where}: modes {first} and {second} {what}"
 
 
 def less_square(c0: float, c1: float, s1: float, twice: float, k: tuple[float, float, float]) -> Coefficients:
@@ -296,17 +272,6 @@ def _coefficients(leg: Leg, l1: float, c: float) -> Coefficients:
     c2 = c * c
     c0 = p * p + 0.5 * k * k + c2 * (q * q + 0.5 * k * k)
     return less_square(c0, 2 * p * k, 2 * c2 * q * k, k * k * (1 - c2), square)
-
-
-def _planar_folds(leg: Leg, l1: float) -> list[TrigRoot]:
-    """Crank angles with ``|S| = l1 + rod`` or ``|S| = |l1 - rod|``."""
-    k, r, p = leg.crank, leg.rod, l1 - leg.crank
-    found = []
-    for outer in (1.0, -1.0):
-        # (l1 +- rod)^2 - p^2 - k^2 - rod^2 with the squares of rod and l1 taken out
-        goal = 2.0 * k * (l1 - k) + outer * 2.0 * l1 * r
-        found += sinusoid_roots(2.0 * p * k, 2.0 * leg.side * r * k, goal)
-    return sorted(found)
 
 
 class OneLeg(NamedTuple):
@@ -342,24 +307,53 @@ def one_leg(mechanism: PointingDimensions, leg: str, phi_other: float, s_other: 
     return OneLeg(second, l1, False, u, sign)
 
 
-def folds(mechanism: PointingDimensions, leg: str, phi_other: float, s_other: int | None) -> tuple[Fold, ...]:
-    """All folds of one leg over a turn of its crank; see `PointingMechanism.folds`."""
+def folds(
+    self: PointingDimensions, leg: str, phi_other: float = 0.0, *, s_other: int | None = None
+) -> tuple[Fold, ...]:
+    """All folds of one leg over a full turn of its crank, with place, output, order and coefficient (theory/antenna 7).
+
+    Sorted by crank angle.  The output of the other leg is NaN where that leg does not reach; a `GeometryError` says
+    that the fold depends on it there.
+
+    Parameters
+    ----------
+    leg : {"Y", "X"}
+    phi_other : float
+        Angle of the other crank, radians.
+    s_other : {+1, -1}, optional
+        Branch of the other leg; by default that of the rest pose.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.antenna import PointingMechanism
+    >>> PointingMechanism().folds("X")
+    ()
+    >>> len(PointingMechanism(l3=0.12, l5=0.12).folds("X"))
+    4
+    """
     other_angle = finite("phi_other", phi_other)
-    own = one_leg(mechanism, leg, other_angle, s_other)
-    polynomial = _coefficients(own.leg, own.l1, math.cos(own.u))
-    roots = _planar_folds(own.leg, own.l1) if own.is_first else quadratic_roots(polynomial)
+    own = one_leg(self, leg, other_angle, s_other)
+    if own.is_first:  # |S| = l1 + rod or |S| = |l1 - rod|
+        roots = []
+        for outer in (1.0, -1.0):
+            crank, rod = own.leg.crank, own.leg.rod
+            # (l1 +- rod)^2 - p^2 - k^2 - rod^2 with the squares of rod and l1 taken out
+            goal = 2.0 * crank * (own.l1 - crank) + outer * 2.0 * own.l1 * rod
+            roots += sinusoid_roots(2.0 * (own.l1 - crank) * crank, 2.0 * own.leg.side * rod * crank, goal)
+        roots.sort()
+    else:
+        roots = quadratic_roots(_coefficients(own.leg, own.l1, math.cos(own.u)))
     offset = (0.0, other_angle) if leg == "Y" else (other_angle, 0.0)
     direction = (1.0, 0.0) if leg == "Y" else (0.0, 1.0)
     signs = (1, own.sign) if leg == "Y" else (own.sign, -1)
-    path = Path(mechanism, offset, direction, *signs)
+    path = Path(self, offset, direction, *signs)
     return tuple(fold_on_path(path, leg, root.angle, root.order) for root in roots)
 
 
 def fold_on_path(path: Path, leg: str, parameter: float, multiplicity: int = 1) -> Fold:
     """Describe a fold whose place on a path is known."""
-    at = path.at_fold(leg, parameter)
+    a, b, coefficient, side = path.at_fold(leg, parameter)
     merging = ((1, path.s_x), (-1, path.s_x)) if leg == "Y" else ((path.s_y, 1), (path.s_y, -1))
     phi_x, phi_y = (path.offset[i] + parameter * path.direction[i] for i in (0, 1))
-    pose = (phi_x, phi_y, at.a, at.b)
-    end = (at.coefficient, at.side, 2) if multiplicity == 1 else (math.nan, 0, 1)
-    return Fold(leg, parameter, path.offset, path.direction, *pose, *end, merging)
+    end = (coefficient, side, 2) if multiplicity == 1 else (math.nan, 0, 1)
+    return Fold(leg, parameter, path.offset, path.direction, phi_x, phi_y, a, b, *end, merging)

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.antenna.closed_form import crank_arrays, poses
-from graphsynth.systems.antenna.model import PointingDimensions, Poses
+from graphsynth.systems.antenna.model import PointingDimensions, Poses, joints
 
 Array = NDArray[np.float64]
 
@@ -51,21 +51,10 @@ def _turn(axis: int, angle: Array) -> Array:
     return matrix
 
 
-def _ball_joints(mechanism: PointingDimensions, poses: Poses) -> tuple[Array, Array]:
-    """Return positions of the two ball joints in the ground, shape (..., 3)."""
-    l1, l2, l3, l4, l5 = mechanism.lengths
-    zero = np.zeros(np.shape(poses.phi_x))
-    y = np.stack([zero, l1 - l3 + l3 * np.cos(poses.phi_x), -l2 + l3 * np.sin(poses.phi_x)], -1)
-    x = np.stack([l1 - l5 + l5 * np.cos(poses.phi_y), zero, -l4 - l5 * np.sin(poses.phi_y)], -1)
-    return y, x
-
-
 def _rotations(mechanism: PointingDimensions, poses: Poses) -> tuple[Array, Array, Array, Array]:
     """Return cardan angles (..., 2) of legs Y and X and the rotations E_Y, E_X of their ball joints."""
     R = poses.rotation
-    ball_y, ball_x = _ball_joints(mechanism, poses)
-    dy = np.einsum("...ji,...j->...i", R, ball_y - mechanism.l1 * R[..., :, 1])
-    dx = np.einsum("...ji,...j->...i", R, ball_x - mechanism.l1 * R[..., :, 0])
+    dy, dx = (np.einsum("...ji,...j->...i", R, ball - cardan) for _, ball, cardan in joints(mechanism, poses))
     x2, x1 = np.arctan2(dy[..., 0], np.hypot(dy[..., 1], dy[..., 2])), np.arctan2(-dy[..., 1], -dy[..., 2])
     x8, x7 = np.arctan2(-dx[..., 1], np.hypot(dx[..., 0], dx[..., 2])), np.arctan2(dx[..., 0], -dx[..., 2])
     E_y = _turn(0, -poses.phi_x) @ R @ _turn(0, -x1) @ _turn(1, -x2)
@@ -73,9 +62,9 @@ def _rotations(mechanism: PointingDimensions, poses: Poses) -> tuple[Array, Arra
     return np.stack([x1, x2], -1), np.stack([x7, x8], -1), E_y, E_x
 
 
-def passive_angles(mechanism: PointingDimensions, poses: Poses) -> PassiveAngles:
-    """All twelve unknowns of the corrected loop equations for known poses; see `PointingMechanism.passive_angles`."""
-    cardan_y, cardan_x, E, F = _rotations(mechanism, poses)
+def passive_angles(self: PointingDimensions, poses: Poses) -> PassiveAngles:
+    """Angles of all passive joints at known poses: the twelve unknowns of the loop equations (theory/antenna 5)."""
+    cardan_y, cardan_x, E, F = _rotations(self, poses)
     x = np.empty((*np.shape(poses.a), 12))
     x[..., 0:2], x[..., 6:8] = cardan_y, cardan_x
     x[..., 2] = np.arctan2(-E[..., 1, 2], E[..., 1, 1])
@@ -170,12 +159,6 @@ def _matrix(step: _Turn | _Shift, angles: Array) -> Array:
     return made
 
 
-def _generator(axis: int) -> Array:
-    made = np.zeros((4, 4))
-    made[(axis + 2) % 3, (axis + 1) % 3], made[(axis + 1) % 3, (axis + 2) % 3] = 1.0, -1.0
-    return made
-
-
 def _product(steps: list[_Turn | _Shift], angles: Array) -> tuple[Array, dict[int, Array]]:
     """Return the product of the steps and its derivative by every source that occurs in it."""
     matrices = [_matrix(step, angles) for step in steps]
@@ -187,7 +170,10 @@ def _product(steps: list[_Turn | _Shift], angles: Array) -> tuple[Array, dict[in
     for step, matrix, rest in zip(steps, matrices, reversed(behind)):
         before = before @ matrix
         if isinstance(step, _Turn) and step.source != _FIXED:
-            derivatives[step.source] = step.factor * (before @ _generator(step.axis) @ rest)
+            i, j = (step.axis + 1) % 3, (step.axis + 2) % 3
+            generator = np.zeros((4, 4))
+            generator[j, i], generator[i, j] = 1.0, -1.0
+            derivatives[step.source] = step.factor * (before @ generator @ rest)
     return before, derivatives
 
 
@@ -276,37 +262,48 @@ class ChartReport:
         return float(self.singular_values[0]) / smallest if smallest > 0.0 else float("inf")
 
 
-def _singular_values(
-    mechanism: PointingDimensions, x: NDArray[np.float64], phi: NDArray[np.float64], chart: str, scaled: bool
-) -> tuple[NDArray[np.float64], int]:
-    values = np.linalg.svd(loop_equations(mechanism, x[None], phi[None], chart, scaled=scaled).jacobian[0])[1]
-    return values, int((values > RANK_TOLERANCE * values[0]).sum())
-
-
 def check_chart(
-    mechanism: PointingDimensions, phi_x: float, phi_y: float, chart: str, s_y: int, s_x: int, scaled: bool
+    self: PointingDimensions,
+    phi_x: float,
+    phi_y: float,
+    chart: str = "corrected",
+    *,
+    s_y: int = 1,
+    s_x: int = -1,
+    scaled: bool = True,
 ) -> ChartReport:
-    """Judge the coordinates at a pose; see `PointingMechanism.check_chart`."""
+    """Judge the coordinates of the loop equations at a pose: rank, condition, verdict (theory/antenna 4).
+
+    A `GeometryError` refuses another chart, and a pose that cannot be assembled.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.antenna import PointingMechanism
+    >>> report = PointingMechanism().check_chart(0.0, 0.0, "printed")
+    >>> report.rank, report.verdict, report.use
+    (11, 'coordinates singular, mechanism regular', 'corrected')
+    """
     if chart not in CHARTS:
         raise GeometryError(f"chart = {chart!r} is unknown; use one of {', '.join(map(repr, CHARTS))}")
-    pose = poses(mechanism, phi_x, phi_y, s_y, s_x)
+    pose = poses(self, phi_x, phi_y, s_y, s_x)
     if not pose.assembled:
         raise GeometryError(f"no rank at phi_x = {phi_x}, phi_y = {phi_y}: {pose.reasons()[0]}; choose another pose")
-    corrected = passive_angles(mechanism, pose).x
+    corrected = passive_angles(self, pose).x
     printed = corrected.copy()
-    printed[2:5] = printed_ball_joint(mechanism, pose)
-    unknowns = {"corrected": corrected, "printed": printed}
+    printed[2:5] = printed_ball_joint(self, pose)
     phi = np.array([float(phi_x), float(phi_y)])
-    found = {name: _singular_values(mechanism, unknowns[name], phi, name, scaled) for name in CHARTS}
-    values, rank = found[chart]
-    other_rank = found[CHARTS[1 - CHARTS.index(chart)]][1]
+    values, ranks = {}, {}
+    for name, x in (("corrected", corrected), ("printed", printed)):
+        jacobian = loop_equations(self, x[None], phi[None], name, scaled=scaled).jacobian[0]
+        values[name] = np.linalg.svd(jacobian, compute_uv=False)
+        ranks[name] = int((values[name] > RANK_TOLERANCE * values[name][0]).sum())
     margin = float(min(pose.margin_x, pose.margin_y))
-    regular = [name for name in CHARTS if found[name][1] == 12]
+    verdict = "regular" if ranks[chart] == 12 else "coordinates singular, mechanism regular"
     if margin < RANK_TOLERANCE:
         verdict = "mechanism singular"
-    else:
-        verdict = "regular" if rank == 12 else "coordinates singular, mechanism regular"
-    return ChartReport(chart, rank, values, other_rank, margin, verdict, regular[0] if regular else "")
+    other = ranks["printed" if chart == "corrected" else "corrected"]
+    use = next((name for name in CHARTS if ranks[name] == 12), "")
+    return ChartReport(chart, ranks[chart], values[chart], other, margin, verdict, use)
 
 
 #: A residual (lengths divided by l1) below this is a root.
@@ -382,7 +379,10 @@ def newton(
     last, iterations = np.full(len(x), np.inf), np.zeros(len(x), dtype=np.int64)
     active = np.arange(len(x))
     for _ in range(limit):
-        step = _steps(found.jacobian, found.residual)
+        try:
+            step = np.linalg.solve(found.jacobian, found.residual[..., None])[..., 0]
+        except np.linalg.LinAlgError:
+            step = (np.linalg.pinv(found.jacobian, rcond=1e-13) @ found.residual[..., None])[..., 0]
         length = np.abs(step).max(axis=1)
         factor = np.minimum(1.0, 1.0 / np.maximum(length, 1e-300))  # no step turns a joint by more than 1 rad
         for _ in range(12):
@@ -402,17 +402,31 @@ def newton(
     return x, size, last, iterations
 
 
-def _steps(jacobian: Array, residual: Array) -> Array:
-    try:
-        return np.asarray(np.linalg.solve(jacobian, residual[..., None])[..., 0])
-    except np.linalg.LinAlgError:
-        return np.asarray((np.linalg.pinv(jacobian, rcond=1e-13) @ residual[..., None])[..., 0])
-
-
 def solve_loops(
-    mechanism: PointingDimensions, phi_x: ArrayLike, phi_y: ArrayLike, start: ArrayLike | None, chart: str
+    self: PointingDimensions,
+    phi_x: ArrayLike,
+    phi_y: ArrayLike,
+    *,
+    start: ArrayLike | None = None,
+    chart: str = "corrected",
 ) -> LoopSolution:
-    """Solve the twelve equations; see `PointingMechanism.solve_loops`."""
+    """Solve the twelve loop equations by Newton's method, without the closed form (theory/antenna 3).
+
+    Parameters
+    ----------
+    phi_x, phi_y : array_like
+        Crank angles, radians.
+    start : array_like, shape (..., 12), optional
+        Unknowns to start from; by default the rest pose, followed to the given angles in small steps.
+    chart : {"corrected", "printed"}
+        "printed" turns the ball joint of leg Y about y, x, y as the source does, which is singular at rest; without
+        ``start`` this is noticed and the regular coordinates are used.
+
+    Returns
+    -------
+    LoopSolution
+        Roots whose orientations do not agree are rejected.
+    """
     given_x, given_y = crank_arrays(phi_x, phi_y)
     phi = np.stack([given_x.ravel(), given_y.ravel()], axis=1)
     n = len(phi)
@@ -420,7 +434,7 @@ def solve_loops(
     message = f"coordinates {chart!r}"
     if start is None:
         # every angle is zero at rest, in any coordinates and for any lengths
-        report = check_chart(mechanism, 0.0, 0.0, chart, 1, -1, scaled=True)
+        report = check_chart(self, 0.0, 0.0, chart)
         ranks = np.full(n, report.rank, dtype=np.int64)
         if report.rank < 12 and report.use:
             message = (
@@ -430,14 +444,14 @@ def solve_loops(
         x = np.zeros((n, 12))
         stages = max(1, int(np.ceil(np.abs(phi).max(initial=0.0) / STEP)))
         for stage in range(1, stages):
-            x, _, _, used = newton(mechanism, x, phi * (stage / stages), chart)
+            x, _, _, used = newton(self, x, phi * (stage / stages), chart)
             total += used
     else:
         x = np.broadcast_to(np.asarray(start, dtype=np.float64), (*given_x.shape, 12)).reshape(n, 12)
-        values = np.linalg.svd(loop_equations(mechanism, x, phi, chart).jacobian, compute_uv=False)
+        values = np.linalg.svd(loop_equations(self, x, phi, chart).jacobian, compute_uv=False)
         ranks = (values > RANK_TOLERANCE * values[:, :1]).sum(axis=1)
-    x, size, last, used = newton(mechanism, x, phi, chart)
-    traces = loop_equations(mechanism, x, phi, chart).traces
+    x, size, last, used = newton(self, x, phi, chart)
+    traces = loop_equations(self, x, phi, chart).traces
     converged = size < RESIDUAL
     genuine = converged & (np.abs(traces - 3.0) < 1e-6).all(axis=1)
     shape = given_x.shape
@@ -456,13 +470,16 @@ def solve_loops(
 
 
 def survey_roots(
-    mechanism: PointingDimensions, phi_x: float, phi_y: float, starts: int, seed: int, chart: str
+    self: PointingDimensions, phi_x: float, phi_y: float, *, starts: int = 200, seed: int = 0, chart: str = "corrected"
 ) -> RootSurvey:
-    """Newton's method from random starts at one pose; see `PointingMechanism.survey_roots`."""
+    """Newton's method from random starts: genuine roots by assembly mode, false orientation roots counted.
+
+    A `GeometryError` refuses fewer than one start.
+    """
     if starts < 1:
         raise GeometryError(f"starts = {starts} must be at least 1; give a number of random starts")
     random = np.random.default_rng(seed).uniform(-np.pi, np.pi, (starts, 12))
-    found = solve_loops(mechanism, np.full(starts, phi_x), np.full(starts, phi_y), random, chart)
+    found = solve_loops(self, np.full(starts, phi_x), np.full(starts, phi_y), start=random, chart=chart)
     pairs = found.x[found.genuine][:, [5, 11]]
     modes: list[Array] = []
     for pair in pairs[np.lexsort(pairs.T[::-1])] if len(pairs) else pairs:

@@ -12,9 +12,9 @@ where a leg of crank ``c`` and rod ``r`` has its ball joint at ``P = l1 - c + c 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,10 @@ class PointingDimensions:
         """The five lengths l1 to l5."""
         return self.l1, self.l2, self.l3, self.l4, self.l5
 
+    def other_order(self) -> Self:
+        """Return the same lengths with the other gimbal order."""
+        return replace(self, order="XY" if self.order == "YX" else "YX")
+
     def graph(self) -> MechanismGraph:
         """Structural graph in space: universal, spherical and revolute joints have 2, 3 and 1 sub-edges.
 
@@ -75,17 +79,13 @@ class Leg(NamedTuple):
 
 def scale_of(mechanism: PointingDimensions) -> float:
     """Power of two near the largest length; dividing by it rounds nothing."""
-    largest = max(mechanism.l1, mechanism.l2, mechanism.l3, mechanism.l4, mechanism.l5)
-    return math.ldexp(1.0, math.frexp(largest)[1])
+    return math.ldexp(1.0, math.frexp(max(mechanism.lengths))[1])
 
 
 def legs(mechanism: PointingDimensions, scale: float = 1.0) -> tuple[Leg, Leg]:
     """Leg Y and leg X, lengths divided by ``scale``."""
-    m = mechanism
-    return (
-        Leg("Y", m.l3 / scale, m.l2 / scale, -1.0, 1),
-        Leg("X", m.l5 / scale, m.l4 / scale, 1.0, -1),
-    )
+    _, l2, l3, l4, l5 = (length / scale for length in mechanism.lengths)
+    return Leg("Y", l3, l2, -1.0, 1), Leg("X", l5, l4, 1.0, -1)
 
 
 def solution_order(mechanism: PointingDimensions, scale: float = 1.0) -> tuple[Leg, Leg]:
@@ -95,6 +95,23 @@ def solution_order(mechanism: PointingDimensions, scale: float = 1.0) -> tuple[L
 
 
 Array = NDArray[np.float64]
+#: Directions of the crank of each leg at the crank angles 0 and a quarter turn.
+_PLANES = {"Y": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), "X": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])}
+
+
+def crank_direction(leg: str, phi: Array) -> Array:
+    """Return unit vectors (..., 3) from the crank pivot of leg "Y" or "X" to its ball joint."""
+    return np.asarray(np.stack([np.cos(phi), np.sin(phi)], -1) @ _PLANES[leg])
+
+
+def joints(mechanism: PointingDimensions, poses: Poses) -> tuple[tuple[Array, Array, Array], ...]:
+    """Crank pivot (3,), ball joint (..., 3) and cardan (..., 3) of leg Y, then of leg X, in the ground."""
+    found = []
+    for leg, phi, column in zip(legs(mechanism), (poses.phi_x, poses.phi_y), (1, 0)):
+        pivot = (mechanism.l1 - leg.crank) * _PLANES[leg.name][0] - [0.0, 0.0, leg.rod]
+        ball = pivot + leg.crank * crank_direction(leg.name, phi)
+        found.append((pivot, ball, mechanism.l1 * poses.rotation[..., :, column]))
+    return tuple(found)
 
 
 class PoseStatus(IntEnum):

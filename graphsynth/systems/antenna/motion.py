@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import finite, finite_array, sign
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.antenna.closed_form import poses
+from graphsynth.systems.antenna import closed_form
 from graphsynth.systems.antenna.folds import Fold, Path, fold_on_path, less_square, one_leg, quadratic_roots
 from graphsynth.systems.antenna.loop_equations import loop_equations, passive_angles
 from graphsynth.systems.antenna.model import Leg, PointingDimensions, Poses, PoseStatus, scale_of, solution_order
@@ -57,6 +57,12 @@ class _LegMotion(NamedTuple):
     q_dot2: Array
     k_dot2: Array
 
+    def second(self, q: tuple[Array, Array, Array], c: Array, s: Array, dy: Array, slope: Array) -> Array:
+        """Acceleration of an output y with ``P cos y + q sin y = K``; ``q`` with its two derivatives in time."""
+        bend = -(self.p * c + q[0] * s) * dy * dy
+        turn = 2.0 * (-self.p_dot * s + q[1] * c) * dy
+        return np.asarray(-(bend + turn + (self.p_dot2 * c + q[2] * s - self.k_dot2)) / slope)
+
 
 def _motion(leg: Leg, l1: float, phi: Array, dphi: Array, ddphi: Array) -> _LegMotion:
     s, c = leg.crank * np.sin(phi), leg.crank * np.cos(phi)
@@ -64,41 +70,41 @@ def _motion(leg: Leg, l1: float, phi: Array, dphi: Array, ddphi: Array) -> _LegM
     k1 = (q * c - p * s) / l1
     k2 = (leg.crank * leg.crank - p * c - q * s) / l1
     square = dphi * dphi
-    return _LegMotion(
-        p,
-        q,
-        -s,
-        c,
-        k1,
-        dphi,
-        -s * dphi,
-        c * dphi,
-        -c * square - s * ddphi,
-        -s * square + c * ddphi,
-        k2 * square + k1 * ddphi,
-    )
+    second = -c * square - s * ddphi, -s * square + c * ddphi, k2 * square + k1 * ddphi
+    return _LegMotion(p, q, -s, c, k1, dphi, -s * dphi, c * dphi, *second)
 
 
 def rates(
-    mechanism: PointingDimensions,
+    self: PointingDimensions,
     phi_x: ArrayLike,
     phi_y: ArrayLike,
-    speeds: tuple[ArrayLike, ArrayLike],
-    accelerations: tuple[ArrayLike, ArrayLike],
-    s_y: int,
-    s_x: int,
+    dphi_x: ArrayLike = 0.0,
+    dphi_y: ArrayLike = 0.0,
+    ddphi_x: ArrayLike = 0.0,
+    ddphi_y: ArrayLike = 0.0,
+    *,
+    s_y: int = 1,
+    s_x: int = -1,
 ) -> Rates:
-    """Velocities and accelerations; see `PointingMechanism.rates`."""
+    """Velocity Jacobian, velocities and accelerations (theory/antenna 6); crank rates in rad/s, rad/s^2.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.antenna import PointingMechanism
+    >>> import numpy as np
+    >>> PointingMechanism().rates(np.radians(15), np.radians(15)).jacobian.round(9).tolist()
+    [[0.583946582, 0.01261739], [0.0, 0.579026781]]
+    """
     names = ("phi_x", "phi_y", "dphi_x", "dphi_y", "ddphi_x", "ddphi_y")
-    given = [finite_array(name, value) for name, value in zip(names, (phi_x, phi_y, *speeds, *accelerations))]
+    given = [finite_array(name, value) for name, value in zip(names, (phi_x, phi_y, dphi_x, dphi_y, ddphi_x, ddphi_y))]
     x, y, dx, dy, ddx, ddy = np.broadcast_arrays(*given)
-    found = poses(mechanism, x, y, s_y, s_x)
-    scale = scale_of(mechanism)
-    l1 = mechanism.l1 / scale
-    first, second = solution_order(mechanism, scale)
+    found = closed_form.poses(self, x, y, s_y, s_x)
+    scale = scale_of(self)
+    l1 = self.l1 / scale
+    first, second = solution_order(self, scale)
     moving = {"Y": (x, dx, ddx), "X": (y, dy, ddy)}
     one, two = _motion(first, l1, *moving[first.name]), _motion(second, l1, *moving[second.name])
-    swap = mechanism.order == "XY"
+    swap = self.order == "XY"
     u, v = (found.a, found.b) if swap else (found.b, found.a)
     hide = np.where(found.status == PoseStatus.OK, 0.0, np.nan)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -122,40 +128,24 @@ def _derivatives(one: _LegMotion, two: _LegMotion, u: Array, v: Array) -> tuple[
     v2 = -(two.p1 * cv + two.q1 * cu * sv - two.k1) / g_v
     du = u1 * one.dphi
     dv = v1 * one.dphi + v2 * two.dphi
-    ddu = (
-        -(
-            -(one.p * cu + one.q * su) * du * du
-            + 2.0 * (-one.p_dot * su + one.q_dot * cu) * du
-            + (one.p_dot2 * cu + one.q_dot2 * su - one.k_dot2)
-        )
-        / f_u
-    )
-    g, g_dot = two.q * cu, two.q_dot * cu - two.q * su * du
+    ddu = one.second((one.q, one.q_dot, one.q_dot2), cu, su, du, f_u)
     g_dot2 = two.q_dot2 * cu - 2.0 * two.q_dot * su * du - two.q * (cu * du * du + su * ddu)
-    ddv = (
-        -(
-            -(two.p * cv + g * sv) * dv * dv
-            + 2.0 * (-two.p_dot * sv + g_dot * cv) * dv
-            + (two.p_dot2 * cv + g_dot2 * sv - two.k_dot2)
-        )
-        / g_v
-    )
+    ddv = two.second((two.q * cu, two.q_dot * cu - two.q * su * du, g_dot2), cv, sv, dv, g_v)
     return u1, v1, v2, du, dv, ddu, ddv
 
 
-def passive_rates(mechanism: PointingDimensions, found: Poses, dphi_x: ArrayLike, dphi_y: ArrayLike) -> Array:
-    """Rates of all twelve unknowns from ``J12 dx = -(d res / d phi) dphi``; see `PointingMechanism.passive_rates`."""
-    x = passive_angles(mechanism, found).x
-    shape = x.shape[:-1]
-    speeds = np.stack(np.broadcast_arrays(dphi_x, dphi_y, found.a)[:2], -1).astype(np.float64).reshape(-1, 2)
-    flat, phi = x.reshape(-1, 12), np.stack([found.phi_x.ravel(), found.phi_y.ravel()], -1)
+def passive_rates(self: PointingDimensions, poses: Poses, dphi_x: ArrayLike, dphi_y: ArrayLike) -> NDArray[np.float64]:
+    """Rates of the twelve unknowns for crank speeds, shape (..., 12), from the 12 x 12 Jacobian."""
+    x = passive_angles(self, poses).x
+    speeds = np.stack(np.broadcast_arrays(dphi_x, dphi_y, poses.a)[:2], -1).astype(np.float64).reshape(-1, 2)
+    flat, phi = x.reshape(-1, 12), np.stack([poses.phi_x.ravel(), poses.phi_y.ravel()], -1)
     made = np.full_like(flat, np.nan)
-    good = np.ravel(found.status == PoseStatus.OK)
+    good = np.ravel(poses.status == PoseStatus.OK)
     if good.any():
-        equations = loop_equations(mechanism, flat[good], phi[good])
+        equations = loop_equations(self, flat[good], phi[good])
         right = -np.einsum("nij,nj->ni", equations.inputs, speeds[good])
         made[good] = np.linalg.solve(equations.jacobian, right[..., None])[..., 0]
-    return made.reshape(*shape, 12)
+    return made.reshape(x.shape)
 
 
 @dataclass(frozen=True)
@@ -188,11 +178,14 @@ class DeadPoint:
 
 
 def dead_points(
-    mechanism: PointingDimensions, leg: str, phi_other: float, s_other: int | None
+    self: PointingDimensions, leg: str, phi_other: float = 0.0, *, s_other: int | None = None
 ) -> tuple[DeadPoint, ...]:
-    """All dead points of one crank; see `PointingMechanism.dead_points`."""
+    """All dead points of one crank: crank and rod in a plane with the crank axis (theory/antenna 7).
+
+    Parameters are those of `folds`.
+    """
     other_angle = finite("phi_other", phi_other)
-    own, l1, is_first, u, _ = one_leg(mechanism, leg, other_angle, s_other)
+    own, l1, is_first, u, _ = one_leg(self, leg, other_angle, s_other)
     cosine = 1.0 if is_first else math.cos(u)
     k, p, q = own.crank, l1 - own.crank, own.side * own.rod
     k0, kc, ks = (l1 * l1 + p * p + k * k) / (2 * k), -l1 * p / k, -l1 * cosine * q / k
@@ -206,39 +199,35 @@ def dead_points(
         dp, dq = l1 * math.cos(v) - p, l1 * cosine * math.sin(v) - q
         toward = math.copysign(1.0, k0 + kc * math.cos(v) + ks * math.sin(v))
         phi = math.atan2(toward * dq, toward * dp)
-        found.append(_dead_point(mechanism, leg, phi, other_angle, v, u, toward, s_other))
+        found.append(_dead_point(self, leg, (phi, other_angle), (v, u), toward, s_other))
     return tuple(found)
 
 
 def _dead_point(
     mechanism: PointingDimensions,
     leg: str,
-    phi: float,
-    other_angle: float,
-    output: float,
-    other_output: float,
+    angles: tuple[float, float],
+    outputs: tuple[float, float],
     toward: float,
     s_other: int | None,
 ) -> DeadPoint:
-    phi_x, phi_y = (phi, other_angle) if leg == "Y" else (other_angle, phi)
-    candidates = [
-        (s_y, s_x) for s_y in (1, -1) for s_x in (1, -1) if s_other is None or (s_x if leg == "Y" else s_y) == s_other
-    ]
-    rest = -1 if leg == "Y" else 1
-    candidates.sort(key=lambda signs: (signs[1] if leg == "Y" else signs[0]) != rest)
-    best: tuple[float, int, int, float, float, float] | None = None
-    for s_y, s_x in candidates:
-        got = rates(mechanism, phi_x, phi_y, (0.0, 0.0), (0.0, 0.0), s_y, s_x)
-        a, b = float(got.poses.a), float(got.poses.b)
-        miss = abs(math.remainder((a if leg == "Y" else b) - output, math.tau))
-        slope = float(got.jacobian[0, 0] if leg == "Y" else got.jacobian[1, 1])
-        if miss < 1e-6 and (best is None or miss < best[0] - 1e-9):
-            best = (miss, s_y, s_x, a, b, slope)
+    """Find the assembly mode of a dead point: crank angles and outputs are those of the leg and of the other one."""
+    own = 0 if leg == "Y" else 1
+    rest = (-1, 1)[own]
+    signs = [(s_y, s_x) for s_y in (1, -1) for s_x in (1, -1) if s_other in (None, (s_y, s_x)[1 - own])]
+    signs.sort(key=lambda pair: pair[1 - own] != rest)
+    phi = angles if own == 0 else angles[::-1]
     kind = "stretched" if toward > 0.0 else "folded"
-    if best is None:
-        a, b = (output, other_output) if leg == "Y" else (other_output, output)
-        return DeadPoint(leg, phi_x, phi_y, a, b, kind, 0, 0, math.nan)
-    return DeadPoint(leg, phi_x, phi_y, best[3], best[4], kind, best[1], best[2], best[5])
+    best = DeadPoint(leg, *phi, *(outputs if own == 0 else outputs[::-1]), kind, 0, 0, math.nan)
+    least = 1e-6
+    for s_y, s_x in signs:
+        got = rates(mechanism, *phi, s_y=s_y, s_x=s_x)
+        pose = float(got.poses.a), float(got.poses.b)
+        miss = abs(math.remainder(pose[own] - outputs[0], math.tau))
+        if miss < least:
+            least = miss - 1e-9
+            best = DeadPoint(leg, *phi, *pose, kind, s_y, s_x, float(got.jacobian[own, own]))
+    return best
 
 
 #: Samples of a discriminant per radian of crank angle, between which a dip is refined.
@@ -273,33 +262,55 @@ class PointingSweep:
 
 
 def sweep(
-    mechanism: PointingDimensions,
+    self: PointingDimensions,
     t: ArrayLike,
-    direction: tuple[float, float],
-    offset: tuple[float, float],
-    s_y: int,
-    s_x: int,
+    direction: tuple[float, float] = (1.0, 1.0),
+    offset: tuple[float, float] = (0.0, 0.0),
+    *,
+    s_y: int = 1,
+    s_x: int = -1,
 ) -> PointingSweep:
-    """Follow one assembly mode; see `PointingMechanism.sweep`."""
+    """Move both cranks along ``offset + t * direction`` on one assembly mode and stop at the first fold.
+
+    It never continues on another mode; beyond the fold all angles are NaN.
+
+    Parameters
+    ----------
+    t : array_like, shape (n,)
+        Rising or falling path parameter, radians; a `GeometryError` refuses others.
+    direction, offset : tuple of float
+        Change of ``(phi_x, phi_y)`` per unit of ``t``, and their values at ``t = 0``.
+    s_y, s_x : {+1, -1}
+        Assembly mode.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.antenna import PointingMechanism
+    >>> import numpy as np
+    >>> sweep = PointingMechanism(l3=0.1, l5=0.1).sweep(np.radians(np.arange(0.0, 76.0)))
+    >>> np.degrees([sweep.fold.parameter, sweep.fold.a]).round(9).tolist(), round(sweep.fold.coefficient, 9)
+    ([69.394627605, 150.578155425], 2.869433008)
+    """
     values = finite_array("t", t)
     change = np.diff(values)
     if values.ndim != 1 or values.size < 2 or not ((change > 0.0).all() or (change < 0.0).all()):
         raise GeometryError(f"t of shape {values.shape} must hold at least two values that rise or fall throughout")
     dx, dy = (finite(f"direction[{i}]", part) for i, part in enumerate(direction))
     ox, oy = (finite(f"offset[{i}]", part) for i, part in enumerate(offset))
-    path = Path(mechanism, (ox, oy), (dx, dy), sign("s_y", s_y), sign("s_x", s_x))
-    found = poses(mechanism, ox + values * dx, oy + values * dy, s_y, s_x)
+    path = Path(self, (ox, oy), (dx, dy), sign("s_y", s_y), sign("s_x", s_x))
+    found = closed_form.poses(self, ox + values * dx, oy + values * dy, s_y, s_x)
     if not found.assembled[0]:
         nothing = np.zeros(values.size, dtype=bool)
         why = PoseStatus(int(found.status[0])).message
         return PointingSweep(values, _hide(found, nothing), nothing, None, f"the sweep cannot start: {why}")
-    stop = _first_zero(path, float(values[0]), float(values[-1]))
+    stop, end = None, float(values[-1])
+    for leg in path.legs()[:2]:
+        zero = _zero_of(path, leg, float(values[0]), end)
+        if zero is not None:
+            stop, end = (leg.name, *zero), zero[0]
     if stop is None:
         return PointingSweep(values, found, found.assembled, None, "the whole sweep lies on one assembly mode")
-    which, place, multiplicity = stop
-    first, second, _ = path.legs()
-    leg = (first, second)[which].name
-    fold = fold_on_path(path, leg, place, multiplicity)
+    fold, place = fold_on_path(path, *stop), stop[1]
     reached = (values <= place) if change[0] > 0.0 else (values >= place)
     reached &= found.assembled
     return PointingSweep(values, _hide(found, reached), reached, fold, f"stopped at t = {place:.12g}: {fold.message}")
@@ -309,25 +320,15 @@ def _hide(poses: Poses, reached: NDArray[np.bool_]) -> Poses:
     return replace(poses, a=np.where(reached, poses.a, np.nan), b=np.where(reached, poses.b, np.nan))
 
 
-def _first_zero(path: Path, start: float, stop: float) -> tuple[int, float, int] | None:
-    """First zero of either discriminant: index of the leg, parameter, and 2 where it only touches zero, else 1.
+def _zero_of(path: Path, leg: Leg, start: float, stop: float) -> tuple[float, int] | None:
+    """First zero of the discriminant of a leg: its parameter, and 2 where it only touches zero, else 1.
 
     Samples between which the second derivative cannot hide a dip are refined by minimisation (estimated, not proved).
     """
-    found: tuple[int, float, int] | None = None
-    end = stop
-    for which in (0, 1):
-        zero = _zero_of(path, which, start, end)
-        if zero is not None:
-            found, end = (which, *zero), zero[0]
-    return found
-
-
-def _zero_of(path: Path, which: int, start: float, stop: float) -> tuple[float, int] | None:
     from scipy.optimize import brentq, minimize_scalar
 
     def value(t: float) -> float:
-        return path.discriminant(t, which)
+        return path.discriminant(t, leg)
 
     turn = abs(stop - start) * max(map(abs, path.direction))
     grid = np.linspace(start, stop, max(64, math.ceil(DENSITY * turn)) + 1).tolist()

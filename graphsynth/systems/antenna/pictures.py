@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from graphsynth.drawing.plots import Line, new_figure, themed_svg
 from graphsynth.pipeline.display import chart, unit_in
 from graphsynth.pipeline.products import Picture
 from graphsynth.pipeline.stages import Context
+from graphsynth.systems.antenna.model import Leg, crank_direction, joints, legs, orientation
 from graphsynth.systems.antenna.scene import antenna_of, other_model, table_of, widths_of
 
 if TYPE_CHECKING:
@@ -22,26 +22,11 @@ if TYPE_CHECKING:
 
     from graphsynth.systems.antenna.closed_form import Convention, ModelComparison
     from graphsynth.systems.antenna.mechanism import PointingMechanism
-    from graphsynth.systems.antenna.model import Poses
     from graphsynth.systems.antenna.stages import AntennaMotion
 
 Array = NDArray[np.float64]
 
 _LEG_Y, _LEG_X, _REST = LIGHT["a"], LIGHT["b"], LIGHT["soft"]
-
-
-def _joints(mechanism: PointingMechanism, poses: Poses) -> dict[str, Array]:
-    """Crank pivot, ball joint and cardan of each leg in the ground, metres."""
-    l1, l2, l3, l4, l5 = mechanism.lengths
-    R, x, y = poses.rotation, float(poses.phi_x), float(poses.phi_y)
-    return {
-        "pivot Y": np.array([0.0, l1 - l3, -l2]),
-        "ball Y": np.array([0.0, l1 - l3 + l3 * math.cos(x), -l2 + l3 * math.sin(x)]),
-        "cardan Y": l1 * R[:, 1],
-        "pivot X": np.array([l1 - l5, 0.0, -l4]),
-        "ball X": np.array([l1 - l5 + l5 * math.cos(y), 0.0, -l4 - l5 * math.sin(y)]),
-        "cardan X": l1 * R[:, 0],
-    }
 
 
 def pointing_picture(
@@ -72,12 +57,11 @@ def pointing_picture(
         raise GeometryError(f"no picture at phi_x = {phi_x}, phi_y = {phi_y}: {poses.reasons()[0]}")
     figure = new_figure(size)
     axes: Any = figure.add_subplot(projection="3d")
-    joints, l1, R = _joints(mechanism, poses), mechanism.l1, poses.rotation
-    _discs(axes, l1, R)
-    _gimbal(axes, l1, R, mechanism.order)
-    for leg, colour in (("Y", _LEG_Y), ("X", _LEG_X)):
-        _leg(axes, mechanism, joints, leg, colour)
-    everything = np.array([*joints.values(), l1 * R[:, 2], [-l1, -l1, 0.0], [l1, l1, 0.0]])
+    placed, l1, R = joints(mechanism, poses), mechanism.l1, poses.rotation
+    _reflector(axes, l1, R, mechanism.order)
+    for leg, points, colour in zip(legs(mechanism), placed, (_LEG_Y, _LEG_X)):
+        _leg(axes, leg, points, colour)
+    everything = np.array([*placed[0], *placed[1], l1 * R[:, 2], [-l1, -l1, 0.0], [l1, l1, 0.0]])
     low, high = everything.min(axis=0), everything.max(axis=0)
     middle, reach = 0.5 * (low + high), 0.55 * float((high - low).max())
     for set_limits, centre in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle):
@@ -98,8 +82,8 @@ def pointing_picture(
     return figure
 
 
-def _discs(axes: Any, l1: float, R: Array) -> None:
-    """Draw the reflector, the outline of its rest position and its normal."""
+def _reflector(axes: Any, l1: float, R: Array, order: str) -> None:
+    """Draw the reflector, the outline of its rest position, its normal, and both gimbal axes."""
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
     turn = np.linspace(0.0, math.tau, 73)
@@ -109,29 +93,19 @@ def _discs(axes: Any, l1: float, R: Array) -> None:
     axes.add_collection3d(Poly3DCollection([disc], facecolor=LIGHT["fill"], edgecolor=LIGHT["ink"], alpha=0.55))
     tip = l1 * R[:, 2]
     axes.plot(*np.array([np.zeros(3), tip]).T, color=LIGHT["c"], lw=1.8, label="normal of the reflector")
-
-
-def _gimbal(axes: Any, l1: float, R: Array, order: str) -> None:
-    """Draw the axis fixed to the ground and the axis carried by the reflector."""
-    fixed = np.array([0.0, 1.0, 0.0]) if order == "YX" else np.array([1.0, 0.0, 0.0])
-    carried = R[:, 0] if order == "YX" else R[:, 1]
+    fixed, carried = (np.eye(3)[1], R[:, 0]) if order == "YX" else (np.eye(3)[0], R[:, 1])
     for direction, style, label in ((fixed, "-.", "gimbal axis fixed to the ground"), (carried, "--", "carried axis")):
         axes.plot(*np.outer([-1.25 * l1, 1.25 * l1], direction).T, color=LIGHT["note"], lw=1.0, ls=style, label=label)
 
 
-def _leg(axes: Any, mechanism: PointingMechanism, joints: dict[str, Array], leg: str, colour: str) -> None:
+def _leg(axes: Any, leg: Leg, points: tuple[Array, Array, Array], colour: str) -> None:
     """Draw crank, rod and arm of one leg, the circle of its crank and the crank axis."""
-    pivot, ball, cardan = (joints[f"{kind} {leg}"] for kind in ("pivot", "ball", "cardan"))
-    crank = mechanism.l3 if leg == "Y" else mechanism.l5
-    turn = np.linspace(0.0, math.tau, 73)
-    zero = np.zeros_like(turn)
-    if leg == "Y":
-        circle, axis = np.stack([zero, np.cos(turn), np.sin(turn)], -1), np.array([1.0, 0.0, 0.0])
-    else:
-        circle, axis = np.stack([np.cos(turn), zero, -np.sin(turn)], -1), np.array([0.0, 1.0, 0.0])
-    axes.plot(*(pivot + crank * circle).T, color=colour, lw=0.7, ls=":")
-    axes.plot(*(pivot + 0.4 * crank * np.outer([-1.0, 1.0], axis)).T, color=colour, lw=4.5, solid_capstyle="butt")
-    axes.plot(*np.array([pivot, ball]).T, color=colour, lw=3.2, label=f"leg {leg}: crank (thick) and rod")
+    pivot, ball, cardan = points
+    circle = leg.crank * crank_direction(leg.name, np.linspace(0.0, math.tau, 73))
+    axis = np.eye(3)[0 if leg.name == "Y" else 1]
+    axes.plot(*(pivot + circle).T, color=colour, lw=0.7, ls=":")
+    axes.plot(*(pivot + 0.4 * leg.crank * np.outer([-1.0, 1.0], axis)).T, color=colour, lw=4.5, solid_capstyle="butt")
+    axes.plot(*np.array([pivot, ball]).T, color=colour, lw=3.2, label=f"leg {leg.name}: crank (thick) and rod")
     axes.plot(*np.array([ball, cardan]).T, color=colour, lw=1.7)
     axes.plot(*np.array([np.zeros(3), cardan]).T, color=LIGHT["ink"], lw=1.0)
     axes.plot(*ball, "o", color="white", mec=colour, mew=1.8, ms=7)
@@ -157,7 +131,7 @@ def comparison_picture(
     `mechanism` is the model of panel b (analytical), `other` that of panel a (block diagram): by default the same
     lengths with the other gimbal order. The sweep ends at `largest`; a dotted line marks `working` (radians).
     """
-    other = _second(mechanism, other)
+    other = other or mechanism.other_order()
     phi = np.linspace(0.0, largest, samples)
     found = mechanism.compare(other, phi, reading=reading, other_reading=other_reading)
     degrees = np.degrees(phi)
@@ -219,23 +193,19 @@ def difference_map_picture(
     axis. Left: difference of the means of elevation and azimuth. Right: angle between the normals of the reflectors.
     """
     grid = _grid(span, nodes)
-    other = _second(mechanism, other)
+    other = other or mechanism.other_order()
     found = mechanism.compare(other, grid[:, None], grid[None, :], reading=reading, other_reading=other_reading)
-    beams = _between_beams(found, (mechanism.order, other.order))
+    orders = (mechanism.order, other.order)
+    normals = [orientation(found.a[k], found.b[k], orders[k])[..., :, 2] for k in (0, 1)]
+    half = np.minimum(0.5 * np.linalg.norm(normals[0] - normals[1], axis=-1), 1.0)  # of the chord
     drawn = []
-    for values, title, colours in (
-        (found.arcminutes, "difference of the means", "RdBu_r"),
-        (beams, "angle between the two beams", "magma_r"),
+    for values, title, colours, below in (
+        (found.arcminutes, "difference of the means", "RdBu_r", -1.0),
+        (60.0 * np.degrees(2.0 * np.arcsin(half)), "angle between the two beams", "magma_r", 0.0),
     ):
         largest = max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-9)
-        drawn.append(
-            (values, title, {"cmap": colours, "vmin": -largest if values is not beams else 0.0, "vmax": largest})
-        )
+        drawn.append((values, title, {"cmap": colours, "vmin": below * largest, "vmax": largest}))
     return _maps(grid, drawn, "arc-minutes", size)
-
-
-def _second(mechanism: PointingMechanism, other: PointingMechanism | None) -> PointingMechanism:
-    return other or replace(mechanism, order="XY" if mechanism.order == "YX" else "YX")
 
 
 def _maps(grid: Array, drawn: Any, label: str, size: tuple[float, float]) -> Figure:
@@ -250,15 +220,6 @@ def _maps(grid: Array, drawn: Any, label: str, size: tuple[float, float]) -> Fig
         axes.set_aspect("equal")
     figure.axes[0].set_ylabel("φy, crank of leg X [deg]")
     return figure
-
-
-def _between_beams(found: ModelComparison, orders: tuple[str, str]) -> Array:
-    """Angle between the normals of both reflectors, minutes of arc, from half their chord."""
-    from graphsynth.systems.antenna.model import orientation
-
-    first, second = (orientation(found.a[k], found.b[k], orders[k])[..., :, 2] for k in (0, 1))
-    chord = np.linalg.norm(first - second, axis=-1)
-    return np.asarray(60.0 * np.degrees(2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))))
 
 
 def _grid(span: float, nodes: int, least: int = 2) -> Array:

@@ -128,18 +128,14 @@ def precise_angles(
     from mpmath import mp
 
     with mp.workdps(digits + 15):
-        phi = {"Y": mp.mpf(phi_x), "X": mp.mpf(phi_y)}
-        u, v = _outputs(mp, mechanism, phi, {"Y": s_y, "X": s_x})
+        given = {"Y": (mp.mpf(phi_x), s_y), "X": (mp.mpf(phi_y), s_x)}
+        first, second = ("X", "Y") if mechanism.order == "YX" else ("Y", "X")
+        u = _linear(mp, *_exact_terms(mp, mechanism, first, given[first][0]), given[first][1])
+        p, q, k = _exact_terms(mp, mechanism, second, given[second][0])
+        v = mp.nan if mp.isnan(u) else _linear(mp, p, q * mp.cos(u), k, given[second][1])
+        if mp.isnan(v):
+            return mp.nan, mp.nan
         return (v, u) if mechanism.order == "YX" else (u, v)
-
-
-def _outputs(mp: Any, mechanism: PointingDimensions, phi: dict[str, Any], signs: dict[str, int]) -> tuple[Any, Any]:
-    first, second = ("X", "Y") if mechanism.order == "YX" else ("Y", "X")
-    p, q, k = _exact_terms(mp, mechanism, first, phi[first])
-    u = _linear(mp, p, q, k, signs[first])
-    p, q, k = _exact_terms(mp, mechanism, second, phi[second])
-    v = mp.nan if mp.isnan(u) else _linear(mp, p, q * mp.cos(u), k, signs[second])
-    return (mp.nan, mp.nan) if mp.isnan(v) else (u, v)
 
 
 def precise_fold(mechanism: PointingDimensions, fold: Fold, digits: int = 50) -> PreciseFold:
@@ -177,19 +173,18 @@ def precise_fold(mechanism: PointingDimensions, fold: Fold, digits: int = 50) ->
         t = mp.findroot(rest, (begin, begin + mp.mpf("1e-9")), tol=mp.mpf(10) ** (-2 * digits), verify=False)
         a, b, k, u = coefficients(t)
         y = mp.atan2(b * k, a * k)
-        slope = mp.diff(lambda s: _residual(mp, coefficients(s), y), t)
-        coefficient = mp.sqrt(2 * abs(slope / k))
+
+        def residual(s: Any) -> Any:
+            a, b, k, _ = coefficients(s)
+            return a * mp.cos(y) + b * mp.sin(y) - k
+
+        coefficient = mp.sqrt(2 * abs(mp.diff(residual, t) / k))
         if fold.leg == first:
             p, q, k = _exact_terms(mp, mechanism, second, phi(second, t))
             outputs = {first: y, second: _linear(mp, p, q * mp.cos(y), k, signs[second])}
         else:
             outputs = {first: u, second: y}
         return PreciseFold(t, outputs["Y"], outputs["X"], coefficient)
-
-
-def _residual(mp: Any, coefficients: tuple[Any, Any, Any, Any], y: Any) -> Any:
-    a, b, k, _ = coefficients
-    return a * mp.cos(y) + b * mp.sin(y) - k
 
 
 Array = NDArray[np.float64]
@@ -259,8 +254,13 @@ def deviations(path: Path, leg: str, place: float, step: float) -> tuple[float, 
     return u.change, v.change
 
 
-def approach(mechanism: PointingDimensions, fold: Fold, distances: ArrayLike, branch: int) -> ApproachToFold:
-    """Compare three ways to compute the output near a fold; see `PointingMechanism.approach`."""
+def approach(self: PointingDimensions, fold: Fold, distances: ArrayLike, *, branch: int = 1) -> ApproachToFold:
+    """Output at small distances from a fold: exact, compensated, by the square root, and plain with its error.
+
+    `distances` (n,) are positive, radians of the path parameter, and may be far below the spacing of floating-point
+    numbers; `branch` is the sign of the folding leg.  A `GeometryError` refuses other distances, and a fold that is not
+    simple.
+    """
     from mpmath import mp
 
     distance = np.atleast_1d(finite_array("distances", distances))
@@ -269,9 +269,9 @@ def approach(mechanism: PointingDimensions, fold: Fold, distances: ArrayLike, br
     if fold.side == 0:
         raise GeometryError(f"the fold of leg {fold.leg} is not simple; its output is no square root of the distance")
     s_y, s_x = fold.merging[0 if branch == 1 else 1]
-    path = Path(mechanism, fold.offset, fold.direction, s_y, s_x)
+    path = Path(self, fold.offset, fold.direction, s_y, s_x)
     which = 0 if path.legs()[0].name == fold.leg else 1
-    sharp = precise_fold(mechanism, fold, 60)
+    sharp = precise_fold(self, fold, 60)
     at = sharp.a if fold.leg == "Y" else sharp.b
     rows = []
     for e in distance.tolist():
@@ -280,29 +280,23 @@ def approach(mechanism: PointingDimensions, fold: Fold, distances: ArrayLike, br
             phi_x, phi_y = (
                 mp.mpf(o) + (sharp.parameter + step) * mp.mpf(d) for o, d in zip(fold.offset, fold.direction)
             )
-            y = precise_angles(mechanism, phi_x, phi_y, s_y, s_x, 60)[0 if fold.leg == "Y" else 1]
+            y = precise_angles(self, phi_x, phi_y, s_y, s_x, 60)[0 if fold.leg == "Y" else 1]
             exact = mp.arg(mp.expj(y - at))
             t = fold.parameter + step
             near_x, near_y = (o + t * d for o, d in zip(fold.offset, fold.direction))
-            got = poses(mechanism, near_x, near_y, s_y, s_x)
+            got = poses(self, near_x, near_y, s_y, s_x)
             plain = mp.mpf(float(got.a if fold.leg == "Y" else got.b))
             error = float("nan") if mp.isnan(plain) else float(abs(mp.arg(mp.expj(plain - y))))
         rows.append((float(exact), deviations(path, fold.leg, fold.parameter, step)[which], error))
     exact_, compensated, plain_error = np.array(rows).reshape(-1, 3).T
     # the input is rounded once, the discriminant a few times: together like a shift of the input by `blur`
-    blur = np.spacing(max(abs(fold.parameter), 1.0)) * 4.0 + _discriminant_blur(path, fold)
+    first, second, l1 = path.legs()
+    h = 1e-7 * fold.side
+    slope = abs(path.discriminant(fold.parameter + h, (first, second)[which]) / h)
+    largest = (l1 + max(leg.rod + 2.0 * leg.crank for leg in (first, second))) ** 2
+    blur = np.spacing(max(abs(fold.parameter), 1.0)) * 4.0
+    blur += 8.0 * math.ulp(1.0) * largest / slope if slope > 0.0 else 1.0
     c = fold.coefficient
     predicted = c * (np.sqrt(distance + blur) - np.sqrt(np.maximum(distance - blur, 0.0))) + 1e-15
     series = np.copysign(c * np.sqrt(distance), exact_)
     return ApproachToFold(fold, distance, exact_, compensated, series, plain_error, predicted)
-
-
-def _discriminant_blur(path: Path, fold: Fold) -> float:
-    """Shift of the input that changes the discriminant as much as its rounding errors do."""
-    first, second, l1 = path.legs()
-    which = 0 if first.name == fold.leg else 1
-    h = 1e-7 * fold.side
-    inside = path.discriminant(fold.parameter + h, which)
-    slope = abs(inside / h)
-    largest = (l1 + max(leg.rod + 2.0 * leg.crank for leg in (first, second))) ** 2
-    return 8.0 * math.ulp(1.0) * largest / slope if slope > 0.0 else 1.0

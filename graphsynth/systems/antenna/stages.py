@@ -70,18 +70,12 @@ class SingularPoses:
     sweep_message: str
 
 
-def _equal_cranks(context: Context) -> NDArray[np.float64]:
-    import numpy as np
-
-    table = table_of(context).sweep
-    return np.linspace(0.0, table.largest, table.samples)
-
-
 def sweep(context: Context) -> AntennaMotion:
     """Turn both cranks together on the assembly mode of the rest pose; beyond a fold everything is NaN."""
     import numpy as np
 
-    antenna, phi = antenna_of(context), _equal_cranks(context)
+    antenna, table = antenna_of(context), table_of(context).sweep
+    phi = np.linspace(0.0, table.largest, table.samples)
     path = antenna.sweep(phi)
     found = antenna.rates(phi, phi, 1.0, 1.0)
     away = ~path.reached
@@ -91,8 +85,11 @@ def sweep(context: Context) -> AntennaMotion:
 
 def compare(context: Context) -> ModelComparison:
     """Compare the outputs of the two models over the sweep."""
-    other, reading = other_model(context)
-    return antenna_of(context).compare(other, _equal_cranks(context), other_reading=reading)
+    import numpy as np
+
+    (other, reading), table = other_model(context), table_of(context).sweep
+    phi = np.linspace(0.0, table.largest, table.samples)
+    return antenna_of(context).compare(other, phi, other_reading=reading)
 
 
 def cross_check(context: Context, motion: AntennaMotion) -> CrossCheck | None:
@@ -130,10 +127,9 @@ def singular_poses(context: Context) -> SingularPoses:
     import numpy as np
 
     antenna = antenna_of(context)
-    folds = [fold for leg in ("Y", "X") for fold in antenna.folds(leg)]
-    dead = [point for leg in ("Y", "X") for point in antenna.dead_points(leg)]
     path = antenna.sweep(np.linspace(0.0, math.pi, 181))
-    return SingularPoses(tuple(folds), tuple(dead), path.fold, path.message)
+    folds, dead = antenna.folds("Y") + antenna.folds("X"), antenna.dead_points("Y") + antenna.dead_points("X")
+    return SingularPoses(folds, dead, path.fold, path.message)
 
 
 def tolerances(context: Context) -> tuple[tuple[float, Tolerance], ...]:
@@ -170,13 +166,16 @@ def assess(
     margins = _margins(context, motion, comparison, bounds)
     record = _verdict(context, motion, comparison, bounds, margins)
     note = "Angles are of the closed form, bounds are proved by intervals."
+    rows = ((motion.phi[k], *motion.rates.jacobian[k].ravel()) for k in _every(motion.phi.size))
+    ratios = ("∂elevation/∂φx", "∂elevation/∂φy", "∂azimuth/∂φx", "∂azimuth/∂φy")
+    columns = ("cranks [°] | .6g", *(f"{name} | 14 .12g" for name in ratios))
     tables = [
         quantity_table("Results", margins, note),
         _structure_table(context),
         _sweep_table(motion, comparison),
         _conventions_table(context),
         _tolerance_table(context, bounds),
-        _rates_table(motion),
+        table("Velocities of the reflector over those of the cranks", columns, rows, "Closed form; no unit."),
         _modes_table(context),
         _singular_table(singular),
     ]
@@ -302,7 +301,7 @@ def _conventions_table(context: Context) -> Table:
 
     antenna, largest = antenna_of(context), table_of(context).sweep.largest
     phi = largest * np.array([0.125, 0.25, 0.375, 0.5, 0.75, 1.0])
-    swapped = replace(antenna, order="XY" if antenna.order == "YX" else "YX")
+    swapped = antenna.other_order()
     cases: list[tuple[str, PointingMechanism, Convention]] = [
         (f"gimbal order {swapped.order}", swapped, Convention()),
         ("both cranks reversed", antenna, Convention(-1, -1)),
@@ -349,7 +348,11 @@ def _tolerance_table(context: Context, bounds: tuple[tuple[float, Tolerance], ..
             certified = " .. ".join(outward_text(value, end) for value, end in zip(side.deviation, (-1, 1)))
             corners = " .. ".join(f"{round(value, 4) + 0.0:+.4f}" for value in side.corner_deviation)
             first = f"±{unit_in('[″]').from_si(side.first_order):.4f}"
-            rows.append((phi, name, side.nominal, certified, corners, first, _excess(side.excess)))
+            # rounding of the corner values hides a smaller overestimation
+            wide = f"{100 * side.excess:.1e} %" if side.excess > 1e-9 else "< 1e-7 %"
+            rows.append(
+                (phi, name, side.nominal, certified, corners, first, wide if math.isfinite(side.excess) else "")
+            )
     columns = (
         "cranks [°] | g",
         "angle",
@@ -368,20 +371,6 @@ def _tolerance_table(context: Context, bounds: tuple[tuple[float, Tolerance], ..
         "of the 32 corners (estimated, from inside); first order: sum of the derivatives."
     )
     return table("What tolerances cost", columns, rows, note)
-
-
-def _excess(excess: float) -> str:
-    """Overestimation in per cent; rounding of the corner values hides a smaller one."""
-    if not math.isfinite(excess):
-        return ""
-    return f"{100 * excess:.1e} %" if excess > 1e-9 else "< 1e-7 %"
-
-
-def _rates_table(motion: AntennaMotion) -> Table:
-    rows = ((motion.phi[k], *motion.rates.jacobian[k].ravel()) for k in _every(motion.phi.size))
-    ratios = ("∂elevation/∂φx", "∂elevation/∂φy", "∂azimuth/∂φx", "∂azimuth/∂φy")
-    columns = ("cranks [°] | .6g", *(f"{name} | 14 .12g" for name in ratios))
-    return table("Velocities of the reflector over those of the cranks", columns, rows, "Closed form; no unit.")
 
 
 def _modes_table(context: Context) -> Table:

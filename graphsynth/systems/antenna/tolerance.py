@@ -195,17 +195,19 @@ class LengthBoxProblem:
 
     def enclose(self, box: tuple[Any, ...]) -> OutputEnclosure:
         """Enclose both outputs and their gradients over a box of lengths; `NoProof` if a fold is in or near it."""
-        first, second = self.legs
         middle = middle_of(box)
         starts = self.nominal(tuple(float(length.a) for length in middle))
         if math.isnan(starts[0]):
-            raise NoProof(second.name, math.inf)
-        u_mid = self._prove(first, middle, middle, starts[0], None, None, None)
-        u = self._prove(first, box, middle, starts[0], None, None, None)
-        u, du = self._shrink(first, box, middle, u, u_mid, None, None)
-        v_mid = self._prove(second, middle, middle, starts[1], u_mid, u_mid, None)
-        v = self._prove(second, box, middle, starts[1], u, u_mid, du)
-        v, dv = self._shrink(second, box, middle, v, v_mid, u, du)
+            raise NoProof(self.legs[1].name, math.inf)
+        found: list[tuple[Any, tuple[Any, ...]]] = []
+        u_mid = None
+        for leg, start in zip(self.legs, starts):
+            u, du = found[0] if found else (None, None)
+            at_mid = self._prove(leg, middle, middle, start, u_mid, u_mid, None)
+            over = self._prove(leg, box, middle, start, u, u_mid, du)
+            found.append(self._shrink(leg, box, middle, over, at_mid, u, du))
+            u_mid = at_mid
+        (u, du), (v, dv) = found
         return OutputEnclosure(u, v, du, dv)
 
 
@@ -317,16 +319,6 @@ def _box(problem: LengthBoxProblem, widths: tuple[float, ...]) -> tuple[Any, ...
     return tuple((iv.mpf(l) + iv.mpf([-w, w])) * around for l, w in zip(problem.mechanism.lengths, widths))
 
 
-def _floor(x: Any) -> float:
-    value = float(x.a)
-    return value if x.a >= value else math.nextafter(value, -math.inf)
-
-
-def _ceil(x: Any) -> float:
-    value = float(x.b)
-    return value if x.b <= value else math.nextafter(value, math.inf)
-
-
 def _face_bound(
     problem: LengthBoxProblem, box: tuple[Any, ...], found: OutputEnclosure, which: int, upward: bool
 ) -> Any:
@@ -340,8 +332,7 @@ def _face_bound(
         else:
             face.append(whole)
     middle = middle_of(tuple(face))
-    centre = problem.enclose(middle)
-    over = problem.enclose(tuple(face))
+    centre, over = problem.enclose(middle), problem.enclose(tuple(face))
     value = centre.v if which else centre.u
     for rate, whole, mid in zip(over.dv if which else over.du, face, middle):
         value += rate * (whole - mid)
@@ -349,28 +340,58 @@ def _face_bound(
 
 
 def tolerance(
-    mechanism: PointingDimensions,
+    self: PointingDimensions,
     phi_x: float,
     phi_y: float,
-    widths: ArrayLike,
-    s_y: int,
-    s_x: int,
-    method: str,
+    widths: ArrayLike = 5e-5,
+    *,
+    s_y: int = 1,
+    s_x: int = -1,
+    method: str = "mixed",
     converted: bool = False,
 ) -> Tolerance:
-    """Bound both outputs; see `PointingMechanism.tolerance`."""
+    """Certified bounds of elevation and azimuth if every length may deviate by plus or minus its width.
+
+    Certified, or undecided with the lengths that let a fold into the box; with the corner values and the first-order
+    estimate beside it.
+
+    Parameters
+    ----------
+    phi_x, phi_y : float
+        Crank angles, radians.
+    widths : float or array_like, shape (5,)
+        Tolerances of l1 to l5, unit of the lengths, at least 0 and below the length, or a `GeometryError` is raised.
+    s_y, s_x : {+1, -1}
+        Assembly mode.
+    method : {"mixed", "mean_value"}
+        "mixed" puts every length with a proved sign of the derivative to the ends of its interval
+        (theory/antenna 9, step 3); "mean_value" is faster and some per cent wider.
+    converted : bool
+        The doubles given stand for decimals or degrees: the bounds then hold for the numbers before they were
+        converted to metres and radians and rounded (up to three roundings each).
+
+    Examples
+    --------
+    >>> from graphsynth.systems.antenna import PointingMechanism
+    >>> import numpy as np
+    >>> found = PointingMechanism().tolerance(np.radians(15), np.radians(15))
+    >>> print(found.report())
+    certified: one pose of this mode for all lengths in the box
+    elevation 8.907526593 deg: certified -44.3763 .. +44.4260, corners -44.3762 .. +44.4259, first order 44.4010
+    azimuth 8.814978215 deg: certified -42.9741 .. +43.0184, corners -42.9740 .. +43.0184, first order 42.9962
+    """
     choice("method", method, ("mixed", "mean_value"))
     given = finite_array("widths", widths)
     if given.shape not in ((), (5,)):
         raise GeometryError(f"widths has shape {given.shape}; give one number or five, for l1 to l5")
     box_widths = tuple(np.broadcast_to(given, 5).tolist())
-    for name, length, width in zip(NAMES, mechanism.lengths, box_widths):
+    for name, length, width in zip(NAMES, self.lengths, box_widths):
         if not 0.0 <= width < length:
             raise GeometryError(f"the tolerance {width} of {name} must be at least 0 and below the length {length}")
     slack = _CONVERTED if converted else 0.0
-    problem = LengthBoxProblem(mechanism, finite("phi_x", phi_x), finite("phi_y", phi_y), s_y, s_x, slack)
+    problem = LengthBoxProblem(self, finite("phi_x", phi_x), finite("phi_y", phi_y), s_y, s_x, slack)
     box = _box(problem, box_widths)
-    estimates = _estimates(problem, box_widths)
+    outputs = _estimates(problem, box_widths)
     try:
         found = problem.enclose(box)
         bounds = [[found.u, found.u], [found.v, found.v]]
@@ -379,34 +400,21 @@ def tolerance(
                 low, high = (_face_bound(problem, box, found, which, upward) for upward in (False, True))
                 bounds[which] = [max(bounds[which][0].a, low.a), min(bounds[which][1].b, high.b)]
     except NoProof as failure:
-        lengths, reason = _explain(problem, box_widths, failure)
-        outputs = [_bounds(part, math.nan, math.nan, (False,) * 5) for part in estimates]
-        status = ToleranceStatus.UNDECIDED
+        (lengths, reason), status = _explain(problem, box_widths, failure), ToleranceStatus.UNDECIDED
     else:
         lengths, reason, status = (), "certified: one pose of this mode for all lengths in the box", ToleranceStatus(0)
-        outputs = []
-        for part, (low, high), gradient in zip(estimates, bounds, (found.du, found.dv)):
+        for k, ((low, high), gradient) in enumerate(zip(bounds, (found.du, found.dv))):
             monotone = tuple(bool(rate.a > 0 or rate.b < 0) for rate in gradient)
-            outputs.append(_bounds(part, _floor(low), _ceil(high), monotone))
+            # rounded outward
+            lower, upper = float(low.a), float(high.b)
+            lower = lower if low.a >= lower else math.nextafter(lower, -math.inf)
+            upper = upper if high.b <= upper else math.nextafter(upper, math.inf)
+            outputs[k] = replace(outputs[k], lower=lower, upper=upper, monotone=monotone)
     u, v = outputs
-    return Tolerance(status, reason, lengths, *((v, u) if mechanism.order == "YX" else (u, v)))
+    return Tolerance(status, reason, lengths, *((v, u) if self.order == "YX" else (u, v)))
 
 
-class _Estimate(NamedTuple):
-    """Nominal value, extreme corners, first-order deviation, gradient."""
-
-    nominal: float
-    low: float
-    high: float
-    first_order: float
-    gradient: tuple[float, ...]
-
-
-def _bounds(part: _Estimate, lower: float, upper: float, monotone: tuple[bool, ...]) -> AngleBounds:
-    return AngleBounds(part.nominal, lower, upper, part.low, part.high, part.first_order, part.gradient, monotone)
-
-
-def _estimates(problem: LengthBoxProblem, widths: tuple[float, ...]) -> list[_Estimate]:
+def _estimates(problem: LengthBoxProblem, widths: tuple[float, ...]) -> list[AngleBounds]:
     """Nominal value, extreme corners, first-order estimate and gradient of u and of v, in double precision."""
     lengths = problem.mechanism.lengths
     nominal = problem.nominal(lengths)
@@ -418,7 +426,7 @@ def _estimates(problem: LengthBoxProblem, widths: tuple[float, ...]) -> list[_Es
         order = sum(abs(g) * w for g, w in zip(gradient, widths))
         offsets = np.remainder(corners[:, i] - nominal[i] + math.pi, math.tau) - math.pi  # no jump at +-pi
         low, high = nominal[i] + float(offsets.min()), nominal[i] + float(offsets.max())
-        made.append(_Estimate(nominal[i], low, high, order, gradient))
+        made.append(AngleBounds(nominal[i], math.nan, math.nan, low, high, order, gradient, (False,) * 5))
     return made
 
 

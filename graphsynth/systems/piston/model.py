@@ -102,10 +102,9 @@ class CrankSlider:
 
     def crosshead(self, phi: ArrayLike) -> Derivatives:
         """Place of the crosshead's pin along its guide, counted from the foot of the crank's centre, m."""
-        angle = np.asarray(phi, dtype=np.float64)
-        c, s = self.crank * np.cos(angle), self.crank * np.sin(angle)
-        q, b = self._across(angle)[1], float(self.branch)
-        return Derivatives(c + b * q.value, -s + b * q.first, -c + b * q.second)
+        (_, c, minus_s), q = self._across(phi)
+        b = float(self.branch)
+        return Derivatives(c + b * q.value, minus_s + b * q.first, -c + b * q.second)
 
     def follower(self, phi: ArrayLike) -> Derivatives:
         """Angle of the rod, from crank pin to crosshead pin, against the guide, radians."""
@@ -203,8 +202,9 @@ class ScotchYoke:
     def dead_centres(self) -> _Ends:
         """Crank angle in [0, 2 pi) and yoke's place at the outer and the inner dead centre; exact."""
         amplitude, mean = self._wave
-        outer, inner = (((self.yoke_angle - sign * 0.5 * math.pi) % _TURN, mean + sign * amplitude) for sign in (1, -1))
-        return outer, inner
+        quarter = 0.5 * math.pi
+        outer = (self.yoke_angle - quarter) % _TURN, mean + amplitude
+        return outer, ((self.yoke_angle + quarter) % _TURN, mean - amplitude)
 
     def joints(self) -> list[JointGeometry]:
         """Joints of links 0..3: frame, crank, block, yoke."""
@@ -258,20 +258,16 @@ class FloatingGroup:
                 f"cylinder_angle = {self.cylinder_angle:.6g} rad turns the cylinder square to the crosshead's guide or "
                 "beyond; keep it between -pi/2 and pi/2"
             )
-        slot = f"slot_angle = {self.slot_angle:.6g} rad"
+        why = ""
         if abs(math.sin(self.slot_angle - self.cylinder_angle)) < _PARALLEL:
-            raise GeometryError(
-                f"{slot} is parallel to the cylinder, so the piston has no definite place; turn the slot, best by pi/2"
-            )
-        if abs(math.sin(self.slot_angle)) < _PARALLEL:
-            raise GeometryError(
-                f"{slot} is parallel to the crosshead's guide, so the piston stands still; turn the slot, best to pi/2"
-            )
-        if self.transmission[0] < 0.0:
-            raise GeometryError(
-                f"{slot} lies between the directions of guide and cylinder, so the piston moves against the crosshead; "
-                "turn the slot, best to pi/2"
-            )
+            why = "is parallel to the cylinder, so the piston has no definite place; turn the slot, best by pi/2"
+        elif abs(math.sin(self.slot_angle)) < _PARALLEL:
+            why = "is parallel to the crosshead's guide, so the piston stands still; turn the slot, best to pi/2"
+        elif self.transmission[0] < 0.0:
+            why = "lies between the directions of guide and cylinder, so the piston moves against the crosshead; turn "
+            why += "the slot, best to pi/2"
+        if why:
+            raise GeometryError(f"slot_angle = {self.slot_angle:.6g} rad {why}")
 
     @property
     def transmission(self) -> tuple[float, float]:
@@ -385,13 +381,7 @@ class FloatingPiston:
         return self.group.cylinder_angle, 1j * (self.drive.offset + self.group.cylinder_offset)
 
     def motion(self, angle: ArrayLike) -> PistonMotion:
-        """Positions, and first and second derivatives by the crank angle, at any angles.
-
-        Raises
-        ------
-        GeometryError
-            Angles that are not finite numbers.
-        """
+        """Positions, and first and second derivatives by the crank angle, at any finite angles."""
         phi = finite_array("angle", angle)
         crosshead, follower = self.drive.crosshead(phi), self.drive.follower(phi)
         if self.group is None:
@@ -401,17 +391,15 @@ class FloatingPiston:
 
     def dead_centres(self) -> tuple[DeadCentre, DeadCentre]:
         """Outer (next to the cylinder's head) and inner dead centre."""
-        factor = 1.0 if self.group is None else self.group.transmission[0]
-        constant = 0.0 if self.group is None else self.group.place()[0]
+        factor, constant = (1.0, 0.0) if self.group is None else (self.group.transmission[0], self.group.place()[0])
         outer, inner = (DeadCentre(phi, s, constant + factor * s) for phi, s in self.drive.dead_centres())
         return outer, inner
 
     @property
     def stroke(self) -> float:
         """Way of the piston between the dead centres, m."""
-        outer, inner = self.dead_centres()
-        factor = 1.0 if self.group is None else self.group.transmission[0]
-        return factor * (outer.crosshead - inner.crosshead)
+        (_, outer), (_, inner) = self.drive.dead_centres()
+        return (1.0 if self.group is None else self.group.transmission[0]) * (outer - inner)
 
     @property
     def time_ratio(self) -> float:
@@ -423,10 +411,7 @@ class FloatingPiston:
     def angle_at(self, piston: float, towards_head: bool) -> float:
         """Crank angle in [0, 2 pi) at which the piston passes a place on its way to or from the head (to rounding).
 
-        Raises
-        ------
-        GeometryError
-            A place that the piston does not reach.
+        A `GeometryError` refuses a place that the piston does not reach.
         """
         from scipy.optimize import brentq
 
@@ -471,17 +456,7 @@ class FloatingPiston:
     def run(self, angle: ArrayLike, slot: Literal["sliding", "crowned"] = "crowned") -> Motion:
         """Return the motion, in closed form, as the planar engine gives it; to draw and for dynamics.
 
-        Parameters
-        ----------
-        angle : array_like, shape (n,)
-            Crank angles in any order.
-        slot : {"sliding", "crowned"}
-            See `mechanism`.
-
-        Raises
-        ------
-        GeometryError
-            Angles that are not one list of finite numbers.
+        Crank angles of shape (n,) in any order, or a `GeometryError`; for `slot` see `mechanism`.
         """
         from graphsynth.pipeline.display import shown_motion
 
@@ -496,19 +471,10 @@ class FloatingPiston:
     def mechanism(self, slot: Literal["sliding", "crowned"] = "sliding", at: float = 0.5) -> Mechanism:
         """Return the dimensioned mechanism for the planar engine and for dynamics.
 
-        Parameters
-        ----------
-        slot : {"sliding", "crowned"}
-            "sliding": the joint 3-4 is a prismatic joint, mobility 1, as the source has it; one constraint is
-            redundant. "crowned": the slot lets the piston turn in it, mobility 2; no constraint is redundant and the
-            motion is the same.  The planar engine takes this one.
-        at : float
-            Crank angle of the pose, radians.
-
-        Raises
-        ------
-        GeometryError
-            For another ``slot``.
+        `slot` "sliding": the joint 3-4 is a prismatic joint, mobility 1, as the source has it; one constraint is
+        redundant.  "crowned": the slot lets the piston turn in it, mobility 2; no constraint is redundant and the
+        motion is the same; the planar engine takes this one.  A `GeometryError` refuses others.  `at`: crank angle of
+        the pose, radians.
         """
         if not isinstance(slot, str) or slot not in ("sliding", "crowned"):
             raise GeometryError(f"slot = {slot!r} is not known; give 'sliding' or 'crowned'")

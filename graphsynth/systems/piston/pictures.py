@@ -8,6 +8,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,21 +34,8 @@ _ORDERS = (("displacement", "mm"), ("velocity", "mm/rad"), ("acceleration", "mm/
 def piston_sketch(machine: FloatingPiston, angle: float, *, width: float = 640.0, numbers: bool = True) -> Sketch:
     """Kinematic diagram at one crank angle: cylinder with its head, piston, slot, crosshead on its guide, crank.
 
-    Parameters
-    ----------
-    machine : FloatingPiston
-        All dimensions are true; the piston's stem, the shoe of the guide and the bore are drawn as long as looks well.
-    angle : float
-        Crank angle, radians.
-    width : float
-        Pixels.
-    numbers : bool
-        Write the numbers of the links.
-
-    Returns
-    -------
-    Sketch
-        ``piston_sketch(machine, 1.0).svg()`` is one self-contained ``<svg>``.
+    All dimensions are true; the piston's stem, the shoe of the guide and the bore are drawn as long as looks well.
+    `width` in pixels; `numbers` writes the numbers of the links.
 
     Examples
     --------
@@ -104,11 +92,18 @@ class _Drawing:
         return where + group.lead + (middle + sense * half) * cmath.exp(1j * group.slot_angle)
 
     def _draw(self) -> None:
-        self._guide()
-        if self.machine.group is None:
-            self._cylinder(self._piston_head(self.crosshead + (0.0 if self.slider else self.stem)))
-        else:
-            self._cylinder(self._piston_head(self._on_axis(self.place + self.stem)))
+        r = self.r
+        if self.machine.group is not None:  # ground under the shoe of the crosshead, as long as its travel
+            start, stop = (dead.crosshead + self.shoe for dead in (self.dead[1], self.dead[0]))
+            self._hatched(self.offset + start - (0.5 + 0.2j) * r, self.offset + stop + (0.5 - 0.2j) * r)
+        # the cylinder: two walls and the head
+        near = self._on_axis(self.dead[1].piston + self.stem - 0.45 * r)
+        far = self._on_axis(self.dead[0].piston + self.stem + 0.5 * r)
+        side = 0.47j * r * self.axis
+        for one, other in pairwise((near - side, far - side, far + side, near + side)):
+            self._hatched(one, other)
+        head = self.crosshead + (0.0 if self.slider else self.stem)
+        self._piston_head(head if self.machine.group is None else self._on_axis(self.place + self.stem))
         self._crosshead()
         self._first_links()
         if self.numbers:
@@ -119,31 +114,14 @@ class _Drawing:
         corners = [centre + half + across, centre - half + across, centre - half - across, centre + half - across]
         (self.sketch.plate if filled else self.sketch.outline)(corners, width=2.0)
 
-    def _guide(self) -> None:
-        """Ground under the shoe of the crosshead, as long as its travel."""
-        if self.machine.group is None:
-            return
-        start, stop = (dead.crosshead + self.shoe for dead in (self.dead[1], self.dead[0]))
-        feet = [self.offset + x - 0.2j * self.r for x in (start - 0.5 * self.r, stop + 0.5 * self.r)]
-        self._hatched(feet[0], feet[1])
-
     def _hatched(self, start: complex, end: complex) -> None:
         """Ground to the right of the way from start to end."""
         down = -1j * (end - start) / abs(end - start) * self.sketch.pixel * self.sketch.symbol
         strokes = max(5, round(abs(end - start) * self.sketch.scale / 13.0))
         self.sketch.hatch(start, end, down, strokes)
 
-    def _cylinder(self, wall: float) -> None:
-        """Two walls and the head; the piston's length at both ends is left open below."""
-        near = self._on_axis(self.dead[1].piston + self.stem - 0.45 * self.r)
-        far = self._on_axis(self.dead[0].piston + self.stem + 0.5 * self.r)
-        side = 1j * self.axis * wall
-        self._hatched(near - side, far - side)
-        self._hatched(far - side, far + side)
-        self._hatched(far + side, near + side)
-
-    def _piston_head(self, centre: complex) -> float:
-        """Piston in the cylinder and its stem; return the distance of the walls from the axis."""
+    def _piston_head(self, centre: complex) -> None:
+        """Piston in the cylinder and its stem."""
         self.sketch.on(layer="bar")
         if self.machine.group is not None:
             self.sketch.bar(self._on_axis(self.place), centre)
@@ -152,7 +130,6 @@ class _Drawing:
         self.sketch.on(layer="block")
         self._block(centre, self.axis, 0.6, 0.86, filled=True)
         self.sketch.on()
-        return 0.47 * self.r
 
     def _crosshead(self) -> None:
         """Crosshead with its shoe and, for the second group, the slot with the block of the piston in it."""
@@ -216,18 +193,10 @@ class _Drawing:
 
 
 def piston_motion_chart(machine: FloatingPiston, order: int = 0) -> Chart:
-    """Displacement, velocity or acceleration of piston, and of crosshead and slot where they differ, over a turn.
+    """Displacement, velocity or acceleration (`order`) of piston, and of crosshead and slot where they differ.
 
-    Parameters
-    ----------
-    machine : FloatingPiston
-    order : {0, 1, 2}
-        Derivatives are by the crank angle; displacements count from the inner dead centre.
-
-    Raises
-    ------
-    GeometryError
-        Another order.
+    Over a turn; derivatives are by the crank angle, displacements count from the inner dead centre.  A `GeometryError`
+    refuses another order.
     """
     if order not in (0, 1, 2):
         raise GeometryError(f"order = {order} must be 0, 1 or 2: displacement, velocity or acceleration")
@@ -240,11 +209,8 @@ def piston_motion_chart(machine: FloatingPiston, order: int = 0) -> Chart:
         slot = motion.slot[order] - (motion.slot[0].mean() if order == 0 else 0.0)
         lines.append(Line(x, 1e3 * slot, "piston in the slot", "c", "-."))
     word, unit = _ORDERS[order]
-    return Chart(lines, _NAME, f"{word} [{unit}]", marks=_dead_marks(machine), xticks=_TICKS)
-
-
-def _dead_marks(machine: FloatingPiston) -> list[Mark]:
-    return [Mark(math.degrees(dead.angle)) for dead in machine.dead_centres()]
+    marks = [Mark(math.degrees(dead.angle)) for dead in machine.dead_centres()]
+    return Chart(lines, _NAME, f"{word} [{unit}]", marks=marks, xticks=_TICKS)
 
 
 def _unit(values: Array) -> tuple[float, str]:
@@ -255,22 +221,9 @@ def _unit(values: Array) -> tuple[float, str]:
 def side_load_chart(machine: PistonMachine, length: float | None = None) -> Chart:
     """Side load on the cylinder of the floating and of the plain piston, and the load of the crosshead's guide.
 
-    Dotted: what static friction in a slot that does not slide may add to the floating piston's.
-
-    For a Scotch yoke, whose plain piston has a couple and hardly a side load, the forces at the far ends of piston and
-    shoe.
-
-    Parameters
-    ----------
-    machine : PistonMachine
-        With a second group.
-    length : float, optional
-        Of piston and shoe, for the forces at their ends, m; the stroke by default.
-
-    Raises
-    ------
-    GeometryError
-        A machine without a second group.
+    Dotted: what static friction in a slot that does not slide may add to the floating piston's.  For a Scotch yoke,
+    whose plain piston has a couple and hardly a side load, the forces at the far ends of piston and shoe: `length` is
+    theirs, m, the stroke by default.  A `GeometryError` refuses a machine without a second group.
     """
     if machine.mechanism.group is None:
         raise GeometryError("the machine has no second group to compare with; give a mechanism with a FloatingGroup")

@@ -149,7 +149,12 @@ def _turn(machine: PistonMachine, size: float) -> PistonTurn:
         )
     nodes, weights = _nodes(machine)
     loads = machine.loads(nodes)
-    _check(loads)
+    bad = np.flatnonzero(~np.isfinite(loads.torque))
+    if len(bad):
+        raise GeometryError(
+            f"friction leaves no single solution at the crank angle {loads.angle[bad[0]] % _TURN:.6g} rad: the machine "
+            "jams there, or may; reduce the friction coefficients, or make slot and cylinder square"
+        )
     powers = (loads.driving, loads.gas_power, loads.friction_power, loads.kinetic_power, loads.weight_power)
     motor, gas, friction, kinetic, lifted = (float(weights @ p) / abs(machine.speed) for p in powers)
     moved = max(float(weights @ np.abs(p)) / abs(machine.speed) for p in powers[:4])
@@ -204,9 +209,7 @@ def compare_pistons(machine: PistonMachine, length: float | None = None) -> Pist
         raise GeometryError("the machine has no second group to compare with; give a mechanism with a FloatingGroup")
     size = machine.mechanism.stroke if length is None else length
     floating, plain = piston_turn(machine, size), piston_turn(machine.without_group(), size)
-    drive = machine.mechanism.drive
-    some = np.linspace(0.0, 2.0 * math.pi, 91)
-    least = 1e-10 * float(np.abs(machine.loads(some).crank_pin).max())
+    drive, least = machine.mechanism.drive, _rounding(machine)
     return PistonComparison(
         floating,
         plain,
@@ -228,26 +231,19 @@ def _ratio(one: float, other: float, least: float) -> float:
     return one / other if other > least else math.nan
 
 
-def _check(loads: PistonLoads) -> None:
-    bad = np.flatnonzero(~np.isfinite(loads.torque))
-    if len(bad):
-        at = loads.angle[bad[0]] % (_TURN)
-        raise GeometryError(
-            f"friction leaves no single solution at the crank angle {at:.6g} rad: the machine jams there, or may; "
-            "reduce the friction coefficients, or make slot and cylinder square"
-        )
-
-
 def _nodes(machine: PistonMachine) -> tuple[Array, Array]:
     """Nodes and weights of a turn: panels end at kinks and shrink towards places where loads change fast."""
-    start = machine.mechanism.dead_centres()[0].angle
-    narrow = _narrow(machine)
-    edges = {start, start + _TURN}
-    for at in (*(place for place, _ in narrow), *_valves(machine), *_sign_changes(machine)):
-        edges.add(start + (at - start) % (_TURN))
+    outer, inner = machine.mechanism.dead_centres()
+    start, narrow = outer.angle, _narrow(machine)
+    kinks = [place for place, _ in narrow] + _sign_changes(machine)
+    for gap, closing in machine.gas.kinks(machine.mechanism.stroke):
+        place = min(max(outer.piston - gap, inner.piston), outer.piston)
+        # turning backwards, the crank angles of the way to the head are those of the way back
+        kinks.append(machine.mechanism.angle_at(place, closing if machine.speed > 0.0 else not closing))
+    edges = {start, start + _TURN, *(start + (at - start) % _TURN for at in kinks)}
     for at, offset in narrow:
         while offset < _WIDEST:
-            edges |= {start + (at + side * offset - start) % (_TURN) for side in (1.0, -1.0)}
+            edges |= {start + (at + side * offset - start) % _TURN for side in (1.0, -1.0)}
             offset *= 2.0
     ends = np.array(sorted(edges))
     pieces = [np.linspace(a, b, max(1, math.ceil((b - a) / _WIDEST)) + 1)[:-1] for a, b in pairwise(ends) if b > a]
@@ -285,17 +281,6 @@ def _zone(machine: PistonMachine, reversals: list[float]) -> float:
     steep = max(float(np.abs(part.second).max()) for part in (motion.crosshead, motion.piston, motion.slot))
     steep = max(steep, machine.mechanism.drive.crank)
     return max(_FINEST * friction.smoothing_velocity / (abs(machine.speed) * steep), 1e-9)
-
-
-def _valves(machine: PistonMachine) -> list[float]:
-    """Crank angles where the gas force is not smooth."""
-    outer, inner = machine.mechanism.dead_centres()
-    found = []
-    for gap, closing in machine.gas.kinks(machine.mechanism.stroke):
-        place = min(max(outer.piston - gap, inner.piston), outer.piston)
-        # turning backwards, the crank angles of the way to the head are those of the way back
-        found.append(machine.mechanism.angle_at(place, closing if machine.speed > 0.0 else not closing))
-    return found
 
 
 def _sign_changes(machine: PistonMachine) -> list[float]:

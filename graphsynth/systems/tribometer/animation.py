@@ -50,8 +50,7 @@ def tribometer_sketch(motion: StickSlipMotion, at: float = 0.0) -> str:
     """Draw the tribometer at the known moment next to a time, s, its parts named; `SpecError` if nothing is known."""
     known = _known(motion)
     k = int(known[np.argmin(np.abs(motion.t[known] - at))])
-    drawing = Moving(_WIDTH, _SCENE + 16.0, 1.0)
-    stage = _Stage(motion)
+    drawing, stage = Moving(_WIDTH, _SCENE + 16.0, 1.0), _Stage(motion)
     stage.draw(drawing, np.array([k]))
     stage.names(drawing, k)
     return drawing.svg("Tribometer")
@@ -114,7 +113,12 @@ class _Stage:
         hatch = "".join(f"M{x:.1f} {floor + 1:.1f} l-6 8 " for x in ground)
         drawing.fixed(f'<path d="M14 {floor:.1f} H{_WIDTH - 14:.1f} {hatch}" {_line(1.2)}/>')
         if self.belt:
-            self._belt(drawing, frames)
+            # marks run along the belt and start anew
+            length = _WIDTH - 60.0
+            drawing.fixed(f'<rect x="30" y="{floor - 34:.1f}" width="{length:.1f}" height="10" rx="5" {_LOWER}/>')
+            for k in range(8):
+                x = 30.0 + np.remainder(self.scale * self.motion.x1[frames] + k * (length / 8.0), length)
+                drawing.circle(np.stack([x, np.full_like(x, floor - 29.0)], -1), 3.0, painted("ink"))
         else:
             drawing.box(x1 - 1.8 * unit, floor - 34.0, 3.6 * unit, 28.0, _LOWER)
             for side in (-1.4, 1.4):
@@ -166,16 +170,6 @@ class _Stage:
         drawing.path(np.stack([tip, end], 1), _line(2.4))
         for points in (middle, tip, end):
             drawing.circle(points, 4.0, painted("paper", "ink", 1.6))
-
-    def _belt(self, drawing: Moving, frames: NDArray[np.intp]) -> None:
-        """Add a belt whose marks run along and start anew."""
-        top, length = self.floor - 34.0, _WIDTH - 60.0
-        drawing.fixed(f'<rect x="30" y="{top:.1f}" width="{length:.1f}" height="10" rx="5" {_LOWER}/>')
-        shift = self.scale * self.motion.x1[frames]
-        gap = length / 8.0
-        for k in range(8):
-            x = 30.0 + np.remainder(shift + k * gap, length)
-            drawing.circle(np.stack([x, np.full_like(x, top + 5.0)], -1), 3.0, painted("ink"))
 
     def names(self, drawing: Moving, k: int) -> None:
         """Name the parts."""

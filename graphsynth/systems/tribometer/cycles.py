@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import SpecError
 from graphsynth.systems.tribometer.model import Tribometer
-from graphsynth.systems.tribometer.motion import EventGuard, StickSlipEvent
+from graphsynth.systems.tribometer.motion import EventGuard, StickSlipEvent, StickSlipMotion
 from graphsynth.systems.tribometer.platforms import BeltDrive, TwoCoefficientLaw
 
 Array = NDArray[np.float64]
@@ -33,12 +33,7 @@ def belt_cycle(model: Tribometer) -> BeltCycle:
     """Stick-slip cycle on a belt without damping, two-coefficient law: closed form, exact.
 
     ``T_stick = 2 (mu_s - mu_k) N / (k v0)``, ``T_slip = (2/w0) (pi - atan(A))`` with
-    ``A = (mu_s - mu_k) N w0 / (k v0)`` (theory/tribometer 7).
-
-    Raises
-    ------
-    SpecError
-        If the drive is no moving belt, or there is damping, or the law has not two coefficients.
+    ``A = (mu_s - mu_k) N w0 / (k v0)`` (theory/tribometer 7).  `SpecError` for other drives and laws.
 
     Examples
     --------
@@ -65,41 +60,22 @@ def belt_cycle(model: Tribometer) -> BeltCycle:
 
 @dataclass(frozen=True)
 class LimitCycle:
-    """A periodic motion.
+    """A periodic motion, and its state ``x2``, ``v2`` (m, m/s) at whole turns of the crank, on a belt at the release.
 
-    Attributes
-    ----------
-    kind : str
-        "stick-slip", "sliding" (periodic without sticking), "stuck" (carried along all the time), "steady" (at rest on
-        a moving belt) or "none found".
-    period : float
-        s; NaN if none was found or the platform is at rest.
-    turns : int
-        Turns of the crank in one period; 0 on a belt.
-    x2, v2 : float
-        State at the start of the period: at whole turns of the crank, on a belt at the release.
-    events : tuple of StickSlipEvent
-        Events of one period, times counted from its start.
-    multipliers : tuple of float or complex
-        Factors by which small changes of the state shrink over a period (Floquet multipliers); 0 for directions that a
-        stick piece forgets altogether.
-    stable : bool
-        All multipliers below 1 in size.
-    residual : float
-        Change of x2 and of ``v2 / frequency`` over one period, m.
-    statement : str
-        One sentence.
+    ``kind`` is "stick-slip", "sliding" (periodic without sticking), "stuck" (carried along all the time), "steady" (at
+    rest on a moving belt) or "none found".  ``multipliers`` are the factors by which small changes of the state shrink
+    over a period (Floquet multipliers), 0 for directions that a stick piece forgets altogether.
     """
 
     kind: str
-    period: float
-    turns: int
+    period: float  #: s; NaN if none was found or the platform is at rest
+    turns: int  #: of the crank in one period; 0 on a belt
     x2: float
     v2: float
-    events: tuple[StickSlipEvent, ...]
+    events: tuple[StickSlipEvent, ...]  #: of one period, times counted from its start
     multipliers: tuple[complex, ...]
-    stable: bool
-    residual: float
+    stable: bool  #: all multipliers below 1 in size
+    residual: float  #: change of x2 and of ``v2 / frequency`` over one period, m
     statement: str
 
 
@@ -108,23 +84,10 @@ def limit_cycle(
 ) -> LimitCycle:
     """Find the periodic motion to which the tribometer settles; estimated.
 
-    With a crank the state at whole turns is followed until it repeats after 1, 2, ... ``longest`` turns.  On a belt the
-    state at the release is always the same, so one slip and one stick make the cycle.
-
-    Parameters
-    ----------
-    model : Tribometer
-        Its initial state decides between several cycles.
-    most_turns : int
-        Bound on the turns followed.
-    longest : int
-        Longest period looked for, in turns.
-    guard : EventGuard, optional
-
-    Returns
-    -------
-    LimitCycle
-        ``kind`` "none found" and NaN if the motion does not repeat or the run stopped early.
+    With a crank the state at whole turns, ``most_turns`` of them, is followed until it repeats after 1, 2, ...
+    ``longest`` turns; the initial state decides between several cycles.  On a belt the state at the release is always
+    the same, so one slip and one stick make the cycle.  "none found" and NaN if the motion does not repeat or the run
+    stopped early.
 
     Examples
     --------
@@ -136,30 +99,32 @@ def limit_cycle(
     if isinstance(model.drive, BeltDrive):
         return _on_belt(model, guard)
     spell = model.drive.period
-    states = [np.array([model.x2, model.start()[0]])]
+    states, stuck = [np.array([model.x2, model.start()[0]])], model.v2 is None
     scale = max(model.reach, 1e-3 * abs(float(np.abs(model.drive.motion(0.0).x))))
-    now = model
     while len(states) <= most_turns:
-        motion = now.event_driven(spell, times=[spell], guard=guard, estimate=False)
+        motion, state = _run(model, states[-1], stuck, spell, guard)
         if not motion.complete:
             return _none(f"The run stopped in turn {len(states)}: {motion.statement}")
-        states.append(np.array([motion.x2[-1], motion.v2[-1]]))
+        states.append(state)
         stuck = bool(motion.state[-1] == 0)
-        now = _from(model, states[-1], stuck)
         for turns in range(1, min(longest, len(states) - 1) + 1):
-            if _gap(model, states[-1], states[-1 - turns]) <= 1e-13 * scale:
+            if _gap(model, state, states[-1 - turns]) <= 1e-13 * scale:
                 # a shorter period may close a little more slowly, when the motion settles with changing sign
-                turns = next(n for n in range(1, turns + 1) if _gap(model, states[-1], states[-1 - n]) <= 1e-11 * scale)
-                return _describe(model, states[-1], stuck, turns, guard)
+                turns = next(n for n in range(1, turns + 1) if _gap(model, state, states[-1 - n]) <= 1e-11 * scale)
+                return _describe(model, state, stuck, turns, guard)
     return _none(
         f"The state at whole turns did not repeat within {most_turns} turns (periods up to {longest} turns): "
         "raise most_turns, or the motion is not periodic."
     )
 
 
-def _from(model: Tribometer, state: Array, stuck: bool) -> Tribometer:
-    """Return the model with another state at its start."""
-    return replace(model, x2=float(state[0]), v2=None if stuck else float(state[1]))
+def _run(
+    model: Tribometer, state: Array, stuck: bool, duration: float, guard: EventGuard, estimate: bool = False
+) -> tuple[StickSlipMotion, Array]:
+    """Run from another state of the upper platform, and return the state at the end too."""
+    start = replace(model, x2=float(state[0]), v2=None if stuck else float(state[1]))
+    motion = start.event_driven(duration, times=[duration], guard=guard, estimate=estimate)
+    return motion, np.array([motion.x2[-1], motion.v2[-1]])
 
 
 def _gap(model: Tribometer, a: Array, b: Array) -> float:
@@ -171,10 +136,9 @@ def _none(statement: str) -> LimitCycle:
 
 
 def _describe(model: Tribometer, state: Array, stuck: bool, turns: int, guard: EventGuard) -> LimitCycle:
-    start = _from(model, state, stuck)
     period = turns * model.drive.period
-    motion = start.event_driven(period, times=[period], guard=guard)
-    residual = _gap(model, np.array([motion.x2[-1], motion.v2[-1]]), state)
+    motion, end = _run(model, state, stuck, period, guard, estimate=True)
+    residual = _gap(model, end, state)
     sticking = (motion.path.columns.state == 0.0) if motion.path is not None else np.array([True])
     kind = "sliding" if not sticking.any() else "stuck" if not motion.events else "stick-slip"
     factors = (1.0 + 0j,) if kind == "stuck" else _multipliers(model, state, stuck, period, guard)
@@ -195,12 +159,11 @@ def _multipliers(model: Tribometer, state: Array, stuck: bool, period: float, gu
     step = _NUDGE * model.reach
     columns = []
     for unit in ([1.0, 0.0],) if stuck else ([1.0, 0.0], [0.0, model.frequency]):
-        ends = []
-        for sign in (1.0, -1.0):
-            moved = _from(model, state + sign * step * np.array(unit), stuck)
-            motion = moved.event_driven(period, times=[period], guard=guard, estimate=False)
-            ends.append(np.array([motion.x2[-1], motion.v2[-1] / model.frequency]))
-        columns.append((ends[0] - ends[1]) / (2.0 * step))
+        more, less = (
+            _run(model, state + change, stuck, period, guard)[1] / [1.0, model.frequency]
+            for change in (step * np.array(unit), -step * np.array(unit))
+        )
+        columns.append((more - less) / (2.0 * step))
     if stuck:
         return (complex(columns[0][0]), 0j)
     return tuple(complex(value) for value in np.linalg.eigvals(np.array(columns).T))

@@ -105,29 +105,16 @@ def method_study(
     rounds: int = 3,
     most_calls: int = 600_000,
 ) -> Problem:
-    """Error and run time of all three methods on one tribometer, failures and refusals included.
+    """Error and run time of all three methods on one tribometer over ``duration`` s, failures and refusals included.
 
     The reference is the automaton with the tolerance 1e-14: for its own rows it is itself, for the others a different
-    method.  Rows of the regularised form say "unreliable" if the error is more than three times that of the form with
-    the other solvers at the same speed, or more than ten times `model_error` if there is no other.
+    method; `SpecError` if it does not finish.  Rows of the regularised form say "unreliable" if the error is more than
+    three times that of the form with the other solvers at the same speed, or more than ten times `model_error` if there
+    is no other.
 
-    Parameters
-    ----------
-    model : Tribometer
-    duration : float
-        s.
-    tolerances, steps, speeds : sequence of float
-        Of the automaton; of time stepping, s; of the regularised form, m/s.  A method with none is left out.
-    solvers : sequence of str
-    rounds : int
-        Runs for the wall time, of which the shortest counts; solvers but LSODA run once.
-    most_calls : int
-        A solver that needs more is shown as failed.
-
-    Raises
-    ------
-    SpecError
-        There is no reference: the automaton did not finish.
+    Settings are ``tolerances`` of the automaton, ``steps`` (s) of time stepping, ``speeds`` (m/s) and ``solvers`` of
+    the regularised form, of which one that needs more than ``most_calls`` calls has failed; a method without settings
+    is left out.  Of ``rounds`` runs the shortest counts; solvers but LSODA run once.
 
     Examples
     --------
@@ -152,21 +139,15 @@ def method_study(
         solve = partial(model.regularised, solver=solver, check=False, most_calls=most_calls)
         smooth += rows(solver, "speed", speeds, solve)
     question = f"Stick-slip over {duration:g} s: position of the upper platform every 50 ms"
-    found += [_doubted(row, smooth) for row in smooth]
+    for row in smooth:
+        others = [other.error for other in smooth if other.value == row.value and other.method != row.method]
+        others = [error for error in others if not math.isnan(error)]
+        bound = 3.0 * min(others) if others else 10.0 * model_error(row.value)
+        if row.status is RowStatus.OK and row.error > bound:
+            text = f"{row.method} reports success with an error of {row.error:.1e} m, above that of the form itself."
+            row = replace(row, status=RowStatus.UNRELIABLE, reason=text)
+        found.append(row)
     return Problem("stick-slip", question, "m", tuple(found), note=f"Error against {truth.name}.")
-
-
-def _doubted(row: Row, all_rows: list[Row]) -> Row:
-    """Mark a success whose error is far above that of the form itself."""
-    if row.status is not RowStatus.OK:
-        return row
-    others = [other.error for other in all_rows if other.value == row.value and other.method != row.method]
-    others = [error for error in others if not math.isnan(error)]
-    bound = 3.0 * min(others) if others else 10.0 * model_error(row.value)
-    if row.error <= bound:
-        return row
-    text = f"{row.method} reports success with an error of {row.error:.1e} m, above that of the form itself."
-    return replace(row, status=RowStatus.UNRELIABLE, reason=text)
 
 
 def _default(method: str, name: str) -> Any:
@@ -219,25 +200,18 @@ def _general_rows(model: Tribometer, truth: PreciseMotion, duration: float, effo
     rows = []
     for rtol in effort.some(sorted({1e-6, 1e-8, 1e-10, own}, reverse=True)):
         run = partial(simulate_dynamics, general, [0.0, duration], start=start, form="augmented", rtol=rtol)
-        found, seconds, rounds = best_of(run, effort)
-        same = found.completed and len(found.events) == len(truth.events)
-        gap = max((abs(e.time - float(t.time)) for e, t in zip(found.events, truth.events)), default=0.0)
+        found, *timed = best_of(run, effort)
         more = {"events": float(len(found.events)), "steps or calls": float(found.steps)}
-        row = Row(
-            "general model",
-            f"rtol {rtol:.0e}",
-            abs(float(found.poses[-1, 2, 0]) - float(truth.x2)) if found.completed else math.nan,
-            seconds,
-            rounds,
-            _FINAL,
-            f"Taylor series with {_DIGITS} digits",
-            default=rtol == own,
-            more=more | ({"event error [s]": gap} if same else {}),
-        )
-        if not same:
-            why = "other events than the reference" if found.completed else found.message
-            row = replace(row, status=RowStatus.FAILED, reason=why)
-        rows.append(row)
+        why = "" if found.completed else found.message
+        if found.completed and len(found.events) != len(truth.events):
+            why = "other events than the reference"
+        elif not why:
+            gaps = (abs(e.time - float(t.time)) for e, t in zip(found.events, truth.events))
+            more["event error [s]"] = max(gaps, default=0.0)
+        error = abs(float(found.poses[-1, 2, 0]) - float(truth.x2)) if found.completed else math.nan
+        given: dict[str, Any] = {"kind": _FINAL, "reference": f"Taylor series with {_DIGITS} digits"}
+        given |= {"default": rtol == own, "more": more}
+        rows.append(Row.of("general model", f"rtol {rtol:.0e}", error, timed, why, **given))
     return rows
 
 
@@ -255,12 +229,8 @@ def stick_slip_problem(
     the event-driven run does not finish: then there is no reference.
     """
     effort = effort or Effort()
-    defaults = {
-        "event-driven": _default("event_driven", "rtol"),
-        "time stepping": _default("time_stepping", "step"),
-        "": _default("regularised", "speed"),
-    }
-    own_solver = _default("regularised", "solver")
+    defaults = {"event-driven": ("event_driven", "rtol"), "time stepping": ("time_stepping", "step")}
+    own_solver, speed = _default("regularised", "solver"), _default("regularised", "speed")
     study = partial(method_study, model, duration, most_calls=200_000)
     found = study(
         tolerances=effort.some((1e-4, 1e-6, 1e-8, 1e-10, 1e-12)),
@@ -271,17 +241,17 @@ def stick_slip_problem(
     )
     rows = list(found.rows)
     if own_solver not in solvers and not effort.quick:
-        rows += study(tolerances=(), steps=(), speeds=(1e-2, 1e-3, defaults[""]), solvers=(own_solver,)).rows
+        rows += study(tolerances=(), steps=(), speeds=(1e-2, 1e-3, speed), solvers=(own_solver,)).rows
     shaped = []
     for row in rows:
-        own = row.method in defaults
-        is_default = row.value == defaults[row.method if own else ""] and (own or row.method == own_solver)
-        row = replace(row, default=is_default)
-        if row.method == "event-driven":
-            row = replace(row, reference=row.reference + " (the same method; see the problem events)")
-        if not own:
+        if row.method in defaults:
+            row = replace(row, default=row.value == _default(*defaults[row.method]))
+            if row.method == "event-driven":
+                row = replace(row, reference=row.reference + " (the same method; see the problem events)")
+        else:
+            default = row.method == own_solver and row.value == speed
             more = {key: value for key, value in row.more.items() if not key.startswith("event")}
-            row = replace(row, method=f"regularised, {row.method}", more=more)
+            row = replace(row, default=default, method=f"regularised, {row.method}", more=more)
         shaped.append(row)
     note = (
         f"Observed order of time stepping: {found.order('time stepping'):.2f}. The regularised form never sticks: it "

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError, TooLargeError
-from graphsynth.systems.tribometer.motion import EventGuard, RunStatus, StickSlipEvent, StickSlipMotion, event_driven
+from graphsynth.systems.tribometer.motion import RunStatus, StickSlipEvent, StickSlipMotion, event_driven, output_times
 from graphsynth.systems.tribometer.platforms import Platforms, StribeckLaw, TwoCoefficientLaw, finite, positive
 
 Array = NDArray[np.float64]
@@ -25,10 +24,21 @@ _SHARE = 0.5
 
 
 def time_stepping(
-    model: Platforms, duration: float, times: Array, step: float, weight: float, estimate: bool
+    self: Platforms,
+    duration: float = 10.0,
+    *,
+    step: float = 1e-4,
+    times: ArrayLike | None = None,
+    weight: float = 0.5,
+    estimate: bool = True,
 ) -> StickSlipMotion:
-    """March with fixed steps; see `graphsynth.systems.tribometer.model.Tribometer.time_stepping`."""
-    step = positive("step", step)
+    """March with equal steps, ``step`` s at most, and friction impulses from a complementarity problem.
+
+    First order; needs no event location, so it survives Zeno behaviour.  ``weight``, 0 to 1, is that of the end of a
+    step.  Changes come at whole steps; errors are estimated by two runs with longer steps.  `SpecError` or
+    `TooLargeError` if a number is out of its bounds, or the steps are too many.
+    """
+    (duration, times), step = output_times(duration, times), positive("step", step)
     if not 0.0 <= finite("weight of the step", weight) <= 1.0:
         raise SpecError(f"The weight of the step is {weight:g}; give a number from 0 to 1, best 0.5.")
     count = max(1, math.ceil(duration / step * (1.0 - 1e-12)))
@@ -38,26 +48,26 @@ def time_stepping(
             f"{duration / _MOST_STEPS:.2g} s or a shorter run.",
             count,
         )
-    _march(model, duration, 1, weight)  # compilation is no part of the run time
+    _march(self, duration, 1, weight)  # compilation is no part of the run time
     begin = time.perf_counter()
-    march = _march(model, duration, count, weight)
+    march = _march(self, duration, count, weight)
     x2 = march.between(times, duration, 0)
     seconds = time.perf_counter() - begin
     failed, h = march.done < count, duration / count
     error, events = math.nan, march.changes(h)
     if estimate and not failed:
-        error, events = _stepping_error(model, duration, times, weight, count, x2, events)
+        error, events = _stepping_error(self, duration, times, weight, count, x2, events)
     end = march.done * h if failed else duration
     statement = f"{len(events)} changes of the contact in {duration:g} s, step {h:g} s."
     if failed:
         statement = (
             f"Failed: the numbers left the range of floating point at {end:.9g} s; use a weight of at least 0.5."
         )
-    drive = model.drive.motion(times)
+    drive = self.drive.motion(times)
     _, _, state, friction = march.path[np.minimum(np.ceil(times / h - 1e-9).astype(int), count)].T
     driven, heat, damped = march.energies.tolist()
     return StickSlipMotion(
-        model=model,
+        model=self,
         method="time stepping",
         t=times,
         x1=drive.x,
@@ -73,7 +83,7 @@ def time_stepping(
         evaluations=march.done,
         seconds=seconds,
         events=events,
-        energy_residual=_residual(model, march),
+        energy_residual=_residual(self, march),
         friction_loss=heat,
         drive_work=driven,
         damper_loss=damped,
@@ -89,17 +99,14 @@ class _March(NamedTuple):
 
     def between(self, times: Array, duration: float, column: int) -> Array:
         """Interpolate between steps, linearly: the method itself knows no more."""
-        found: Array = np.interp(times, np.linspace(0.0, duration, len(self.path)), self.path[:, column])
-        return found
+        return np.asarray(np.interp(times, np.linspace(0.0, duration, len(self.path)), self.path[:, column]))
 
     def changes(self, h: float) -> tuple[StickSlipEvent, ...]:
         """Return the changes of the contact."""
         path = self.path[: self.done + 1]
         at = np.flatnonzero(np.diff(path[:, 2])) + 1
-        return tuple(
-            StickSlipEvent(float(i) * h, int(state), float(x), math.nan)
-            for i, (x, state) in zip(at, path[at][:, [0, 2]].tolist())
-        )
+        rows = zip((at * h).tolist(), path[at, 2].astype(int).tolist(), path[at, 0].tolist())
+        return tuple(StickSlipEvent(*row, math.nan) for row in rows)
 
 
 def _march(model: Platforms, duration: float, count: int, weight: float) -> _March:
@@ -164,8 +171,8 @@ def model_error(speed: float) -> float:
     return 0.15 * speed * max(math.log(1.0 / speed), 1.0)
 
 
-class Solving(NamedTuple):
-    """How the regularised form is solved: smoothing velocity (m/s), solver of scipy, tolerance, bound on its calls."""
+class _Solving(NamedTuple):
+    """Smoothing velocity (m/s), solver of scipy, tolerance, whether it gets the Jacobian, bound on its calls."""
 
     speed: float
     solver: str
@@ -181,33 +188,61 @@ class _Solution(NamedTuple):
     end: float
     calls: int
     seconds: float
-    complaint: str
+    complaint: str = ""
 
 
-def regularised(model: Platforms, duration: float, times: Array, how: Solving, check: bool) -> StickSlipMotion:
-    """Solve the regularised form; see `graphsynth.systems.tribometer.model.Tribometer.regularised`."""
-    _refuse(model, how)
-    found = _solve(model, duration, times, how)
-    reference = event_driven(model, duration, times, 1e-14, EventGuard(), False)
+def regularised(
+    self: Platforms,
+    duration: float = 10.0,
+    *,
+    speed: float = 1e-5,
+    solver: str = "Radau",
+    times: ArrayLike | None = None,
+    rtol: float = 1e-8,
+    jacobian: bool = True,
+    check: bool | None = None,
+    most_calls: int = 2_000_000,
+) -> StickSlipMotion:
+    """Solve the form with ``F = N mu(|u|) tanh(u / speed)``, which any solver of scipy accepts (see `SOLVERS`).
+
+    It never sticks: the upper platform creeps.  The error of the result is its difference from an event-driven run.
+    The smoothing velocity ``speed`` (m/s) lies below the Stribeck velocity; the absolute tolerance is a hundredth of
+    ``rtol`` (of m, m/s); ``jacobian`` gives the exact Jacobian to the implicit solvers; ``most_calls`` bounds the calls
+    of the right-hand side.  ``check`` compares with a second implicit solver; None: if the solver is LSODA, which can
+    report a wrong answer as a success.
+
+    `RunStatus.FAILED` if the solver stopped, `RunStatus.UNRELIABLE` if the cross-check objects; `SpecError` if the law
+    has two coefficients, or a number is out of its bounds.
+    """
+    from graphsynth.dynamics.motors import whole
+
+    duration, times = output_times(duration, times)
+    if not 1e-13 <= finite("relative tolerance", rtol) <= 1e-2:
+        raise SpecError(f"The relative tolerance is {rtol:g}; give a number from 1e-13 to 1e-2.")
+    calls = whole("most_calls", most_calls, "raise it for long runs")
+    how = _Solving(positive("smoothing velocity", speed), str(solver), rtol, jacobian, calls)
+    _refuse(self, how)
+    found = _solve(self, duration, times, how)
+    reference = event_driven(self, duration, times=times, estimate=False)
     exact = reference.x2 if reference.complete else None
     status, statement = RunStatus.COMPLETE, f"{how.solver} reached {duration:g} s."
     if found.complaint:
         status = RunStatus.FAILED
         stopped = f"{how.solver} stopped at {found.end:.9g} s of {duration:g} s ({found.complaint})"
         statement = f"Failed: {stopped}; use Radau."
-    elif check:
-        status, statement = _cross_checked(model, duration, times, how, found.y[0], exact)
-    drive = model.drive.motion(times)
+    elif solver == "LSODA" if check is None else check:
+        status, statement = _cross_checked(self, duration, times, how, found.y[0], exact)
+    drive = self.drive.motion(times)
     u = drive.v - found.y[1]
     return StickSlipMotion(
-        model=model,
+        model=self,
         method=f"regularised ({how.solver})",
         t=times,
         x1=drive.x,
         v1=drive.v,
         x2=found.y[0],
         v2=found.y[1],
-        friction=model.normal * model.law.coefficient(np.abs(u)) * np.tanh(u / how.speed),
+        friction=self.normal * self.law.coefficient(np.abs(u)) * np.tanh(u / how.speed),
         state=np.nan_to_num(np.sign(u)).astype(np.int64),
         status=status,
         statement=statement,
@@ -219,29 +254,25 @@ def regularised(model: Platforms, duration: float, times: Array, how: Solving, c
 
 
 def _cross_checked(
-    model: Platforms, duration: float, times: Array, how: Solving, x2: Array, exact: Array | None
+    model: Platforms, duration: float, times: Array, how: _Solving, x2: Array, exact: Array | None
 ) -> tuple[RunStatus, str]:
     """Compare with a second implicit solver; their difference has to be small beside the error of the form."""
     solver, other = how.solver, "BDF" if how.solver == "Radau" else "Radau"
     second = _solve(model, duration, times, how._replace(solver=other, jacobian=True))
     if second.complaint:
-        return (
-            RunStatus.UNRELIABLE,
-            f"{solver} reached {duration:g} s, but {other} failed ({second.complaint}): no cross-check; use Radau.",
-        )
+        why = f"but {other} failed ({second.complaint}): no cross-check; use Radau."
+        return RunStatus.UNRELIABLE, f"{solver} reached {duration:g} s, {why}"
     gap = float(np.abs(x2 - second.y[0]).max())
     form = model_error(how.speed) if exact is None else float(np.abs(second.y[0] - exact).max())
     if gap <= _SHARE * form:
         return RunStatus.COMPLETE, f"{solver} reached {duration:g} s; {other} differs by {gap:.2g} m."
-    return (
-        RunStatus.UNRELIABLE,
+    statement = (
         f"{solver} reports success, but {other} differs by {gap:.2g} m, not small beside the error {form:.2g} m "
-        "of the form itself; use Radau or a smaller tolerance.",
     )
+    return RunStatus.UNRELIABLE, statement + "of the form itself; use Radau or a smaller tolerance."
 
 
-def _refuse(model: Platforms, how: Solving) -> None:
-    positive("smoothing velocity", how.speed)
+def _refuse(model: Platforms, how: _Solving) -> None:
     if how.solver not in SOLVERS:
         raise SpecError(f"The solver {how.solver!r} is not known; give one of {', '.join(SOLVERS)}.")
     law = model.law
@@ -258,19 +289,16 @@ def _refuse(model: Platforms, how: Solving) -> None:
 
 
 class _ExhaustedError(Exception):
-    """The bound on the calls of the right-hand side is reached; holds the time."""
-
-    def __init__(self, at: float) -> None:
-        super().__init__()
-        self.at = at
+    """The bound on the calls of the right-hand side is reached, at the time that is its argument."""
 
 
-def _functions(
-    model: Platforms, how: Solving
-) -> tuple[Callable[[float, Array], Array], Callable[[float, Array], Array]]:
+def _solve(model: Platforms, duration: float, times: Array, how: _Solving) -> _Solution:
+    """Run a solver of scipy and believe nothing: status, end and finite numbers are checked."""
+    from scipy.integrate import solve_ivp
+
     from graphsynth.systems.tribometer.kernels.plant import regularised as rate, regularised_slope as slope
 
-    data, calls = model.data(), 0
+    data, start, calls = model.data(), np.array([model.x2, model.start()[0]]), 0
 
     def rhs(t: float, y: Array) -> Array:
         nonlocal calls
@@ -285,15 +313,6 @@ def _functions(
         damping = model.damping + slope(t, y, data, how.speed)
         return np.array([[0.0, 1.0], [-model.stiffness / model.mass, -damping / model.mass]])
 
-    return rhs, jac
-
-
-def _solve(model: Platforms, duration: float, times: Array, how: Solving) -> _Solution:
-    """Run a solver of scipy and believe nothing: status, end and finite numbers are checked."""
-    from scipy.integrate import solve_ivp
-
-    rhs, jac = _functions(model, how)
-    start = np.array([model.x2, model.start()[0]])
     rhs(0.0, start)
     jac(0.0, start)
     options: dict[str, Any] = {"jac": jac} if how.jacobian and how.solver in _IMPLICIT else {}
@@ -306,20 +325,20 @@ def _solve(model: Platforms, duration: float, times: Array, how: Solving) -> _So
             warnings.simplefilter("ignore")
             found = solve_ivp(rhs, (0.0, duration), start, **options)
     except _ExhaustedError as stop:
-        seconds = time.perf_counter() - begin
-        return _Solution(blank, stop.at, how.most_calls, seconds, f"more than {how.most_calls} calls")
+        complaint = f"more than {how.most_calls} calls"
+        return _Solution(blank, stop.args[0], how.most_calls, time.perf_counter() - begin, complaint)
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as problem:
         return _Solution(blank, 0.0, 0, time.perf_counter() - begin, str(problem).rstrip("."))
     seconds = time.perf_counter() - begin
     got = np.asarray(found.y, float).reshape(2, -1) if np.size(found.y) else np.empty((2, 0))
     reached = got.shape[1]
     blank[:, :reached] = got[:, : times.size]
-    complaint = ""
     if found.status != 0:
         complaint = f"status {found.status}, {found.message}".rstrip(".")
     elif reached != times.size:
         complaint = f"{reached} of {times.size} times returned"
     elif not np.isfinite(blank).all():
         complaint = "not a number in the result"
-    end = duration if not complaint else float(times[reached - 1]) if reached else 0.0
-    return _Solution(blank, end, int(found.nfev), seconds, complaint)
+    else:
+        return _Solution(blank, duration, int(found.nfev), seconds)
+    return _Solution(blank, float(times[reached - 1]) if reached else 0.0, int(found.nfev), seconds, complaint)

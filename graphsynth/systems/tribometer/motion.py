@@ -9,10 +9,10 @@ from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
-from graphsynth.systems.tribometer.platforms import Platforms, positive
+from graphsynth.systems.tribometer.platforms import Platforms, finite, positive
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,21 +71,8 @@ class StickSlipEvent(NamedTuple):
 class EventGuard:
     """Bounds beyond which the exact automaton stops with the status "Zeno behaviour".
 
-    Parameters
-    ----------
-    rate : float
-        Most events per second, over a window of ``window`` events.
-    window : int
-        Events over which the rate is taken; a shorter burst passes.
-    dwell : float
-        A dwell below this multiple of the spacing of floating-point times is too short; three in a row stop the run.
-    steps : int
-        Most steps of a run.
-
-    Raises
-    ------
-    SpecError
-        If a bound is not positive.
+    At most ``rate`` events per second over ``window`` events (a shorter burst passes), at most ``steps`` steps; three
+    dwells in a row below ``dwell`` times the spacing of floating-point times stop the run too.
 
     Examples
     --------
@@ -190,59 +177,31 @@ def follow(
 
 @dataclass(frozen=True, eq=False)
 class StickSlipMotion:
-    """Motion of both platforms of a tribometer.
+    """Motion of both platforms of a tribometer: at times ``t`` (s), place and velocity of the lower and the upper one.
 
-    Attributes
-    ----------
-    model : Platforms
-    method : str
-        "event-driven", "time stepping" or "regularised (solver)".
-    t, x1, v1, x2, v2 : ndarray, shape (n,)
-        Times (s), displacement and velocity of the lower and the upper platform (m, m/s); NaN after an early end.
-    friction : ndarray, shape (n,)
-        Friction force on the upper platform, N.
-    state : ndarray of int, shape (n,)
-        0 stick, +1 and -1 slip.  The regularised form never sticks: the sign of the sliding velocity.
-    events : tuple of StickSlipEvent
-        Changes of the contact; none from the regularised form.
-    status : RunStatus
-    statement : str
-        One sentence: how the run ended, and the remedy where there is one.
-    end : float
-        Time up to which the motion is known, s.
-    error : float
-        Estimate of the largest error of ``x2`` at the times ``t``, m.
-    guarantee : str
-        "exact" (closed-form pieces joined at roots found to rounding) or "estimated".
-    energy_residual : float
-        Largest ``|E(t) - E(0) - W(t)|`` over the larger of the range of ``E`` and the energy exchanged, at least a
-        ten-thousandth of ``E``; NaN if not known (regularised form).  W is integrated beside the motion and not derived
-        from it.
-    friction_loss, drive_work, damper_loss : float
-        Energies since the start, J; NaN if not known.
-    evaluations : int
-        Steps of the automaton or of time stepping, calls of the right-hand side of a solver.
-    seconds : float
-        Wall time of the solution without the estimate of its error.
+    Arrays have the shape (n,), in m, m/s and N (``friction`` on the upper platform), and are NaN after an early end.
+    Energies are those since the start, J, NaN if not known.
     """
 
     model: Platforms
-    method: str
+    method: str  #: "event-driven", "time stepping" or "regularised (solver)"
     t: Array
     x1: Array
     v1: Array
     x2: Array
     v2: Array
     friction: Array
-    state: NDArray[np.int64]
+    state: NDArray[np.int64]  #: 0 stick, +1 and -1 slip; of the regularised form the sign of the sliding velocity
     status: RunStatus
-    statement: str
-    end: float
-    error: float
-    evaluations: int
-    seconds: float
+    statement: str  #: how the run ended, and the remedy where there is one
+    end: float  #: time up to which the motion is known, s
+    error: float  #: estimate of the largest error of ``x2`` at the times ``t``, m
+    evaluations: int  #: steps, or calls of the right-hand side of a solver
+    seconds: float  #: wall time without the estimate of the error
     events: tuple[StickSlipEvent, ...] = ()
-    guarantee: str = "estimated"
+    guarantee: str = "estimated"  #: or "exact": closed-form pieces joined at roots found to rounding
+    #: Largest ``|E(t) - E(0) - W(t)|`` over the larger of the range of ``E`` and the energy exchanged, at least a
+    #: ten-thousandth of ``E``; W is integrated beside the motion and not derived from it.
     energy_residual: float = math.nan
     friction_loss: float = math.nan
     drive_work: float = math.nan
@@ -266,21 +225,9 @@ class StickSlipMotion:
         return self.v1 - self.v2
 
     def at(self, times: object) -> Array:
-        """Evaluate an event-driven motion anywhere, with the accuracy of its steps.
+        """Return x2, v2, state, friction force of an event-driven motion at any times, shape (n, 4).
 
-        Parameters
-        ----------
-        times : array_like, shape (n,)
-
-        Returns
-        -------
-        ndarray, shape (n, 4)
-            x2, v2, state, friction force; NaN outside of the run.
-
-        Raises
-        ------
-        SpecError
-            If the motion comes from another method.
+        With the accuracy of its steps, NaN outside of the run; `SpecError` for a motion by another method.
         """
         if self.path is None:
             raise SpecError(f"A motion by {self.method} is known at its own times only; use an event-driven run.")
@@ -301,12 +248,42 @@ class StickSlipMotion:
         return pd.DataFrame(rows, columns=["time", "state", "x2", "error"])
 
 
+def output_times(duration: float, times: ArrayLike | None) -> tuple[float, Array]:
+    """Check the final time and the times of the curves, s; 1001 equal steps if these are not given."""
+    from graphsynth.dynamics.motors import numbers
+
+    duration = positive("duration", duration)
+    if times is None:
+        return duration, np.linspace(0.0, duration, 1001)
+    wanted = np.atleast_1d(numbers("times", times, "s", finite=False))
+    if wanted.ndim != 1 or not wanted.size or not ((wanted >= 0.0) & (wanted <= duration)).all():
+        raise SpecError(f"The times asked for must be numbers between 0 and the duration {duration:g}.")
+    if (np.diff(wanted) < 0.0).any():
+        raise SpecError("The times asked for have to be in ascending order; sort them.")
+    return duration, wanted
+
+
 def event_driven(
-    model: Platforms, duration: float, times: Array, rtol: float, guard: EventGuard, estimate: bool
+    self: Platforms,
+    duration: float = 10.0,
+    *,
+    times: ArrayLike | None = None,
+    rtol: float = 1e-14,
+    guard: EventGuard | None = None,
+    estimate: bool = True,
 ) -> StickSlipMotion:
-    """Run the hybrid automaton; see `graphsynth.systems.tribometer.model.Tribometer.event_driven`."""
-    data = model.data()
-    start = (0.0, model.x2, *model.start())
+    """Run the hybrid automaton: stick exactly, slip in smooth pieces, events located to rounding.
+
+    ``rtol`` (1e-14 to 1e-3) is that of integrated slip pieces; closed-form pieces need none.  The errors are estimated
+    by a second run with a larger tolerance and slightly changed data.  With a ``status`` other than
+    `RunStatus.COMPLETE` the motion is that up to where the run stopped; `SpecError` if a number is out of its bounds.
+    """
+    duration, times = output_times(duration, times)
+    if not 1e-14 <= finite("relative tolerance", rtol) <= 1e-3:
+        raise SpecError(f"The relative tolerance is {rtol:g}; give a number from 1e-14 to 1e-3.")
+    guard = guard or EventGuard()
+    data = self.data()
+    start = (0.0, self.x2, *self.start())
     follow(data, start, 1e-9 * duration, guard, rtol).at(times[:1])  # compilation is no part of the run time
     begin = time.perf_counter()
     path = follow(data, start, duration, guard, rtol)
@@ -314,14 +291,21 @@ def event_driven(
     seconds = time.perf_counter() - begin
     error, status, other = math.nan, path.status, None
     if estimate:
-        other = follow(_perturbed(data), start, duration, guard, _COARSER * rtol)
-        error = _error(values[:, 0], other.at(times)[:, 0])
-    if status is RunStatus.COMPLETE and ((other is not None and not _alike(path, other)) or _tied(model, path)):
+        # mass, stiffness, normal force and drive by a few units in the last place, in different directions
+        factors = np.ones(data.size)
+        factors[[0, 3, 4]] += _PERTURBED
+        factors[[1, 5, 11]] -= _PERTURBED
+        other = follow(data * factors, start, duration, guard, _COARSER * rtol)
+        gap = np.abs(values[:, 0] - other.at(times)[:, 0])
+        error = (
+            float(np.nanmax(gap) + np.spacing(np.nanmax(np.abs(values[:, 0])))) if not np.isnan(gap).all() else error
+        )
+    if status is RunStatus.COMPLETE and ((other is not None and not _alike(path, other)) or _tied(self, path)):
         status, error = RunStatus.UNRELIABLE, math.nan
     x2, v2, state, friction = values.T
-    drive = model.drive.motion(times)
+    drive = self.drive.motion(times)
     motion = StickSlipMotion(
-        model=model,
+        model=self,
         method="event-driven",
         t=times,
         x1=drive.x,
@@ -335,8 +319,8 @@ def event_driven(
         statement="",
         end=path.end,
         error=error,
-        guarantee="exact" if model.closed_form else "estimated",
-        energy_residual=_residual(model, path),
+        guarantee="exact" if self.closed_form else "estimated",
+        energy_residual=_residual(self, path),
         friction_loss=float(path.columns.heat[-1]),
         drive_work=float(path.columns.driven[-1]),
         damper_loss=float(path.columns.damped[-1]),
@@ -345,14 +329,6 @@ def event_driven(
         path=path,
     )
     return replace(motion, statement=_statement(motion, duration, guard))
-
-
-def _perturbed(data: Array) -> Array:
-    """Change mass, stiffness, normal force and drive by a few units in the last place, in different directions."""
-    factors = np.ones(data.size)
-    factors[[0, 3, 4]] += _PERTURBED
-    factors[[1, 5, 11]] -= _PERTURBED
-    return data * factors
 
 
 def _alike(path: EventPath, other: EventPath) -> bool:
@@ -385,12 +361,6 @@ def _events(path: EventPath, other: EventPath | None) -> tuple[StickSlipEvent, .
     return tuple(StickSlipEvent(*row) for row in rows)
 
 
-def _error(x2: Array, other: Array) -> float:
-    gap = np.abs(x2 - other)
-    gap = gap[~np.isnan(gap)]
-    return float(gap.max() + np.spacing(np.nanmax(np.abs(x2)))) if gap.size else math.nan
-
-
 def _residual(model: Platforms, path: EventPath) -> float:
     """Largest gap of the energy balance over what is exchanged."""
     c, energy = path.columns, path.stored
@@ -403,26 +373,18 @@ def _residual(model: Platforms, path: EventPath) -> float:
 
 def _statement(motion: StickSlipMotion, duration: float, guard: EventGuard) -> str:
     found, stopped = len(motion.events), f"stopped at {motion.end:.9g} s of {duration:g} s"
-    if motion.status is RunStatus.COMPLETE:
-        return f"{found} events in {duration:g} s."
-    if motion.status is RunStatus.UNRELIABLE:
-        return (
-            f"{found} events in {duration:g} s, but rounding or the tolerance decides between stick and slip at one of "
-            "them: the motion is too sensitive for this precision; shorten the run or change the data slightly."
-        )
-    if motion.status is RunStatus.STORM:
-        return (
-            f"Zeno behaviour: {stopped} after {found} events, the shortest dwell {motion.shortest_dwell:.3g} s "
-            f"(bound {guard.rate:g} events per second); use time_stepping, or raise the rate of the guard."
-        )
-    if motion.status is RunStatus.STEP_LIMIT:
-        return (
-            f"Step limit: {stopped} after {motion.evaluations} steps (bound {guard.steps}); "
-            "use time_stepping, or raise the steps of the guard."
-        )
-    if motion.status is RunStatus.UNRESOLVED:
-        return (
-            f"Unresolved contact: {stopped}, the sliding that begins there is below the rounding of the velocities; "
-            "use time_stepping, or change the data slightly to see which side it falls on."
-        )
-    return f"Failed: {stopped}, the numbers left the range of floating point; scale the data."
+    sentences = {
+        RunStatus.COMPLETE: f"{found} events in {duration:g} s.",
+        RunStatus.UNRELIABLE: f"{found} events in {duration:g} s, but rounding or the tolerance decides between stick "
+        "and slip at one of them: the motion is too sensitive for this precision; shorten the run or change the data "
+        "slightly.",
+        RunStatus.STORM: f"Zeno behaviour: {stopped} after {found} events, the shortest dwell "
+        f"{motion.shortest_dwell:.3g} s (bound {guard.rate:g} events per second); use time_stepping, or raise the rate "
+        "of the guard.",
+        RunStatus.STEP_LIMIT: f"Step limit: {stopped} after {motion.evaluations} steps (bound {guard.steps}); use "
+        "time_stepping, or raise the steps of the guard.",
+        RunStatus.UNRESOLVED: f"Unresolved contact: {stopped}, the sliding that begins there is below the rounding of "
+        "the velocities; use time_stepping, or change the data slightly to see which side it falls on.",
+        RunStatus.FAILED: f"Failed: {stopped}, the numbers left the range of floating point; scale the data.",
+    }
+    return sentences[motion.status]

@@ -35,7 +35,7 @@ _MOST_NODES, _MOST_ENERGIES = 20_000, 4000
 
 def plots(context: Context, motion: StickSlipMotion, cycle: LimitCycle, study: Problem | None) -> tuple[Picture, ...]:
     """Draw Figure 7b, friction, phase portraits, energies and errors."""
-    if not _drawable(motion):
+    if not np.isfinite(motion.x2).sum() > 1:
         return ()
     stuck = "Shaded: the platforms stick. Below: the force of friction."
     colours = "Of the upper platform: stick and slip in two colours."
@@ -51,10 +51,6 @@ def plots(context: Context, motion: StickSlipMotion, cycle: LimitCycle, study: P
     return (*pictures, *_curves(motion), *_errors(study))
 
 
-def _drawable(motion: StickSlipMotion) -> bool:
-    return bool(np.isfinite(motion.x2).sum() > 1)
-
-
 def _shown(title: str, figure: Figure, caption: str, *, wide: bool = False) -> Picture:
     return Picture(title, themed_svg(figure), caption, "wide" if wide else "normal")
 
@@ -63,12 +59,12 @@ def _once(motion: StickSlipMotion, cycle: LimitCycle) -> StickSlipMotion:
     """One period of the cycle by itself."""
     from dataclasses import replace
 
-    from graphsynth.systems.tribometer.motion import EventGuard, event_driven
+    from graphsynth.systems.tribometer.motion import event_driven
 
     model = motion.model
     stuck = bool(abs(cycle.v2 - float(model.drive.motion(0.0).v)) < 1e-12 * max(model.frequency * model.reach, 1e-12))
     start = replace(model, x2=cycle.x2, v2=None if stuck else cycle.v2)
-    return event_driven(start, cycle.period, np.linspace(0.0, cycle.period, 1001), 1e-14, EventGuard(), False)
+    return event_driven(start, cycle.period, estimate=False)
 
 
 def _curves(motion: StickSlipMotion) -> list[Picture]:
@@ -117,13 +113,15 @@ def _errors(study: Problem | None) -> list[Picture]:
     ]
 
 
-def _plain(axes: Any) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-
-
-def _known(motion: StickSlipMotion) -> None:
-    if not _drawable(motion):
+def _figure(motion: StickSlipMotion, size: tuple[float, float], **panels: Any) -> tuple[Figure, Any]:
+    """Return a figure and its axes without their upper and right edges; `SpecError` if nothing is known."""
+    if not np.isfinite(motion.x2).sum() > 1:
         raise SpecError(f"There is nothing to draw: {motion.statement}")
+    figure = new_figure(size)
+    found = figure.subplots(**panels)
+    for axes in np.atleast_1d(found):
+        axes.spines[["top", "right"]].set_visible(False)
+    return figure, found
 
 
 def _sticking(motion: StickSlipMotion) -> list[tuple[float, float]]:
@@ -146,11 +144,8 @@ def platforms_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (9
     The upper part is Figure 7b of the source [Perechesova et al. 2014].  Sticking is shaded.  `SpecError` if the run
     failed at its start.
     """
-    _known(motion)
-    figure = new_figure(size)
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    figure, (above, below) = _figure(motion, size, nrows=2, sharex=True, height_ratios=(3, 2))
     for axes in (above, below):
-        _plain(axes)
         for index, (start, stop) in enumerate(_sticking(motion)):
             axes.axvspan(start, stop, color=LIGHT["pale"], lw=0, zorder=0, label="stick" if index == 0 else None)
     if math.isfinite(motion.model.drive.period):  # a belt would run out of the picture
@@ -180,10 +175,7 @@ def phase_picture(
     After the time ``settled`` the motion is drawn strongly, for example to show the limit cycle; before it, faintly.
     `SpecError` if the run failed at its start.
     """
-    _known(motion)
-    figure = new_figure(size)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = _figure(motion, size)
     # points of the events too, so that no corner is cut; those of Zeno behaviour cannot be told apart anyway
     t, x, v, state = motion.t, motion.x2, motion.v2, motion.state
     if motion.path is not None and len(motion.path.nodes) <= _MOST_NODES:
@@ -204,10 +196,7 @@ def phase_picture(
 
 def friction_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (6.0, 4.5)) -> Figure:
     """Friction force over sliding velocity, with the curve of the law; sticking is the upright line at zero."""
-    _known(motion)
-    figure = new_figure(size)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = _figure(motion, size)
     model = motion.model
     widest = 1.05 * float(np.nanmax(np.abs(motion.sliding))) or 1e-3
     speed = np.linspace(0.0, widest, 400)

@@ -37,23 +37,24 @@ def positive(name: str, value: float, *, or_zero: bool = False) -> float:
     return number
 
 
-def _coefficients(static: float, kinetic: float, viscous: float) -> tuple[float, float, float]:
-    static = positive("static friction coefficient", static)
-    kinetic = positive("kinetic friction coefficient", kinetic, or_zero=True)
-    if kinetic > static:
-        raise SpecError(
-            f"The kinetic friction coefficient {kinetic:g} is above the static one, {static:g}; "
-            "swap them, or give the static one at least the same value."
-        )
-    return static, kinetic, positive("viscous friction coefficient", viscous, or_zero=True)
-
-
 class FrictionLaw(ABC):
     """Base of the laws: ``coefficient`` and ``slope`` over the sliding speed ``v >= 0``, ``static`` at rest."""
 
     static: float
     kinetic: float
     viscous: float
+
+    def _check(self, *more: str) -> None:
+        """Check the coefficients, which all laws have; ``more`` are the names of further numbers above zero."""
+        for name, sizes in (("static", False), ("kinetic", True), ("viscous", True)):
+            value = positive(f"{name} friction coefficient", getattr(self, name), or_zero=sizes)
+            object.__setattr__(self, name, value)
+        if self.kinetic > self.static:
+            raise SpecError(
+                f"The kinetic friction coefficient {self.kinetic:g} is above the static one, {self.static:g}; "
+                "swap them, or give the static one at least the same value."
+            )
+        check_fields(self, ("static", *more), SpecError, small=("kinetic", "viscous"))
 
     @abstractmethod
     def _weakening(self, v: Array) -> tuple[Array, Array]:
@@ -88,17 +89,8 @@ class FrictionLaw(ABC):
 class TwoCoefficientLaw(FrictionLaw):
     """One coefficient at rest, another while slipping (Coulomb's law if they are equal).
 
-    Parameters
-    ----------
-    static, kinetic : float
-        Coefficients with ``0 <= kinetic <= static``, ``static > 0``.
-    viscous : float
-        Coefficient of a part that grows with the sliding speed, s/m.
-
-    Raises
-    ------
-    SpecError
-        If a coefficient is out of its bounds.
+    ``0 <= kinetic <= static``, ``static > 0``, or a `SpecError` is raised; the part ``viscous`` (s/m) grows with the
+    sliding speed.
 
     Examples
     --------
@@ -111,11 +103,7 @@ class TwoCoefficientLaw(FrictionLaw):
     viscous: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in zip(
-            ("static", "kinetic", "viscous"), _coefficients(self.static, self.kinetic, self.viscous)
-        ):
-            object.__setattr__(self, name, value)
-        check_fields(self, ("static",), SpecError, small=("kinetic", "viscous"))
+        self._check()
 
     def _weakening(self, v: Array) -> tuple[Array, Array]:
         return np.zeros_like(v), np.zeros_like(v)
@@ -128,23 +116,8 @@ class TwoCoefficientLaw(FrictionLaw):
 class StribeckLaw(FrictionLaw):
     """Friction that falls from the static to the kinetic coefficient as the sliding speed grows.
 
-    ``mu(v) = kinetic + (static - kinetic) exp(-(v/velocity)^exponent) + viscous v``.
-
-    Parameters
-    ----------
-    static, kinetic : float
-        Coefficients with ``0 <= kinetic <= static``, ``static > 0``.
-    velocity : float
-        Stribeck velocity, m/s.
-    exponent : float
-        At least 1.
-    viscous : float
-        s/m.
-
-    Raises
-    ------
-    SpecError
-        If a coefficient is out of its bounds.
+    ``mu(v) = kinetic + (static - kinetic) exp(-(v/velocity)^exponent) + viscous v`` with the Stribeck velocity (m/s),
+    an exponent of at least 1, and ``viscous`` in s/m; coefficients as for a `TwoCoefficientLaw`.
 
     Examples
     --------
@@ -159,14 +132,11 @@ class StribeckLaw(FrictionLaw):
     viscous: float = 0.0
 
     def __post_init__(self) -> None:
-        found = _coefficients(self.static, self.kinetic, self.viscous)
-        velocity = positive("Stribeck velocity", self.velocity)
-        exponent = finite("Stribeck exponent", self.exponent)
-        if exponent < 1.0:
-            raise SpecError(f"The Stribeck exponent is {exponent:g}; it must be at least 1.")
-        for name, value in zip(("static", "kinetic", "viscous", "velocity", "exponent"), (*found, velocity, exponent)):
-            object.__setattr__(self, name, value)
-        check_fields(self, ("static", "velocity", "exponent"), SpecError, small=("kinetic", "viscous"))
+        object.__setattr__(self, "velocity", positive("Stribeck velocity", self.velocity))
+        object.__setattr__(self, "exponent", finite("Stribeck exponent", self.exponent))
+        if self.exponent < 1.0:
+            raise SpecError(f"The Stribeck exponent is {self.exponent:g}; it must be at least 1.")
+        self._check("velocity", "exponent")
 
     def _weakening(self, v: Array) -> tuple[Array, Array]:
         z, d = v / self.velocity, self.exponent
@@ -196,31 +166,27 @@ class Drive(ABC):
         """Time of one turn of the crank, s."""
         return math.tau / abs(self.speed)
 
+    def _check(self, *lengths: tuple[str, str]) -> None:
+        """Check lengths, pairs of field and name in messages, and the speed of a crank, which has to turn."""
+        for field_name, name in lengths:
+            object.__setattr__(self, field_name, positive(name, getattr(self, field_name)))
+        object.__setattr__(self, "speed", finite("crank speed", self.speed))
+        if self.speed == 0.0:
+            raise GeometryError("The crank speed is 0; the drive has to turn, give a speed in rad/s other than zero.")
+        check_fields(self, (*(name for name, _ in lengths), "speed"))
+
     @abstractmethod
     def motion(self, t: ArrayLike) -> DriveMotion:
-        """Motion of the lower platform at the times ``t``."""
+        """Motion of the lower platform at the times ``t``, closed form."""
 
     @abstractmethod
     def _packed(self) -> tuple[float, float, float, float]:
         """Return kind, radius, rod, speed: entries 10 to 13 of the kernels' data."""
 
 
-def _turning(speed: float) -> float:
-    number = finite("crank speed", speed)
-    if number == 0.0:
-        raise GeometryError("The crank speed is 0; the drive has to turn, give a speed in rad/s other than zero.")
-    return number
-
-
 @dataclass(frozen=True)
 class BeltDrive(Drive):
-    """Lower platform that moves with the constant velocity ``speed``, m/s.
-
-    Examples
-    --------
-    >>> float(BeltDrive(0.02).motion(3.0).x)
-    0.06
-    """
+    """Lower platform that moves with the constant velocity ``speed``, m/s."""
 
     speed: float
 
@@ -234,7 +200,7 @@ class BeltDrive(Drive):
         return math.inf
 
     def motion(self, t: ArrayLike) -> DriveMotion:
-        """Motion of the lower platform at the times ``t``; exact."""
+        """See `Drive`; exact."""
         t = finite_array("t", t, nan=True)
         zero = np.zeros_like(t)
         return DriveMotion(self.speed * t, zero + self.speed, zero, zero)
@@ -245,19 +211,9 @@ class BeltDrive(Drive):
 
 @dataclass(frozen=True)
 class HarmonicDrive(Drive):
-    """Lower platform at ``radius cos(speed t)``: the sine of the source's block diagram.
+    """Lower platform at ``radius cos(speed t)`` (m, rad/s): the sine of the source's block diagram.
 
-    Parameters
-    ----------
-    radius : float
-        Amplitude, m.
-    speed : float
-        Angular speed, rad/s.
-
-    Raises
-    ------
-    SpecError, GeometryError
-        If the radius is not positive or the speed is zero.
+    `SpecError` or `GeometryError` if the radius is not positive or the speed is zero.
 
     Examples
     --------
@@ -269,12 +225,10 @@ class HarmonicDrive(Drive):
     speed: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", positive("radius", self.radius))
-        object.__setattr__(self, "speed", _turning(self.speed))
-        check_fields(self, ("radius", "speed"))
+        self._check(("radius", "radius"))
 
     def motion(self, t: ArrayLike) -> DriveMotion:
-        """Motion of the lower platform at the times ``t``; exact but for rounding."""
+        """See `Drive`; exact but for rounding."""
         w = self.speed
         theta = w * finite_array("t", t, nan=True)
         C, S = self.radius * np.cos(theta), self.radius * np.sin(theta)
@@ -288,17 +242,8 @@ class HarmonicDrive(Drive):
 class CrankDrive(Drive):
     """Lower platform driven by a crank and a connecting rod, ``x1 = r cos(wt) + sqrt(l^2 - r^2 sin^2(wt)) - l``.
 
-    Parameters
-    ----------
-    radius, rod : float
-        Crank radius and length of the connecting rod, m; the rod must be longer.
-    speed : float
-        Crank speed, rad/s.
-
-    Raises
-    ------
-    SpecError, GeometryError
-        If a length is not positive, the rod is not longer than the crank, or the speed is zero.
+    In m and rad/s.  `SpecError` or `GeometryError` if a length is not positive, the rod is not longer than the crank,
+    or the speed is zero.
 
     Examples
     --------
@@ -311,10 +256,7 @@ class CrankDrive(Drive):
     speed: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", positive("crank radius", self.radius))
-        object.__setattr__(self, "rod", positive("length of the connecting rod", self.rod))
-        object.__setattr__(self, "speed", _turning(self.speed))
-        check_fields(self, ("radius", "rod", "speed"))
+        self._check(("radius", "crank radius"), ("rod", "length of the connecting rod"))
         if not self.radius < self.rod:
             raise GeometryError(
                 f"The crank radius {self.radius:g} m is not below the length of the connecting rod, {self.rod:g} m; "
@@ -322,7 +264,7 @@ class CrankDrive(Drive):
             )
 
     def motion(self, t: ArrayLike) -> DriveMotion:
-        """Motion of the lower platform at the times ``t``; closed form."""
+        """See `Drive`."""
         r, rod, w = self.radius, self.rod, self.speed
         theta = w * finite_array("t", t, nan=True)
         C, S = np.cos(theta), np.sin(theta)
@@ -409,8 +351,7 @@ class Platforms:
         The averaged limit to which ``k x2 / N`` tends (theory/tribometer 11).
         """
         v = self.drive.motion(times).v
-        found: Array = np.sign(v) * self.law.coefficient(np.abs(v))
-        return found
+        return np.asarray(np.sign(v) * self.law.coefficient(np.abs(v)))
 
     def data(self) -> Array:
         """Return the data of the kernels."""

@@ -6,9 +6,8 @@ of mpmath.  It shares no code with the kernels.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 from graphsynth.core.errors import SpecError, TooLargeError
 from graphsynth.systems.tribometer.platforms import BeltDrive, CrankDrive, Platforms, StribeckLaw, TwoCoefficientLaw
@@ -16,8 +15,7 @@ from graphsynth.systems.tribometer.platforms import BeltDrive, CrankDrive, Platf
 Series = list[Any]
 
 
-@dataclass(frozen=True)
-class PreciseEvent:
+class PreciseEvent(NamedTuple):
     """An event; ``time`` and ``position`` are mpmath numbers, ``state`` the new state."""
 
     time: Any
@@ -25,8 +23,7 @@ class PreciseEvent:
     position: Any
 
 
-@dataclass(frozen=True)
-class PreciseMotion:
+class PreciseMotion(NamedTuple):
     """Events, and the final position and velocity of the upper platform, as mpmath numbers."""
 
     events: tuple[PreciseEvent, ...]
@@ -36,33 +33,12 @@ class PreciseMotion:
 
 
 def precise_motion(model: Platforms, duration: float, *, digits: int = 30, most_events: int = 1000) -> PreciseMotion:
-    """Run the automaton in multiple precision.
+    """Run the automaton in multiple precision: so many significant digits, 15 to 200; ten more are carried.
 
-    The data of the model are taken as they are stored, or as the shortest decimal numbers that round to them: 0.4 means
-    four tenths.
-
-    Parameters
-    ----------
-    model : Platforms
-        With a `TwoCoefficientLaw`, or a `StribeckLaw` whose exponent is a whole number.
-    duration : float
-        Final time, s.
-    digits : int
-        Significant digits wanted, 15 to 200; ten more are carried.
-    most_events : int
-        Bound on the number of events.
-
-    Returns
-    -------
-    PreciseMotion
-        Guarantee: estimated (series truncated below the digits asked for).
-
-    Raises
-    ------
-    SpecError
-        If the law has no Taylor series at rest, or the digits are out of bounds.
-    TooLargeError
-        If there are more events than ``most_events``.
+    Estimated: the series are truncated below the digits asked for.  The data of the model are taken as they are stored,
+    or as the shortest decimal numbers that round to them: 0.4 means four tenths.  `SpecError` if the law is neither a
+    `TwoCoefficientLaw` nor a `StribeckLaw` whose exponent is a whole number, or the digits are out of bounds;
+    `TooLargeError` if there are more events than ``most_events``.
 
     Examples
     --------
@@ -76,8 +52,7 @@ def precise_motion(model: Platforms, duration: float, *, digits: int = 30, most_
         raise SpecError(f"The number of digits is {digits}; give 15 to 200.")
     with mpmath.workdps(digits + 10):
         run = _Run(model, digits + 10)
-        end = mpmath.mpf(repr(float(duration)))
-        run.to(end, most_events)
+        run.to(mpmath.mpf(repr(float(duration))), most_events)
         return PreciseMotion(tuple(run.events), run.x, run.v, digits)
 
 
@@ -100,7 +75,7 @@ class _Run:
             return mpf(repr(value))
 
         self.m, self.k, self.c = number(model.mass), number(model.stiffness), number(model.damping)
-        self.N = number(model.mass) * number(model.gravity) + number(model.load)
+        self.N = self.m * number(model.gravity) + number(model.load)
         self.static, self.kinetic = number(law.static), number(law.kinetic)
         self.viscous, self.power, self.vs = number(law.viscous), 0, mpf(1)
         if isinstance(law, StribeckLaw):

@@ -7,6 +7,7 @@ report says about them.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -20,7 +21,7 @@ from graphsynth.pipeline.tables import In, Place, require
 
 if TYPE_CHECKING:
     from graphsynth.evidence.rows import Problem
-    from graphsynth.systems.tribometer.cycles import BeltCycle, LimitCycle
+    from graphsynth.systems.tribometer.cycles import LimitCycle
     from graphsynth.systems.tribometer.model import Tribometer
     from graphsynth.systems.tribometer.motion import StickSlipMotion
     from graphsynth.systems.tribometer.platforms import Drive, FrictionLaw
@@ -235,34 +236,26 @@ def _margins(motion: StickSlipMotion, cycle: LimitCycle) -> tuple[Quantity, ...]
     known = np.flatnonzero(np.isfinite(motion.x2))
     if known.size:
         last = int(known[-1])
-        error = motion.error if math.isfinite(motion.error) else None
+        own = motion.error if math.isfinite(motion.error) else None
         place = f"upper platform at {motion.t[last]:g} s"
-        found.append(Quantity.of_si(place, motion.x2[last], "mm", "estimated", error))
-        found.append(Quantity("share of the time that it sticks", _sticking(motion)))
+        found.append(Quantity.of_si(place, motion.x2[last], "mm", "estimated", own))
+        stuck = math.nan
+        if motion.path is not None:
+            t, state = motion.path.columns.t, motion.path.columns.state
+            stuck = float(np.diff(t)[state[:-1] == 0.0].sum() / max(float(t[-1]), 1e-300))
+        found.append(Quantity("share of the time that it sticks", stuck))
     if math.isfinite(motion.shortest_dwell):
         found.append(Quantity("shortest time between changes", motion.shortest_dwell, "s", error=2.0 * worst))
     if math.isfinite(cycle.period):
-        found.append(Quantity("period of the cycle", cycle.period, "s", error=_period_error(cycle)))
+        # with a crank the period is that of the drive; on a belt it carries the errors of its events
+        error = 2.0 * math.ulp(cycle.period)
+        if not cycle.turns:
+            error = max((e.error for e in cycle.events if math.isfinite(e.error)), default=0.0) + 1e-14
+        found.append(Quantity("period of the cycle", cycle.period, "s", error=error))
         found.append(Quantity("largest multiplier of the cycle", max(map(abs, cycle.multipliers))))
     found.append(Quantity("largest estimated error of an event time", worst, "s"))
     found.append(Quantity("energy that does not balance, relative", motion.energy_residual))
     return tuple(found)
-
-
-def _period_error(cycle: LimitCycle) -> float:
-    """With a crank the period is that of the drive; on a belt it carries the errors of its events."""
-    if cycle.turns:
-        return 2.0 * math.ulp(cycle.period)
-    return max((event.error for event in cycle.events if math.isfinite(event.error)), default=0.0) + 1e-14
-
-
-def _sticking(motion: StickSlipMotion) -> float:
-    """Share of the known time spent in stick, from the nodes of the run."""
-    if motion.path is None:
-        return math.nan
-    c = motion.path.columns
-    spans = c.t[1:] - c.t[:-1]
-    return float(spans[c.state[:-1] == 0.0].sum() / max(float(c.t[-1]), 1e-300))
 
 
 def _events_table(motion: StickSlipMotion) -> Table:
@@ -283,37 +276,27 @@ def _events_table(motion: StickSlipMotion) -> Table:
 
 
 def _cycle_table(model: Tribometer, cycle: LimitCycle) -> Table:
+    from graphsynth.systems.tribometer.cycles import belt_cycle
+
     rows = [("kind", cycle.kind), ("statement", cycle.statement)]
     if cycle.kind != "none found":
+        factors = (f"{m.real:.6g}" + (f" {m.imag:+.6g}i" if m.imag else "") for m in cycle.multipliers)
         rows += [
             ("period", f"{cycle.period:.12g} s" if math.isfinite(cycle.period) else "none"),
             ("turns of the crank", str(cycle.turns) if cycle.turns else "no crank"),
             ("upper platform at its start", f"{1e3 * cycle.x2:.12g} mm, {round(1e3 * cycle.v2, 10) + 0.0:.10g} mm/s"),
             ("change over one period", f"{cycle.residual:.1e} m"),
-            ("multipliers (small changes shrink by)", ", ".join(_complex(value) for value in cycle.multipliers)),
+            ("multipliers (small changes shrink by)", ", ".join(factors)),
             ("stable", "yes" if cycle.stable else "no"),
         ]
         rows += [
             (f"{event.name} in the cycle", f"{event.time:.12f} s, {1e3 * event.position:.9f} mm")
             for event in cycle.events
         ]
-    known = _belt_cycle(model)
-    if known is not None:
+    with suppress(SpecError):  # no closed form for this drive or law
+        known = belt_cycle(model)
         rows += [(f"exact: {name}", f"{getattr(known, name):.15g} s") for name in ("stick", "slip", "period")]
     return table("Limit cycle", ("", ""), rows, "Return map of the automaton, multipliers by differences (estimated).")
-
-
-def _complex(value: complex) -> str:
-    return f"{value.real:.6g}" if value.imag == 0.0 else f"{value.real:.6g} {value.imag:+.6g}i"
-
-
-def _belt_cycle(model: Tribometer) -> BeltCycle | None:
-    from graphsynth.systems.tribometer.cycles import belt_cycle
-
-    try:
-        return belt_cycle(model)
-    except SpecError:  # no closed form for this drive or law
-        return None
 
 
 def _energy_table(motion: StickSlipMotion) -> Table:
@@ -338,18 +321,17 @@ _METHOD_COLUMNS = (
 
 
 def _methods_table(title: str, study: Problem, note: str) -> Table:
+    def known(value: float) -> float | None:
+        return None if math.isnan(value) else value
+
     rows = [
         (
-            *(row.method, row.value, _known(row.error), row.more.get("event error [s]")),
-            *(row.more["steps or calls"], _known(row.seconds), row.status.value, row.reason),
+            *(row.method, row.value, known(row.error), row.more.get("event error [s]")),
+            *(row.more["steps or calls"], known(row.seconds), row.status.value, row.reason),
         )
         for row in study.rows
     ]
     return table(title, _METHOD_COLUMNS, rows, note)
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value
 
 
 _HERE = "graphsynth.systems.tribometer"
