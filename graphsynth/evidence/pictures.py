@@ -51,7 +51,8 @@ def work_precision_picture(problem: Problem) -> Figure:
 
     figure = new_figure((7.2, 5.8))
     axes = figure.subplots()
-    top = _top(problem)
+    # failures are drawn a decade above the largest error
+    top = 10.0 * max((max(row.error, FLOOR) for row in problem.rows if math.isfinite(row.error)), default=1.0)
     names: list[Any] = []
     for k, method in enumerate(problem.methods):
         style = {"color": _COLOURS[k % len(_COLOURS)], "marker": _MARKERS[k % len(_MARKERS)]}
@@ -94,19 +95,10 @@ def _law(axes: Any, rows: tuple[Row, ...], count: str, colour: str) -> None:
     axes.annotate(text, at, (-4, 4), textcoords="offset points", ha="right", fontsize=7, color=colour)
 
 
-def _top(problem: Problem) -> float:
-    """Height at which failures are drawn: a decade above the largest error."""
-    return 10.0 * max((_height(row) for row in problem.rows if math.isfinite(row.error)), default=1.0)
-
-
-def _height(row: Row) -> float:
-    return max(row.error, FLOOR)
-
-
 def _place(problem: Problem, row: Row, top: float) -> tuple[float, float]:
     if problem.count:
         return row.more.get(problem.count, math.nan), row.seconds
-    height = _height(row) if math.isfinite(row.error) else top
+    height = max(row.error, FLOOR) if math.isfinite(row.error) else top
     return (row.more.get(problem.over, math.nan) if problem.over else row.seconds), height
 
 
@@ -130,19 +122,12 @@ def _method(
         if row.status is not RowStatus.OK:
             x, y = _place(problem, row, top)
             axes.plot(x if math.isfinite(x) else max(times, default=1.0), y, "x", color=colour, ms=9, mew=2.2, zorder=4)
-    _name_ends(axes, rows, good, places, colour, names)
-
-
-def _name_ends(
-    axes: Any, rows: tuple[Row, ...], good: list[Row], places: list[Any], colour: str, taken: list[Any]
-) -> None:
-    """Write the settings at the first and the last point of a line, where no other text stands."""
+    # the settings at the first and the last point of a line, where no other text stands
     for k in sorted({0, len(good) - 1}) if good else ():
-        if not good[k].setting:
-            continue
-        below = k > 0 or len(rows) == 1
-        spot = {"textcoords": "offset points", "fontsize": 7, "color": colour, "ha": "left"}
-        taken.append(axes.annotate(good[k].setting, places[k], (5, -10 if below else 6), **spot))
+        if good[k].setting:
+            spot = {"textcoords": "offset points", "fontsize": 7, "color": colour, "ha": "left"}
+            offset = (5, -10 if k > 0 or len(rows) == 1 else 6)
+            names.append(axes.annotate(good[k].setting, places[k], offset, **spot))
 
 
 #: Where the name of a setting may stand beside its marker, in points: offset and alignment, the best first.

@@ -61,25 +61,15 @@ def precise_drive(
     angle: float = 0.0,
     speed: float = 0.0,
 ) -> Vector:
-    """Angle, speed and currents at times: a row for each, shape (n, 2 + currents).
+    """Angle, speed and currents at increasing times, s: a row for each, shape (n, 2 + currents).
 
     Estimated: the two finest extrapolations of each step agree to 300 roundings.  A `SpecError` refuses another
     motor, and more than 20 000 steps: too stiff for an explicit method.
 
-    Parameters
-    ----------
-    shape : Shape
-        Of the mechanism.
-    motor : DCMotor, SynchronousMotor or None
-        With an inductance; no voltage limit.  None for a mechanism that moves freely.
-    ratio : float
-        Motor turns per turn of the crank; no losses.
-    inertia, friction : float
-        Of the train, and viscous, both at the crank (the motor's own are added), kg m^2 and N m s/rad.
-    times : sequence of float
-        Increasing, the first is the start, s.
-    angle, speed : float
-        Of the crank at the start; currents begin at zero.
+    The motor has an inductance and no voltage limit; None for a mechanism that moves freely.  It makes ``ratio`` turns
+    per turn of the crank, without losses; ``inertia`` of the train and viscous ``friction`` count at the crank (the
+    motor's own are added), kg m^2 and N m s/rad.  ``angle`` and ``speed`` are those of the crank at the first of the
+    times; currents begin at zero.
 
     Examples
     --------

@@ -207,8 +207,12 @@ def stress_cases(names: Iterable[str] = (), *, slow: bool = True, files: Iterabl
     own = [case for path in files for case in read_cases(path)]
     cases = _in_order(own) if own else _shipped()
     wanted = list(names)
+
+    def under(full: str, name: str) -> bool:
+        return full == name or (full.startswith(name) and full[len(name)] in "-.")
+
     for name in wanted:
-        if not any(_under(case.name, name) for case in cases):
+        if not any(under(case.name, name) for case in cases):
             pages = list(dict.fromkeys(case.page for case in cases))
             near = get_close_matches(name, [*pages, *(case.name for case in cases)], n=2)
             advice = f"did you mean {' or '.join(near)}?" if near else f"pages are {', '.join(pages)}"
@@ -216,13 +220,9 @@ def stress_cases(names: Iterable[str] = (), *, slow: bool = True, files: Iterabl
     return tuple(
         case
         for case in cases
-        if (not wanted or any(_under(case.name, name) for name in wanted))
+        if (not wanted or any(under(case.name, name) for name in wanted))
         and (slow or not case.slow or case.name in wanted)
     )
-
-
-def _under(full: str, name: str) -> bool:
-    return full == name or (full.startswith(name) and full[len(name)] in "-.")
 
 
 def _names(case: Case) -> dict[str, Any]:

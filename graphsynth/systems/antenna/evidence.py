@@ -74,10 +74,9 @@ def pointing_errors(
     """Error against run time of every way to a pose, over equal crank angles up to ``largest`` on the mode at rest.
 
     Ways: the closed form in bulk (timed with 100 000 poses) and pose by pose, Newton's method on the twelve equations
-    in bulk, scipy's ``root`` on the same equations pose by pose with several tolerances.
-
-    Rows hold the largest errors of elevation and azimuth (radians; NaN after a failure) and the seconds for one pose. A
-    `GeometryError` refuses fewer than two poses or one round, and a mechanism that cannot be assembled throughout.
+    in bulk, scipy's ``root`` on the same equations pose by pose with several tolerances.  Rows hold the largest errors
+    of both angles (radians; NaN after a failure) and the seconds for one pose. A `GeometryError` refuses fewer than two
+    poses or one round, and a mechanism that cannot be assembled throughout.
 
     Examples
     --------
@@ -169,8 +168,12 @@ def pose_problem(mechanism: PointingMechanism, largest: float, effort: Effort | 
             truth = np.resize(_truths(mechanism, phi)[::-1], (size, 2))
             setting = f"{size} pose{'s' if size > 1 else ''} at once"
             given.append(_row(method, setting, partial(way, mechanism, angles), truth, size, effort))
-    why = _disagreement(mechanism, phi)
-    rows = [_assessed(row, why) for row in sorted(given, key=lambda row: list(_ORDER).index(row.method))]
+    away = _disagreement(mechanism, phi)
+    rows = []
+    for row in sorted(given, key=lambda row: _ORDER.index(row.method)):
+        lost = not math.isfinite(row.error) or row.error > 0.01
+        why = "it converges to another assembly, or to none" if lost else away
+        rows.append(replace(row, status=RowStatus.UNRELIABLE if why else RowStatus.OK, reason=why))
     question = f"Elevation and azimuth of the reflector, both cranks from 0 to {math.degrees(largest):g} degrees"
     return Problem("poses", question, "rad", tuple(rows), "pose")
 
@@ -196,9 +199,3 @@ def _disagreement(mechanism: PointingMechanism, phi: Array) -> str:
         for p, q in zip(precise_angles(mechanism, value, value), _truth(mechanism, value), strict=True)
     )
     return "" if away < 1e-40 else f"the closed form with 50 digits is {away:.1e} rad from the reference"
-
-
-def _assessed(row: Row, why: str) -> Row:
-    if not math.isfinite(row.error) or row.error > 0.01:
-        why = "it converges to another assembly, or to none"
-    return replace(row, status=RowStatus.UNRELIABLE if why else RowStatus.OK, reason=why)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -104,6 +104,9 @@ class _Shift(NamedTuple):
     length: float
 
 
+_Step = _Turn | _Shift
+
+
 class LoopEquations(NamedTuple):
     """Residuals (n, 12), Jacobian by unknowns (n, 12, 12), by crank angles (n, 12, 2), traces of D_Y, D_X (n, 2)."""
 
@@ -113,37 +116,18 @@ class LoopEquations(NamedTuple):
     traces: Array
 
 
-def _chains(mechanism: PointingDimensions, chart: str) -> tuple[list[_Turn | _Shift], list[_Turn | _Shift]]:
+def _chains(mechanism: PointingDimensions, chart: str) -> tuple[list[_Step], list[_Step]]:
     l1, l2, l3, l4, l5 = mechanism.lengths
     axes = (2, 0) if chart == "corrected" else (0, 1)
-    leg_y: list[_Turn | _Shift] = [
-        _Turn(0, _INPUT_X),
-        _Turn(1, 4),
-        _Shift(1, l3),
-        _Turn(axes[0], 3),
-        _Turn(axes[1], 2),
-        _Shift(2, l2),
-        _Turn(1, 1),
-        _Turn(0, 0),
-        _Turn(2, _FIXED, 0.5 * math.pi),
-        _Shift(0, -l1),
-    ]
-    leg_x: list[_Turn | _Shift] = [
-        _Turn(1, _INPUT_Y),
-        _Turn(0, 10),
-        _Shift(0, l5),
-        _Turn(2, 9),
-        _Turn(1, 8),
-        _Shift(2, l4),
-        _Turn(0, 7),
-        _Turn(1, 6),
-        _Turn(2, _FIXED, 0.0),
-        _Shift(0, -l1),
-    ]
+    # from the crank over the ball joint and along the rod, then cardan and mounting
+    leg_y: list[_Step] = [_Turn(0, _INPUT_X), _Turn(1, 4), _Shift(1, l3), _Turn(axes[0], 3), _Turn(axes[1], 2)]
+    leg_y += [_Shift(2, l2), _Turn(1, 1), _Turn(0, 0), _Turn(2, _FIXED, 0.5 * math.pi), _Shift(0, -l1)]
+    leg_x: list[_Step] = [_Turn(1, _INPUT_Y), _Turn(0, 10), _Shift(0, l5), _Turn(2, 9), _Turn(1, 8)]
+    leg_x += [_Shift(2, l4), _Turn(0, 7), _Turn(1, 6), _Turn(2, _FIXED, 0.0), _Shift(0, -l1)]
     return leg_y, leg_x
 
 
-def _matrix(step: _Turn | _Shift, angles: Array) -> Array:
+def _matrix(step: _Step, angles: Array) -> Array:
     """One-step matrix, shape (n, 4, 4)."""
     made = np.zeros((len(angles), 4, 4))
     made[:, range(4), range(4)] = 1.0
@@ -159,7 +143,7 @@ def _matrix(step: _Turn | _Shift, angles: Array) -> Array:
     return made
 
 
-def _product(steps: list[_Turn | _Shift], angles: Array) -> tuple[Array, dict[int, Array]]:
+def _product(steps: list[_Step], angles: Array) -> tuple[Array, dict[int, Array]]:
     """Return the product of the steps and its derivative by every source that occurs in it."""
     matrices = [_matrix(step, angles) for step in steps]
     behind = [np.broadcast_to(np.eye(4), matrices[0].shape)]
@@ -194,7 +178,7 @@ def loop_equations(
     goals = ((0.0, l3 - l1, l2), (l5 - l1, 0.0, l4))
     unit = l1 if scaled else 1.0
     residual, full, traces = np.zeros((n, 12)), np.zeros((n, 12, 14)), np.empty((n, 2))
-    gimbal: list[_Turn | _Shift] = [_Turn(0, 5, -1.0), _Turn(1, 11, -1.0)]
+    gimbal: list[_Step] = [_Turn(0, 5, -1.0), _Turn(1, 11, -1.0)]
     if mechanism.order == "XY":
         gimbal.reverse()
     for leg, (steps, goal) in enumerate(zip(_chains(mechanism, chart), goals)):
@@ -454,19 +438,11 @@ def solve_loops(
     traces = loop_equations(self, x, phi, chart).traces
     converged = size < RESIDUAL
     genuine = converged & (np.abs(traces - 3.0) < 1e-6).all(axis=1)
-    shape = given_x.shape
     x = np.where(genuine[:, None], x - 2.0 * np.pi * np.round(x / (2.0 * np.pi)), np.nan)
-    return LoopSolution(
-        x=x.reshape(*shape, 12),
-        residual=size.reshape(shape),
-        error=last.reshape(shape),
-        converged=converged.reshape(shape),
-        genuine=genuine.reshape(shape),
-        iterations=(total + used).reshape(shape),
-        chart=chart,
-        start_rank=ranks.reshape(shape),
-        message=message,
-    )
+    found: tuple[Any, ...] = (size, last, converged, genuine, total + used, ranks)
+    size, last, converged, genuine, total, ranks = (part.reshape(given_x.shape) for part in found)
+    x = x.reshape(*given_x.shape, 12)
+    return LoopSolution(x, size, last, converged, genuine, total, chart, ranks, message)
 
 
 def survey_roots(

@@ -127,17 +127,14 @@ class PoseStatus(IntEnum):
     @property
     def message(self) -> str:
         """One sentence that says what the status means."""
-        return _MESSAGES[self]
-
-
-_MESSAGES = {
-    PoseStatus.OK: "assembled",
-    PoseStatus.FOLD_Y: "assembled at a fold of leg Y: two assembly modes meet, the velocity is undefined",
-    PoseStatus.FOLD_X: "assembled at a fold of leg X: two assembly modes meet, the velocity is undefined",
-    PoseStatus.LEG_Y_OUT_OF_REACH: "cannot be assembled: |K_Y| exceeds hypot(A, B), the rod of leg Y does not reach",
-    PoseStatus.LEG_X_OUT_OF_REACH: "cannot be assembled: |K_X| exceeds hypot(A, B), the rod of leg X does not reach",
-    PoseStatus.INDETERMINATE: "not determined: a ball joint lies on a gimbal axis and holds nothing",
-}
+        return (
+            "assembled",
+            "assembled at a fold of leg Y: two assembly modes meet, the velocity is undefined",
+            "assembled at a fold of leg X: two assembly modes meet, the velocity is undefined",
+            "cannot be assembled: |K_Y| exceeds hypot(A, B), the rod of leg Y does not reach",
+            "cannot be assembled: |K_X| exceeds hypot(A, B), the rod of leg X does not reach",
+            "not determined: a ball joint lies on a gimbal axis and holds nothing",
+        )[self]
 
 
 @dataclass(frozen=True, eq=False)

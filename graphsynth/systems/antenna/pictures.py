@@ -332,9 +332,8 @@ def sketches(context: Context) -> tuple[Picture, ...]:
             "Leg Y (crank axis parallel to x) gives the elevation, leg X the azimuth. Squares are cardans, open "
             "circles ball joints, dotted circles the paths of the crank pins."
         )
-        pictures.append(
-            Picture(f"The mechanism in space, {at}", themed_svg(pointing_picture(antenna, x, y)), caption, "wide")
-        )
+        svg = themed_svg(pointing_picture(antenna, x, y))
+        pictures.append(Picture(f"The mechanism in space, {at}", svg, caption, "wide"))
     for sy, sx in there:
         name = f"Assembly mode ({'+' if sy > 0 else '−'}, {'+' if sx > 0 else '−'})"
         svg = themed_svg(pointing_picture(antenna, x, y, s_y=sy, s_x=sx, size=(4.4, 4.0), plain=True))
@@ -366,36 +365,22 @@ def plots(context: Context, motion: AntennaMotion, comparison: ModelComparison) 
     table, antenna = table_of(context), antenna_of(context)
     other, reading = other_model(context)
     largest = table.sweep.largest
-    figure4 = comparison_picture(
-        antenna,
-        other,
-        other_reading=reading,
-        largest=largest,
-        samples=table.sweep.samples,
-        working=table.sweep.working,
-        size=(8.6, 3.7),
-    )
-    pictures = [
-        Picture(
-            "Figure 4: two models over equal crank angles",
-            themed_svg(figure4),
-            "a: second model; b: first model; c: the means of both and their difference. Dotted: working limit.",
-            "wide",
-        ),
-        *_curves(motion, comparison),
-    ]
-    drawn = difference_map_picture(antenna, other, other_reading=reading, span=largest)
+    given: dict[str, Any] = {"samples": table.sweep.samples, "working": table.sweep.working, "size": (8.6, 3.7)}
+    figure = comparison_picture(antenna, other, other_reading=reading, largest=largest, **given)
+    words = "a: second model; b: first model; c: the means of both and their difference. Dotted: working limit."
+    pictures = [Picture("Figure 4: two models over equal crank angles", themed_svg(figure), words, "wide")]
+    pictures += _curves(motion, comparison)
+    figure = difference_map_picture(antenna, other, other_reading=reading, span=largest)
     words = "Left: what the article compares. Right: how far apart the two models really point."
-    pictures.append(Picture("Map of the difference of the two models", themed_svg(drawn), words, "wide"))
-    if any(widths_of(context)):
-        drawn = tolerance_map_picture(
-            antenna, tuple(widths_of(context)), span=largest, nodes=table.tolerances.map_nodes
-        )
-        pictures.append(
-            Picture("Map of the certified deviations", themed_svg(drawn), "Mean-value form at every node.", "wide")
-        )
-    drawn = fold_map_picture(antenna, nodes=61, size=(6.4, 6.2))
-    pictures.append(Picture("Map of folds and dead points", themed_svg(drawn), "Of the mode of the rest pose.", "wide"))
+    pictures.append(Picture("Map of the difference of the two models", themed_svg(figure), words, "wide"))
+    widths = tuple(widths_of(context))
+    if any(widths):
+        figure = tolerance_map_picture(antenna, widths, span=largest, nodes=table.tolerances.map_nodes)
+        words = "Mean-value form at every node."
+        pictures.append(Picture("Map of the certified deviations", themed_svg(figure), words, "wide"))
+    figure = fold_map_picture(antenna, nodes=61, size=(6.4, 6.2))
+    words = "Of the mode of the rest pose."
+    pictures.append(Picture("Map of folds and dead points", themed_svg(figure), words, "wide"))
     return tuple(pictures)
 
 
@@ -413,15 +398,13 @@ def _curves(motion: AntennaMotion, comparison: ModelComparison) -> list[Picture]
         )
     ]
     ratios = "Of the reflector (a elevation, b azimuth) to the cranks (φx leg Y, φy leg X)."
-    leg_y, leg_x = _lines(phi, passive, range(5)), _lines(phi, passive, range(6, 11))
+    looks = list(zip(("a", "b", "c", "d", "note"), ("-", "--", "-.", ":", "-")))
+    leg_y, leg_x = (
+        [Line(phi, passive[:, k], f"x{k + 1}", *look) for k, look in enumerate(looks, first)] for first in (0, 6)
+    )
     return [
         chart("Growth of the differences", growth, x, "difference [′]", "Equal cranks; a: elevation, b: azimuth."),
         chart("Velocity ratios", slopes, x, "velocity ratio", ratios),
         chart("Passive angles of leg Y", leg_y, x, "angle [°]", "x1, x2: cardan; x3, x4, x5: ball joint."),
         chart("Passive angles of leg X", leg_x, x, "angle [°]", "x7, x8: cardan; x9, x10, x11: ball joint."),
     ]
-
-
-def _lines(x: Any, columns: Any, which: range) -> list[Any]:
-    colours, styles = ("a", "b", "c", "d", "note"), ("-", "--", "-.", ":", "-")
-    return [Line(x, columns[:, k], f"x{k + 1}", colours[i], styles[i]) for i, k in enumerate(which)]

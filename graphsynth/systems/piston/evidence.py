@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -44,14 +45,7 @@ def work(context: Any, effort: Effort) -> Problem:
 
 
 def load_problem(machine: PistonMachine, name: str, effort: Effort | None = None) -> Problem:
-    """Compare the forces of a piston machine with a crowned slot, and with a sliding one that is redundant.
-
-    Parameters
-    ----------
-    machine : PistonMachine
-    name : str
-    effort : Effort, optional
-    """
+    """Compare the forces of a piston machine with a crowned slot, and with a sliding one that is redundant."""
     effort = effort or Effort()
     rows = []
     kind, methods = "largest difference of a force over the largest force", ("crowned slot", "sliding slot")
@@ -71,53 +65,36 @@ def load_problem(machine: PistonMachine, name: str, effort: Effort | None = None
 def work_problem(machine: PistonMachine, name: str, effort: Effort | None = None) -> Problem:
     """Integrate the gas work over a turn: even steps, and the pieces between the kinks of the load.
 
-    Raises
-    ------
-    GeometryError
-        A gas law without work.
+    A `GeometryError` refuses a gas law without work.
     """
+    from graphsynth.systems.piston.loads import CompressorCycle
     from graphsynth.systems.piston.turn import piston_turn
 
     effort = effort or Effort()
-    exact, reference = _exact_work(machine)
+    exact = machine.gas.work(machine.mechanism.stroke)
+    reference = "area of the p-V diagram, closed form of the gas law"
+    if isinstance(machine.gas, CompressorCycle):
+        exact = float(precise_work(machine.gas, machine.mechanism.stroke))
+        reference = "area of the p-V diagram, quadrature with 50 digits"
     if not math.isfinite(exact) or exact == 0.0:
         raise GeometryError("the gas does no work over a turn, so there is nothing to compare")
-    _work = partial(_work_row, exact=exact, reference=reference)
-    rows = []
-    for count in (90, 360, 1440) if effort.quick else (90, 360, 1440, 5760, 23_040):
-        value, seconds, rounds = best_of(_trapezium(machine, count), effort)
-        rows.append(_work("even steps", f"{count} positions", value, seconds, rounds))
-    found, seconds, rounds = best_of(lambda: piston_turn(machine), effort)
-    rows.append(_work("pieces between kinks, all works", "", float(found.gas), seconds, rounds))
-    return Problem("work", f"Work of the gas of {name} over a turn", "relative", tuple(rows), "turn")
 
-
-def _trapezium(machine: PistonMachine, count: int) -> Any:
-    angles = np.arange(count) * math.tau / count
-
-    def run() -> float:
-        force = machine.gas_force(angles)
+    def even_steps(count: int) -> float:
+        angles = np.arange(count) * math.tau / count
         speed = machine.mechanism.motion(angles).piston.first
-        return float(np.sum(force * speed) * math.tau / count)
+        return float(np.sum(machine.gas_force(angles) * speed) * math.tau / count)
 
-    return run
-
-
-def _work_row(
-    method: str, setting: str, value: float, seconds: float, rounds: int, *, exact: float, reference: str
-) -> Row:
-    error = min(abs(value - exact), abs(value + exact)) / abs(exact)
-    return Row(method, setting, error, seconds, rounds, "distance from the reference", reference)
-
-
-def _exact_work(machine: PistonMachine) -> tuple[float, str]:
-    """Work of the gas over a turn, and where it is from."""
-    from graphsynth.systems.piston.loads import CompressorCycle
-
-    stroke = machine.mechanism.stroke
-    if isinstance(machine.gas, CompressorCycle):
-        return float(precise_work(machine.gas, stroke)), "area of the p-V diagram, quadrature with 50 digits"
-    return machine.gas.work(stroke), "area of the p-V diagram, closed form of the gas law"
+    runs: list[tuple[str, str, Callable[[], float]]] = [
+        ("even steps", f"{n} positions", partial(even_steps, n))
+        for n in ((90, 360, 1440) if effort.quick else (90, 360, 1440, 5760, 23_040))
+    ]
+    runs.append(("pieces between kinks, all works", "", lambda: float(piston_turn(machine).gas)))
+    rows = []
+    for method, setting, run in runs:
+        value, *timed = best_of(run, effort)
+        error = min(abs(value - exact), abs(value + exact)) / abs(exact)
+        rows.append(Row.of(method, setting, error, timed, reference=reference))
+    return Problem("work", f"Work of the gas of {name} over a turn", "relative", tuple(rows), "turn")
 
 
 def precise_work(gas: CompressorCycle, stroke: float) -> Any:

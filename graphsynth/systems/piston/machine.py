@@ -96,19 +96,9 @@ class PistonLoads:
         return float(np.abs(parts[:, good].sum(axis=0)).max() / max(np.abs(parts[:, good]).max(), 1e-300))
 
     def edges(self, length: float, of: Literal["wall", "guide"] = "wall") -> tuple[Array, Array]:
-        """Return the forces at the two ends of a piston (or of the crosshead's shoe) that give side load and couple.
+        """Return the forces, N, at the two ends of a piston that give its side load and couple, the head's end last.
 
-        Parameters
-        ----------
-        length : float
-            m; the reference point is in its middle.
-        of : {"wall", "guide"}
-            Of the cylinder on the piston, or of the guide on the crosshead.
-
-        Returns
-        -------
-        near, far : ndarray, shape (n,)
-            N; ``far`` at the end towards the head.
+        `length` in m, with the reference point in its middle; `of` "guide": at the ends of the crosshead's shoe.
         """
         force, couple = (self.wall, self.wall_couple) if of == "wall" else (self.guide, self.guide_couple)
         lever = couple / positive("length of the piston", length)
@@ -185,10 +175,7 @@ class PistonMachine:
     def dynamic_model(self, slot: Slot = "crowned") -> DynamicModel:
         """Return the machine with bodies, gas, rings and friction as elements: for simulation, springs, motors.
 
-        Parameters
-        ----------
-        slot : {"sliding", "crowned"}
-            See :meth:`FloatingPiston.mechanism`.
+        For `slot` see `FloatingPiston.mechanism`.
 
         Examples
         --------
@@ -203,9 +190,8 @@ class PistonMachine:
             gap = outer.piston - (along.conj() * (complex(*place) - base)).real
             rate = (along.conj() * complex(*velocity)).real
             given = self.gas.force(np.array([t]), np.array([gap]), np.array([rate > 0.0]), stroke)
-            force = -along * (
-                float(given[0]) + self.friction.rings * math.tanh(rate / self.friction.smoothing_velocity)
-            )
+            rings = self.friction.rings * math.tanh(rate / self.friction.smoothing_velocity)
+            force = -along * (float(given[0]) + rings)
             return force.real, force.imag
 
         return self._model(law, slot)
@@ -254,33 +240,16 @@ class PistonMachine:
         return inverse_dynamics(model, motion, self.speed, self.acceleration, times=count, refuse=refuse)
 
     def loads(self, angle: ArrayLike) -> PistonLoads:
-        """Find all reactions at crank angles.
+        """Find all reactions at crank angles, radians: one list of numbers, or a scalar for arrays of length 1.
 
-        Parameters
-        ----------
-        angle : array_like
-            Radians; a scalar gives arrays of length 1.
-
-        Returns
-        -------
-        PistonLoads
-            NaN where friction leaves no or several solutions: the machine jams there, or may.
-
-        Raises
-        ------
-        GeometryError
-            Angles that are not one list of numbers.
+        NaN where friction leaves no or several solutions: the machine jams there, or may.
         """
         phi = np.atleast_1d(finite_array("angle", angle))
         found = self.inverse_dynamics(phi, refuse=False)
         motion, zero = self.mechanism.motion(phi), np.zeros(len(phi))
         pins = {pair: found.reactions.between(*pair).on(pair[1])[0] for pair in ((0, 1), (1, 2), (2, 3))}
-        speeds = {
-            "guide": motion.crosshead,
-            "cylinder": motion.piston,
-            "slot": motion.slot,
-            "yoke": motion.follower,
-        }
+        ways = (motion.crosshead, motion.piston, motion.slot, motion.follower)
+        speeds = dict(zip(("guide", "cylinder", "slot", "yoke"), ways))
         normal, lost = dict.fromkeys(speeds, zero), self.friction.rings * self._sliding(motion.piston.first)
         for name, (pair, turn) in self._contacts().items():
             force = found.reactions.between(*pair).on(pair[1])[0]
@@ -320,11 +289,8 @@ class PistonMachine:
         motion, w, a = self.mechanism.run(phi), self.speed, self.acceleration
         kinetic = weights = np.zeros(len(phi))
         for link, body in self.dynamic_model().bodies.items():
-            path, turn, second = (
-                motion.point(link, body.centre),
-                motion.velocities[:, link, 2],
-                motion.accelerations[:, link, 2],
-            )
+            path = motion.point(link, body.centre)
+            turn, second = motion.velocities[:, link, 2], motion.accelerations[:, link, 2]
             velocity, acceleration = path.velocity * w, path.acceleration * w**2 + path.velocity * a
             kinetic = kinetic + body.mass * (velocity * acceleration).sum(axis=1)
             kinetic = kinetic + body.inertia * turn * w * (second * w**2 + turn * a)

@@ -170,26 +170,18 @@ def loop_spaces(
     found: list[LoopSpace] = []
     before, seen = 0, set[Pair]()
     for k, links in enumerate(basis):
-        pairs = _joints_of(links)
+        passed = _passed(links)
+        pairs = tuple(pair for pair, _ in passed)
         rows = matrix[3 * k : 3 * k + 3]
-        for (a, b), pair in zip(zip(links, (*links[1:], links[0])), pairs):
-            rows[:, columns[pair]] = screws[pair] * (1.0 if a < b else -1.0)
+        for pair, sign in passed:
+            rows[:, columns[pair]] = screws[pair] * sign
         u, values, _ = np.linalg.svd(rows)
         own_rank = _rank(values)
         rank = _rank(np.asarray(np.linalg.svd(matrix[: 3 * k + 3], compute_uv=False)))
         fresh = tuple(pair for pair in pairs if pair not in seen)
         seen.update(pairs)
-        found.append(
-            LoopSpace(
-                links,
-                pairs,
-                fresh,
-                own_rank,
-                rank - before,
-                sum(screws[pair].shape[1] for pair in fresh),
-                u[:, own_rank:].T.copy(),
-            )
-        )
+        sub_edges = sum(screws[pair].shape[1] for pair in fresh)
+        found.append(LoopSpace(links, pairs, fresh, own_rank, rank - before, sub_edges, u[:, own_rank:].T.copy()))
         before = rank
     return LoopSpaces(tuple(found), start, before, report.by_rank)
 
@@ -209,8 +201,9 @@ def _screws(joint: object, place: Array, Lc: float) -> Array:
     return found if a < b else -found
 
 
-def _joints_of(links: Sequence[int]) -> tuple[Pair, ...]:
-    return tuple((min(a, b), max(a, b)) for a, b in zip(links, (*links[1:], links[0])))
+def _passed(links: Sequence[int]) -> list[tuple[Pair, int]]:
+    """Joints of a loop, each ascending, and 1 or -1 for the direction in which the loop passes it."""
+    return [((a, b), 1) if a < b else ((b, a), -1) for a, b in zip(links, (*links[1:], links[0]))]
 
 
 def _tree_loops(graph: MechanismGraph) -> list[tuple[int, ...]]:
@@ -245,10 +238,11 @@ def _check_basis(graph: MechanismGraph, loops: Sequence[Sequence[int]]) -> None:
     for k, links in enumerate(loops):
         if len(set(links)) != len(links) or len(links) < 3:
             raise GraphError(f"loop {tuple(links)} must name at least three links, each once")
-        for (a, b), pair in zip(zip(links, (*links[1:], links[0])), _joints_of(links)):
+        for pair, sign in _passed(links):
             if pair not in joints:
+                a, b = pair[::sign]
                 raise GraphError(f"loop {tuple(links)} passes from link {a} to link {b}, which have no joint")
-            table[k, joints.index(pair)] = 1 if a < b else -1
+            table[k, joints.index(pair)] = sign
     if len(loops) and np.linalg.matrix_rank(table.astype(np.float64)) < len(loops):
         raise GraphError("the loops depend on each other; leave one out and give another")
 
@@ -299,7 +293,13 @@ def rotary_assignments(seed: int = 0) -> list[Assignment]:
     seed = whole("seed", seed, 0, 2**63 - 1)
     found = []
     for kinds in product("RP", repeat=6):
-        mechanism = _random("".join(kinds), seed)
+        rng = np.random.default_rng(seed)
+        made: list[JointGeometry] = []  # random joints, all link frames at the origin
+        for (a, b), kind in zip(_JOINTS, kinds):
+            at = (float(rng.uniform(-1, 1)), float(rng.uniform(-1, 1)))
+            turn = float(rng.uniform(0, np.pi))
+            made.append(Revolute(a, b, at, at) if kind == "R" else Prismatic(a, b, at, at, turn, turn))
+        mechanism = Mechanism(MechanismGraph(5, list(_JOINTS), frame=0), tuple(made), pose=((0.0, 0.0, 0.0),) * 5)
         spaces = loop_spaces(mechanism, loops=[(0, 1, 2, 3), (0, 3, 4)])
         if spaces.spaces != (3, 2) or spaces.mobility != 1 or kinds[0] != "R":
             continue
@@ -309,14 +309,3 @@ def rotary_assignments(seed: int = 0) -> list[Assignment]:
             name = "".join(kinds)
             found.append(Assignment(name, spaces, *_FULL_TURN[name[1:3]]))
     return found
-
-
-def _random(kinds: str, seed: int) -> Mechanism:
-    """Return the mechanism with random joints, all link frames at the origin."""
-    rng = np.random.default_rng(seed)
-    joints: list[JointGeometry] = []
-    for (a, b), kind in zip(_JOINTS, kinds):
-        at = (float(rng.uniform(-1, 1)), float(rng.uniform(-1, 1)))
-        turn = float(rng.uniform(0, np.pi))
-        joints.append(Revolute(a, b, at, at) if kind == "R" else Prismatic(a, b, at, at, turn, turn))
-    return Mechanism(MechanismGraph(5, list(_JOINTS), frame=0), tuple(joints), pose=((0.0, 0.0, 0.0),) * 5)

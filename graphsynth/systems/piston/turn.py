@@ -27,72 +27,42 @@ _SAMPLES = 720
 
 @dataclass(frozen=True, eq=False)
 class PistonTurn:
-    """Works of a turn at constant speed (estimated: Gauss quadrature on panels that end where a load has a kink), J.
+    """Works of a turn at constant speed, J, and peaks of the loads, N (magnitudes).
 
-    Attributes
-    ----------
-    motor, gas, friction : float
-        Work of the motor, work taken by the gas, work lost.
-    kinetic, weights : float
-        Change of the kinetic energy and work of the weights over the turn: exactly 0, so they are errors.
-    gas_closed_form : float
-        Indicated work from the pressure-volume diagram; NaN if the gas law has none.
-    balance_error : float
-        ``|motor - gas - friction|`` over the largest work in play: the kinetic energy's way up and down counts.
-    peak_wall, mean_wall : float
-        Largest and mean side load of the cylinder, N (magnitudes).
-    peak_guide, mean_guide : float
-        The same of the crosshead's guide.
-    peak_edge, peak_guide_edge : float
-        Largest force at an end of the piston, and of the crosshead's shoe, N.
-    peak_held : float
-        Largest side load that the slot's static friction can add, N; 0 where the slot slides.
+    Estimated: Gauss quadrature on panels that end where a load has a kink.
     """
 
     motor: float
-    gas: float
+    gas: float  #: work taken by the gas
     friction: float
-    kinetic: float
-    weights: float
-    gas_closed_form: float
-    balance_error: float
-    peak_wall: float
+    kinetic: float  #: change of the kinetic energy over the turn: exactly 0, so it is an error
+    weights: float  #: work of the weights: the same
+    gas_closed_form: float  #: indicated work from the pressure-volume diagram; NaN if the gas law has none
+    balance_error: float  #: ``|motor - gas - friction|`` over the largest work in play, the kinetic energy's included
+    peak_wall: float  #: side load of the cylinder
     mean_wall: float
-    peak_guide: float
+    peak_guide: float  #: of the crosshead's guide
     mean_guide: float
-    peak_edge: float
-    peak_guide_edge: float
-    peak_held: float
+    peak_edge: float  #: at an end of the piston
+    peak_guide_edge: float  #: at an end of the crosshead's shoe
+    peak_held: float  #: side load that the slot's static friction can add; 0 where the slot slides
 
 
 @dataclass(frozen=True, eq=False)
 class PistonComparison:
     """The same drive, gas and masses with and without the second group (estimated).
 
-    Attributes
-    ----------
-    floating, plain : PistonTurn
-    wall_ratio : float
-        Peak side load of the cylinder with over without the second group; NaN if there is none without, up to
-        rounding.
-    edge_ratio : float
-        The same of the forces at the ends of the piston.
-    guide_share : float
-        Peak force at an end of the crosshead's shoe over that at an end of the plain piston: where the load goes.
-    friction_ratio : float
-        Work lost with over without; NaN without friction.
-    squareness : float
-        Error of the right angle between slot and cylinder, radians, from which on the second group buys nothing
-        whatever the gas force, masses aside: the steepest angle of the rod.  NaN for a Scotch yoke, whose plain piston
-        has no side load.
+    Ratios are with over without it, NaN if there is nothing without, up to rounding.
     """
 
     floating: PistonTurn
     plain: PistonTurn
-    wall_ratio: float
-    edge_ratio: float
-    guide_share: float
-    friction_ratio: float
+    wall_ratio: float  #: of the peak side loads of the cylinder
+    edge_ratio: float  #: of the forces at the ends of the piston
+    guide_share: float  #: peak force at an end of the shoe over that at an end of the plain piston
+    friction_ratio: float  #: of the works lost
+    #: Error of the right angle between slot and cylinder, radians, from which on the second group buys nothing whatever
+    #: the gas force, masses aside: the steepest angle of the rod.  NaN for a Scotch yoke: its plain piston has no load.
     squareness: float
 
     @property
