@@ -89,11 +89,11 @@ def read_graph(text: str, line: int = 1) -> MechanismGraph:
 
 
 def _one(text: str, place: str) -> MechanismGraph:
-    from graphsynth.formats.graph_json import parse_lines
+    from graphsynth.formats.plain import parse_jsonl
     from graphsynth.structure.graph import MechanismGraph
 
     if text.startswith("{"):
-        return parse_lines(text, place)
+        return parse_jsonl(text, place)
     try:
         return MechanismGraph.from_key(text) if text.startswith("1") else MechanismGraph.from_text(text)
     except FormatError as error:

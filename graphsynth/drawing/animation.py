@@ -44,9 +44,11 @@ _LINE = 17.0  # height of a line of the note, pixels
 class _Stage:
     """A sketch whose links are groups, and the pose of each group's origin in pixels and degrees over the frames."""
 
-    def __init__(self, frames: Frames, width: float, height: float, title: str) -> None:
-        self.frames = frames
-        mechanism = frames.mechanism
+    def __init__(self, motion: Motion, count: int, seconds: float, width: float, height: float, title: str) -> None:
+        if not (math.isfinite(seconds) and seconds > 0.0):
+            raise GeometryError(f"seconds = {seconds} must be positive and finite; give the time of one pass")
+        self.frames: Frames = frames_of(motion, count)
+        frames, mechanism = self.frames, motion.mechanism
         self.sketch: Sketch = mechanism_sketch(mechanism, frames.poses, width=width, height=height, title=title)
         # the origin of a group is the middle of its link: turning errors stay small however far its frame lies
         shown = [body.vertices() for body in bodies(mechanism, frames.poses, 0.0)]
@@ -91,26 +93,19 @@ class _Stage:
         for layer, link, shapes in self.layers():
             if link == FIXED:
                 found.append(f'<g data-layer="{layer}">{self.still(shapes)}</g>')
-            else:
-                found.append(self._group(link, layer, shapes, grip == link))
+                continue
+            x, y, turn = self.track(link)[0]
+            body = self.about(link, shapes, f'data-r="{link}" transform="rotate({number(-turn)})"')
+            if grip == link and layer == "label":  # an invisible thick line along the driven link, to take hold of
+                ends = [self.local(link, point) for point in self.ends[link]]
+                data = " L".join(f"{number(x)} {number(y)}" for x, y in (ends if len(ends) > 1 else ends * 2))
+                body += (
+                    f'<path class="grip" d="M{data}" fill="none" stroke="#000" stroke-opacity="0" stroke-width="34" '
+                    'stroke-linecap="round" pointer-events="stroke"/>'
+                )
+            where = f"translate({number(x)} {number(y)}) rotate({number(turn)})"
+            found.append(f'<g data-k="{link}" data-layer="{layer}" transform="{where}">{body}</g>')
         return found
-
-    def _group(self, link: int, layer: str, shapes: list[Shape], grip: bool) -> str:
-        x, y, turn = self.track(link)[0]
-        body = self.about(link, shapes, f'data-r="{link}" transform="rotate({number(-turn)})"')
-        if grip and layer == "label":
-            body += self._grip(link)
-        where = f"translate({number(x)} {number(y)}) rotate({number(turn)})"
-        return f'<g data-k="{link}" data-layer="{layer}" transform="{where}">{body}</g>'
-
-    def _grip(self, link: int) -> str:
-        """Write an invisible thick line along the driven link, to take hold of."""
-        ends = [self.local(link, point) for point in self.ends[link]]
-        data = "M" + " L".join(f"{number(x)} {number(y)}" for x, y in (ends if len(ends) > 1 else ends * 2))
-        return (
-            f'<path class="grip" d="{data}" fill="none" stroke="#000" stroke-opacity="0" stroke-width="34" '
-            'stroke-linecap="round" pointer-events="stroke"/>'
-        )
 
 
 def animation_html(
@@ -134,20 +129,18 @@ def animation_html(
     of the drawing; it scales with the page. Raises `GeometryError`: nothing of the motion is assembled, or a number is
     out of its bounds.
     """
-    _check_seconds(seconds)
-    shown = frames_of(motion, frames)
     name = title or f"Mechanism with {motion.mechanism.graph.links} links"
-    stage = _Stage(shown, width, height, name)
-    driver = _driver_link(shown)
+    stage = _Stage(motion, frames, seconds, width, height, name)
+    first = motion.mechanism.drivers[0]
+    driver = first.link if first.link != motion.mechanism.frame else first.base  # the moving one of its joint
     svg = picture(stage.groups(driver), stage.sketch.width, stage.sketch.height, name, style="")
     notes = "".join(
-        f'<p class="{css}">{escape(words)}</p>' for css, words in (("", note), ("stop", shown.note)) if words
+        f'<p class="{css}">{escape(words)}</p>' for css, words in (("", note), ("stop", stage.frames.note)) if words
     )
     template = files("graphsynth.drawing").joinpath("player.html").read_text("utf-8")
-    allowed = policy(re.findall("<script>(.*?)</script>", template, re.DOTALL))
     data = json.dumps(_data(stage, seconds, driver), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     parts = {
-        "POLICY": allowed,
+        "POLICY": policy(re.findall("<script>(.*?)</script>", template, re.DOTALL)),
         "STYLE": VARIABLES + STYLE,
         "SVG": svg,
         "NOTES": notes,
@@ -158,20 +151,13 @@ def animation_html(
     return "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
 
 
-def _check_seconds(seconds: float) -> None:
-    if not (math.isfinite(seconds) and seconds > 0.0):
-        raise GeometryError(f"seconds = {seconds} must be positive and finite; give the time of one pass")
-
-
-def _driver_link(frames: Frames) -> int:
-    """Return the link that is driven first, the moving one of its joint."""
-    driver = frames.mechanism.drivers[0]
-    return driver.link if driver.link != frames.mechanism.frame else driver.base
-
-
 def _data(stage: _Stage, seconds: float, driver: int) -> dict[str, Any]:
     """Everything the player needs: poses as whole tenths of pixels and hundredths of degrees."""
     frames, mechanism = stage.frames, stage.frames.mechanism
+
+    def short(link: int, point: Point) -> list[float]:
+        return [round(value, 2) for value in stage.local(link, point)]
+
     poses = [
         np.rint(stage.track(link) * [10.0, 10.0, 100.0]).astype(int).ravel().tolist()
         for link in range(mechanism.graph.links)
@@ -181,28 +167,20 @@ def _data(stage: _Stage, seconds: float, driver: int) -> dict[str, Any]:
         name, angle, values = shown_coordinate(mechanism, k, frames.coordinates[:, k])
         drivers.append({"name": name, "angle": angle, "values": values})
     points = [
-        {"name": name, "link": link, "colour": TRACE_COLOURS[k % len(TRACE_COLOURS)], "at": _short(stage, link, at)}
+        {"name": name, "link": link, "colour": TRACE_COLOURS[k % len(TRACE_COLOURS)], "at": short(link, complex(*at))}
         for k, (name, (link, at)) in enumerate(mechanism.points.items())
     ]
-    played = {"count": len(frames.poses), "loop": frames.loops, "seconds": seconds, "grip": _grip_data(stage, driver)}
-    return played | {"poses": poses, "drivers": drivers, "points": points}
-
-
-def _short(stage: _Stage, link: int, at: tuple[float, float]) -> list[float]:
-    return [round(value, 2) for value in stage.local(link, complex(*at))]
-
-
-def _grip_data(stage: _Stage, link: int) -> dict[str, Any] | None:
-    """Where the driven link is held, and the centre it turns about if that is fixed."""
-    mechanism = stage.frames.mechanism
+    # where the driven link is held, and the centre it turns about if that is fixed
     joint = mechanism.joint(*mechanism.drivers[0].pair)
-    own = complex(*(joint.at_a if joint.a == link else joint.at_b))
-    far = max(stage.ends[link], key=lambda point: abs(point - own), default=own)
+    own = complex(*(joint.at_a if joint.a == driver else joint.at_b))
+    far = max(stage.ends[driver], key=lambda point: abs(point - own), default=own)
     centre = None
     if isinstance(joint, Revolute) and mechanism.frame in (joint.a, joint.b) and abs(far - own) > 0.0:
-        at = joint.at_a if joint.a == mechanism.frame else joint.at_b
-        centre = [round(value, 2) for value in stage.sketch.xy(complex(*at))]
-    return {"link": link, "at": _short(stage, link, (far.real, far.imag)), "centre": centre}
+        fixed = complex(*(joint.at_a if joint.a == mechanism.frame else joint.at_b))
+        centre = [round(value, 2) for value in stage.sketch.xy(fixed)]
+    grip = {"link": driver, "at": short(driver, far), "centre": centre}
+    played = {"count": len(frames.poses), "loop": frames.loops, "seconds": seconds, "grip": grip}
+    return played | {"poses": poses, "drivers": drivers, "points": points}
 
 
 def animated_svg(
@@ -220,9 +198,8 @@ def animated_svg(
     readers who ask for reduced motion. Raises `GeometryError`: nothing of the motion is assembled, or a number is out
     of its bounds.
     """
-    _check_seconds(seconds)
-    shown = frames_of(motion, frames)
-    stage = _Stage(shown, width, height, title)
+    stage = _Stage(motion, frames, seconds, width, height, title)
+    shown = stage.frames
     last = len(shown.poses) - 1
     # round, or to and fro: one clock moves everything, so it runs over the whole period
     order = list(range(last + 1)) if shown.loops else [*range(last + 1), *range(last - 1, -1, -1)]
@@ -264,13 +241,11 @@ def save_gif(
     of the picture in pixels. Number of pictures in the file. Raises `GeometryError`: nothing of the motion is
     assembled, or a number is out of its bounds.
     """
-    _check_seconds(seconds)
-    shown = frames_of(motion, frames)
-    stage = _Stage(shown, width, height, title)
+    stage = _Stage(motion, frames, seconds, width, height, title)
     pictures = _pictures(stage, title)
-    passes = max(len(shown.poses) - 1, 1)
+    passes = max(len(stage.frames.poses) - 1, 1)
     duration = max(20, round(seconds / passes * 100.0) * 10)
-    first, *rest = [pictures[k] for k in shown.order]
+    first, *rest = [pictures[k] for k in stage.frames.order]
     endless = {"save_all": True, "loop": 0, "optimize": True, "disposal": 1}
     first.save(Path(path), format="GIF", append_images=rest, duration=duration, **endless)
     return 1 + len(rest)

@@ -48,31 +48,18 @@ class Body:
 
     def vertices(self) -> list[complex]:
         """Attachment points, and for each guide its point nearest to them."""
-        middle = sum(self.points) / len(self.points) if self.points else None
-        ends = [
-            guide.nearest(middle if middle is not None else _first_end(self.guides, guide)) for guide in self.guides
-        ]
-        return [*self.points, *ends]
-
-
-def _first_end(guides: list[Guide], guide: Guide) -> complex:
-    """Return the place a guide of a link without points is joined at: nearest to the middle of another guide."""
-    first = guides[0]
-    return (first.start + first.stop) / 2 if guide is not first else (guides[-1].start + guides[-1].stop) / 2
+        found = list(self.points)
+        for k, guide in enumerate(self.guides):
+            other = self.guides[0 if k else -1]  # a link without points is joined at the middle of another guide
+            middle = sum(self.points) / len(self.points) if self.points else (other.start + other.stop) / 2
+            found.append(guide.nearest(middle))
+        return found
 
 
 def world(poses: Array, link: int, point: complex) -> Complex:
     """Carry a point of a link to the plane for every pose of ``poses`` (n, links, 3)."""
     pose = poses[:, link]
     return np.asarray(pose[:, 0] + 1j * pose[:, 1] + np.exp(1j * pose[:, 2]) * point)
-
-
-def _travel(joint: Prismatic | PinSlot, poses: Array) -> tuple[float, float]:
-    """Least and largest displacement of ``at_b`` along the line of a."""
-    P = world(poses, joint.a, complex(*joint.at_a))
-    Q = world(poses, joint.b, complex(*joint.at_b))
-    along = ((Q - P) * np.exp(-1j * (poses[:, joint.a, 2] + joint.angle_a))).real
-    return float(along.min()), float(along.max())
 
 
 def bodies(mechanism: Mechanism, poses: Array, reserve: float) -> list[Body]:
@@ -83,7 +70,10 @@ def bodies(mechanism: Mechanism, poses: Array, reserve: float) -> list[Body]:
         at_a, at_b = complex(*joint.at_a), complex(*joint.at_b)
         if isinstance(joint, Prismatic | PinSlot):
             t = complex(np.exp(1j * joint.angle_a))
-            least, most = _travel(joint, poses)
+            # least and largest displacement of at_b along the line of a
+            turn = np.exp(-1j * (poses[:, joint.a, 2] + joint.angle_a))
+            along = ((world(poses, joint.b, at_b) - world(poses, joint.a, at_a)) * turn).real
+            least, most = float(along.min()), float(along.max())
             a.guides.append(Guide(joint, at_a + t * (least - reserve), at_a + t * (most + reserve), t))
             b.points.append(at_b)
         else:
@@ -93,18 +83,14 @@ def bodies(mechanism: Mechanism, poses: Array, reserve: float) -> list[Body]:
             a.wheels.append((at_a, joint.radius_a, joint))
             b.wheels.append((at_b, joint.radius_b, joint))
         if isinstance(joint, Cam):
-            a.cams.append((joint, _pitch_curve(joint)))
+            angles = [math.tau * k / 180 for k in range(180)]
+            curve = [at_a + cmath.rect(joint.pitch_radius(psi)[0], joint.angle_a + psi) for psi in angles]
+            a.cams.append((joint, curve))
     for body in found:  # a wheel on its pivot counts once
         body.joints = len(_apart(body.points, reserve / 9.0)) + len(body.guides)
     for point in mechanism.points.values():
         found[point.link].points.append(complex(*point.at))
     return found
-
-
-def _pitch_curve(cam: Cam) -> list[complex]:
-    """Points of the pitch curve in the frame of the cam's link."""
-    steps = [math.tau * k / 180 for k in range(180)]
-    return [complex(*cam.at_a) + cmath.rect(cam.pitch_radius(psi)[0], cam.angle_a + psi) for psi in steps]
 
 
 def bounds(mechanism: Mechanism, poses: Array) -> tuple[complex, complex]:

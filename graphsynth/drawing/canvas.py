@@ -27,25 +27,19 @@ class Canvas:
 
     def __init__(self, sketch: Sketch, axes: Any, pose: Pose | None = None) -> None:
         self.sketch, self.axes = sketch, axes
-        self._frame_view()
-        self._points = self._points_per_pixel()
+        edge = sketch.margin * sketch.pixel
+        axes.set_aspect("equal", adjustable="box")
+        axes.set_xlim(sketch.lower.real - edge, sketch.upper.real + edge)
+        axes.set_ylim(sketch.lower.imag - edge, sketch.upper.imag + edge)
+        box = axes.get_window_extent()
+        #: typographic points that one pixel of the sketch takes on these axes
+        self._points = float(min(box.width / sketch.width, box.height / sketch.height) * 72.0 / axes.figure.dpi)
         self._moving: list[tuple[Shape, Any]] = []
         for order, shape in enumerate(sketch.ordered()):
             artist = self._artist(shape, 2.0 + order * 1e-3)
             if shape.link != FIXED:
                 self._moving.append((shape, artist))
         self.move(pose)
-
-    def _frame_view(self) -> None:
-        sketch, edge = self.sketch, self.sketch.margin * self.sketch.pixel
-        self.axes.set_aspect("equal", adjustable="box")
-        self.axes.set_xlim(sketch.lower.real - edge, sketch.upper.real + edge)
-        self.axes.set_ylim(sketch.lower.imag - edge, sketch.upper.imag + edge)
-
-    def _points_per_pixel(self) -> float:
-        """Typographic points that one pixel of the sketch takes on these axes."""
-        box = self.axes.get_window_extent()
-        return float(min(box.width / self.sketch.width, box.height / self.sketch.height) * 72.0 / self.axes.figure.dpi)
 
     def _artist(self, shape: Shape, order: float) -> Any:
         from matplotlib.patches import Circle as CirclePatch, PathPatch

@@ -63,7 +63,8 @@ def mechanism_sketch(
     least = 200.0 - 2 * _MARGIN  # a narrow mechanism is centred on a picture that has room for letters
     spare = max(0.0, least / scale - size.real) / 2
     lower, upper = lower - spare, upper + spare
-    sketch = Sketch(lower, upper, (upper - lower).real * scale + 2 * _MARGIN, _MARGIN, title or _title(mechanism))
+    title = title or f"Kinematic diagram, {mechanism.graph.links} links"
+    sketch = Sketch(lower, upper, (upper - lower).real * scale + 2 * _MARGIN, _MARGIN, title)
     reserve = (BLOCK + 5.0) / scale
     plan = Plan(mechanism, array, sketch, bodies(mechanism, array, reserve), grounded)
     if traces and len(array) > 1:
@@ -78,13 +79,9 @@ def mechanism_sketch(
         for driver in mechanism.drivers:
             draw_arrow(plan, driver, grounds)
     draw_points(plan)
-    place_letters(sketch, mechanism, array, plan.bodies, grounds, numbers, grounded)
+    place_letters(plan, grounds, numbers)
     sketch.on()
     return sketch
-
-
-def _title(mechanism: Mechanism) -> str:
-    return f"Kinematic diagram, {mechanism.graph.links} links"
 
 
 def _checked(mechanism: Mechanism, poses: ArrayLike) -> Array:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path as File
 from typing import Any
 
@@ -77,8 +77,7 @@ def document(pictures: Sequence[str]) -> str:
 
 
 def _number(value: float) -> str:
-    text = f"{value:.4f}".rstrip("0").rstrip(".")
-    return "0" if text in ("-0", "") else text
+    return number(value, 4)
 
 
 def _element(shape: Shape, sketch: Sketch, place: Placement, zoom: float) -> str:
@@ -98,19 +97,15 @@ def _element(shape: Shape, sketch: Sketch, place: Placement, zoom: float) -> str
     if isinstance(shape, Circle):
         radius = _number(shape.radius * sketch.scale * cm)
         return rf"\path[{options}] {at(shape.centre)} circle[radius={radius}];{note}"
-    return rf"\path[{options}] {_runs(shape, at)};{note}"
-
-
-def _runs(path: Path, at: Callable[[Point], str]) -> str:
     pieces = []
-    for run in path.runs:
+    for run in shape.runs:
         points = [at(point) for point in run]
-        if path.curved:  # a quadratic curve as a cubic one
+        if shape.curved:  # a quadratic curve as a cubic one
             p, q, r = run
             pieces.append(f"{points[0]} .. controls {at((p + 2 * q) / 3)} and {at((r + 2 * q) / 3)} .. {points[2]}")
         else:
-            pieces.append(" -- ".join([*points, "cycle"] if path.closed else points))
-    return " ".join(pieces)
+            pieces.append(" -- ".join([*points, "cycle"] if shape.closed else points))
+    return rf"\path[{options}] {' '.join(pieces)};{note}"
 
 
 def _options(style: Style, symbol: float, zoom: float) -> str:
@@ -161,21 +156,18 @@ def _add(space: Any, shape: Shape, sketch: Sketch, place: Placement, unit: float
         space.add_circle(at(shape.centre), shape.radius * unit, dxfattribs=look)
     elif isinstance(shape, Path):
         for run in shape.runs:
-            points = [at(point) for point in (_curve(run) if shape.curved else run)]
-            space.add_lwpolyline(points, close=shape.closed, dxfattribs=look)
+            points = list(run)
+            if shape.curved:  # quadratic
+                p, q, r = run
+                steps = [k / _CURVE for k in range(_CURVE + 1)]
+                points = [(1 - t) ** 2 * p + 2 * t * (1 - t) * q + t * t * r for t in steps]
+            space.add_lwpolyline(list(map(at, points)), close=shape.closed, dxfattribs=look)
     elif isinstance(shape, Text):
         from ezdxf.enums import TextEntityAlignment
 
         height = 0.7 * shape.size * sketch.pixel * unit
         text = space.add_text(shape.text, height=height, dxfattribs=look)
         text.set_placement(at(shape.at, shape.offset), align=TextEntityAlignment[_ALIGN[shape.anchor]])
-
-
-def _curve(run: Sequence[Point]) -> list[Point]:
-    """Points of a quadratic curve."""
-    p, q, r = run
-    steps = [k / _CURVE for k in range(_CURVE + 1)]
-    return [(1 - t) ** 2 * p + 2 * t * (1 - t) * q + t * t * r for t in steps]
 
 
 def save_dxf(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.drawing.bodies import Body, bodies
+from graphsynth.drawing.bodies import bodies, world
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.constraints import characteristic_length
 from graphsynth.mechanism.joints import Prismatic
@@ -73,16 +73,13 @@ def frames_of(motion: Motion, count: int = 120) -> Frames:
     poses[:, :, 2] = np.unwrap(poses[:, :, 2], axis=0)
     coordinates = np.column_stack([d.law(motion.inputs[pick])[0] for d in motion.mechanism.drivers])
     loops = motion.completed and motion.closure.closed and len(pick) > 2
-    return Frames(motion.mechanism, poses, coordinates, loops, "" if loops else _note(motion))
-
-
-def _note(motion: Motion) -> str:
+    note = ""
     if not motion.completed:
         reason = motion.reason[:1].upper() + motion.reason[1:]
-        return f"Shown to and fro over the part that is reached. {reason}."
-    if motion.closure.tested:
-        return f"Shown to and fro: {motion.closure.statement}."
-    return ""
+        note = f"Shown to and fro over the part that is reached. {reason}."
+    elif not loops and motion.closure.tested:
+        note = f"Shown to and fro: {motion.closure.statement}."
+    return Frames(motion.mechanism, poses, coordinates, loops, note)
 
 
 def with_trace_points(motion: Motion, most: int = 1) -> Motion:
@@ -101,14 +98,12 @@ def with_trace_points(motion: Motion, most: int = 1) -> Motion:
     if not floating or not len(reached):
         return motion
     shown = bodies(mechanism, reached, 0.0)
-    points = {name: _middle(shown[link]) for name, link in zip("PQST", floating[:most])}
+    points = {}
+    for name, link in zip("PQST", floating[:most]):
+        corners = shown[link].vertices()
+        middle = sum(corners) / len(corners)
+        points[name] = TracePoint(link, (middle.real, middle.imag))
     return replace(motion, mechanism=replace(mechanism, points=points))
-
-
-def _middle(body: Body) -> TracePoint:
-    corners = body.vertices()
-    middle = sum(corners) / len(corners)
-    return TracePoint(body.link, (middle.real, middle.imag))
 
 
 def shown_coordinate(mechanism: Mechanism, k: int, values: Array) -> tuple[str, bool, list[float]]:
@@ -162,10 +157,7 @@ def _begin(mechanism: Mechanism) -> float:
     joint = mechanism.joint(*driver.pair)
     pose = np.array(mechanism.pose)
     if isinstance(joint, Prismatic):
-        P, Q = (
-            complex(*pose[k, :2]) + np.exp(1j * pose[k, 2]) * complex(*at)
-            for k, at in ((joint.a, joint.at_a), (joint.b, joint.at_b))
-        )
+        P, Q = (world(pose[None], k, complex(*at))[0] for k, at in ((joint.a, joint.at_a), (joint.b, joint.at_b)))
         sign = 1.0 if driver.base == joint.a else -1.0
         q = sign * float(((Q - P) * np.exp(-1j * (pose[joint.a, 2] + joint.angle_a))).real)
     else:

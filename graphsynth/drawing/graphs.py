@@ -6,6 +6,7 @@ By its adjacency levels the frame is on top, then come the links jointed to it, 
 from __future__ import annotations
 
 import cmath
+import math
 from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import GraphError
@@ -16,7 +17,6 @@ from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
 
 if TYPE_CHECKING:
-    from graphsynth.kinematics.dimensional.sketch import JointLayout
     from graphsynth.structure.graph import MechanismGraph
 
 
@@ -48,22 +48,21 @@ def graph_sketch(
         raise GraphError(f"driver {driver} is not jointed to the frame; choose a link that is")
     drivers = () if driver is None or graph.frame is None else (Driver(graph.frame, driver),)
     pose = [(0.0, 0.0, 0.0)] * graph.links
-    mechanism = Mechanism(framed, tuple(_joint(places, k) for k in range(len(graph.joints))), drivers, pose=tuple(pose))
+    joints: list[JointGeometry] = []
+    for (a, b, mobility), position in zip(places.graph.joints, places.positions):
+        x, y = map(float, position)
+        if mobility == 1:
+            joints.append(Revolute(a, b, (x, y), (x, y)))
+            continue
+        # the slot runs towards the middle of its link
+        cx, cy = map(float, places.outline(a).mean(axis=0))
+        way = complex(cx - x, cy - y)
+        joints.append(PinSlot(a, b, (x, y), (x, y), cmath.phase(way) if abs(way) > 1e-9 else 0.0))
+    mechanism = Mechanism(framed, tuple(joints), drivers, pose=tuple(pose))
     sketch = mechanism_sketch(
         mechanism, pose, width=width, height=height, numbers=numbers, grounded=graph.frame is not None, title=title
     )
     return sketch, pose
-
-
-def _joint(places: JointLayout, k: int) -> JointGeometry:
-    a, b, mobility = places.graph.joints[k]
-    x, y = map(float, places.positions[k])
-    if mobility == 1:
-        return Revolute(a, b, (x, y), (x, y))
-    # the slot runs towards the middle of its link
-    cx, cy = map(float, places.outline(a).mean(axis=0))
-    way = complex(cx - x, cy - y)
-    return PinSlot(a, b, (x, y), (x, y), cmath.phase(way) if abs(way) > 1e-9 else 0.0)
 
 
 def graph_svg(graph: MechanismGraph, *, driver: int | None = None, width: float = 480.0, title: str = "") -> str:
@@ -99,7 +98,11 @@ def level_order(graph: MechanismGraph, sweeps: int = 12) -> tuple[tuple[int, ...
     best, fewest = tuple(map(tuple, levels)), _tangle(edges, graph, place)
     for sweep in range(sweeps):
         for level in levels[1:] if sweep % 2 == 0 else reversed(levels[1:]):
-            _sort_level(level, neighbours, place)
+            # by the mean position of each link's neighbours, its own level included
+            mean = {link: round(sum(place[n] for n in neighbours[link]) / len(neighbours[link]), 9) for link in level}
+            level.sort()
+            level.sort(key=mean.__getitem__)
+            _spread(level, place)
         tangle = _tangle(edges, graph, place)
         if tangle < fewest:
             best, fewest = tuple(map(tuple, levels)), tangle
@@ -110,13 +113,6 @@ def _spread(level: list[int], place: dict[int, float]) -> None:
     """Give the links of a level evenly spaced positions around 0."""
     for i, link in enumerate(level):
         place[link] = i - (len(level) - 1) / 2
-
-
-def _sort_level(level: list[int], neighbours: dict[int, list[int]], place: dict[int, float]) -> None:
-    """Sort a level by the mean position of each link's neighbours, its own level included."""
-    mean = {link: round(sum(place[n] for n in neighbours[link]) / len(neighbours[link]), 9) for link in level}
-    level.sort(key=lambda link: (mean[link], link))
-    _spread(level, place)
 
 
 def _tangle(edges: list[tuple[int, int]], graph: MechanismGraph, place: dict[int, float]) -> float:
@@ -169,19 +165,14 @@ def levels_sketch(graph: MechanismGraph, width: float = 420.0, title: str = "") 
     for joint in graph.joints:
         p, q = where[joint.a], where[joint.b]
         dash = {1: (), 2: (5.0, 4.0)}.get(joint.mobility, (1.5, 4.0))
-        sketch.curve(p, q, _bend(p, q), colour="b" if joint.mobility > 1 else "ink", dash=dash)
+        span = q.real - p.real
+        bend = 0.0
+        if p.imag == q.imag and abs(span) > 1.01:  # down, to pass the vertices between its ends
+            bend = math.copysign(min(0.55, 0.18 * abs(span)), span)
+        sketch.curve(p, q, bend, colour="b" if joint.mobility > 1 else "ink", dash=dash)
     for level in order:
         for link in level:
             sketch.node(where[link], str(link), radius, filled=link == graph.frame)
     if graph.frame is not None:
         sketch.hatch_over(where[graph.frame], radius)
     return sketch
-
-
-def _bend(p: complex, q: complex) -> float:
-    """How far an edge inside a level bends down to pass the vertices between its ends."""
-    if p.imag != q.imag:
-        return 0.0
-    span = abs(q.real - p.real)
-    depth = min(0.55, 0.18 * span) if span > 1.01 else 0.0
-    return depth if q.real > p.real else -depth

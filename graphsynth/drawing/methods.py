@@ -85,7 +85,7 @@ def graph_picture(graph: MechanismGraph) -> str:
 
 def _posed(mechanism: Mechanism) -> Any:
     """Return the pose of a mechanism, or where its motion starts."""
-    if mechanism.pose is not None and not mechanism.drivers:
+    if mechanism.pose is not None:
         return np.asarray(mechanism.pose)
     motion = mechanism.simulate(events=False)
     if not motion.assembled.any():
@@ -95,14 +95,13 @@ def _posed(mechanism: Mechanism) -> Any:
 
 def draw_posed(mechanism: Mechanism, path: str | Path | None, **options: Any) -> Drawing:
     """Work of `Mechanism.draw`."""
-    pose = np.asarray(mechanism.pose) if mechanism.pose is not None else _posed(mechanism)
+    pose = _posed(mechanism)
     return _drawing(mechanism_sketch(mechanism, pose, **options), pose.tolist(), path)
 
 
 def plot_posed(mechanism: Mechanism, ax: Any) -> Any:
     """Work of `Mechanism.plot`."""
-    pose = mechanism.pose if mechanism.pose is not None else _posed(mechanism)
-    return draw_mechanism(mechanism, pose, ax=ax)
+    return draw_mechanism(mechanism, _posed(mechanism), ax=ax)
 
 
 def mechanism_picture(mechanism: Mechanism) -> str:

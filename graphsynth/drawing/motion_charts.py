@@ -59,12 +59,21 @@ def motion_chart(
     """
     if order not in (0, 1, 2):
         raise GeometryError(f"order = {order} must be 0, 1 or 2: displacement, velocity or acceleration")
+    per = "length" if _driver_slides(motion) else "rad"
+    below = ("", f"/{per}", f"/{per}²")[order]
     if isinstance(of, str):
         path = motion.point(of)
         values = (path.position, path.velocity, path.acceleration)[order]
         lines = [Line(motion.inputs, values[:, c], f"{of}, {'xy'[c]}", "ab"[c], _STYLES[c]) for c in (0, 1)]
-        return _over_input(motion, lines, order, unit, events)
-    links = _outputs(motion) if of is None else [of]
+        return _over_input(motion, lines, f"{_WORDS[order]} [{unit}{below}]", events=events)
+    frame = motion.mechanism.frame
+    if of is None:  # undriven links jointed to the frame; sliding ones only if no link turns
+        driven = {link for d in motion.mechanism.drivers for link in (d.link, d.base)}
+        near = sorted({a + b - frame for a, b, _ in motion.mechanism.graph.joints if frame in (a, b)} - driven)
+        near = near or [link for link in range(motion.mechanism.graph.links) if link != frame]
+        links = [link for link in near if not _slides(motion, link)] or near
+    else:
+        links = [of]
     sliding = {_slides(motion, link) for link in links}
     if len(sliding) > 1:
         raise GeometryError(f"links {links} turn and slide, so they have no common axis; draw them one by one")
@@ -72,18 +81,8 @@ def motion_chart(
     for k, link in enumerate(links):
         values = _coordinate(motion, link, order)
         lines.append(Line(motion.inputs, values, f"link {link}", TRACE_COLOURS[k % 4], _STYLES[k % 4]))
-    return _over_input(motion, lines, order, unit if sliding.pop() else "rad", events)
-
-
-def _outputs(motion: Motion) -> list[int]:
-    """Undriven links jointed to the frame; sliding ones only if no link turns."""
-    mechanism = motion.mechanism
-    frame = mechanism.frame
-    driven = {d.link for d in mechanism.drivers} | {d.base for d in mechanism.drivers}
-    near = sorted({a + b - frame for a, b, _ in mechanism.graph.joints if frame in (a, b)} - driven)
-    near = near or [link for link in range(mechanism.graph.links) if link != frame]
-    turning = [link for link in near if not _slides(motion, link)]
-    return turning or near
+    own = unit if sliding.pop() else "rad"
+    return _over_input(motion, lines, f"{_WORDS[order]} [{own}{below}]", events=events)
 
 
 def _slides(motion: Motion, link: int) -> bool:
@@ -112,21 +111,19 @@ def _coordinate(motion: Motion, link: int, order: int) -> Array:
     return np.asarray(along if on_frame else -along)
 
 
-def _over_input(motion: Motion, lines: list[Line], order: int, unit: str, events: bool) -> Chart:
-    name, per, in_pi = _axis(motion)
-    below = ("", f"/{per}", f"/{per}²")[order]
-    return Chart(
-        lines, name, f"{_WORDS[order]} [{unit}{below}]", marks=event_marks(motion) if events else (), in_pi=in_pi
-    )
-
-
-def _axis(motion: Motion) -> tuple[str, str, bool]:
-    """Label of the input axis, unit of the input, and whether to mark it in quarters of a turn."""
+def _driver_slides(motion: Motion) -> bool:
     drivers = motion.mechanism.drivers
-    sliding = bool(drivers) and isinstance(motion.mechanism.joint(*drivers[0].pair), Prismatic)
-    reached = motion.inputs[motion.assembled]
-    wide = reached.size > 0 and float(np.ptp(reached)) >= 0.75 * math.pi
-    return ("driver displacement [length]", "length", False) if sliding else ("driver angle [rad]", "rad", wide)
+    return bool(drivers) and isinstance(motion.mechanism.joint(*drivers[0].pair), Prismatic)
+
+
+def _over_input(
+    motion: Motion, lines: list[Line], label: str, *, events: bool = True, levels: Sequence[Line] = ()
+) -> Chart:
+    """Return curves over the input, its axis in quarters of a turn if it goes far."""
+    sliding, reached = _driver_slides(motion), motion.inputs[motion.assembled]
+    name = "driver displacement [length]" if sliding else "driver angle [rad]"
+    wide = not sliding and reached.size > 0 and float(np.ptp(reached)) >= 0.75 * math.pi
+    return Chart(lines, name, label, marks=event_marks(motion) if events else (), levels=levels, in_pi=wide)
 
 
 def event_marks(motion: Motion) -> list[Mark]:
@@ -155,9 +152,8 @@ def transmission_chart(motion: Motion, least: float | None = None) -> Chart:
         Line(motion.inputs, values, f"links {links[group]}", TRACE_COLOURS[k % 4], _STYLES[k % 4])
         for k, (group, values) in enumerate(angles.items())
     ]
-    name, _, in_pi = _axis(motion)
     bound = [] if least is None else [Line((), least, "bound", "jam", "--")]
-    return Chart(lines, name, "transmission angle [rad]", marks=event_marks(motion), levels=bound, in_pi=in_pi)
+    return _over_input(motion, lines, "transmission angle [rad]", levels=bound)
 
 
 def margin_chart(motion: Motion) -> Chart:
@@ -166,7 +162,6 @@ def margin_chart(motion: Motion) -> Chart:
     Dyads: the square of the sine of the angle at the joint that closes them; larger groups: the determinant of the
     reduced system, over its largest value.
     """
-    name, _, in_pi = _axis(motion)
     lines = []
     for k, step in enumerate(step for step in motion.steps if step.group >= 0):
         values = motion.margins[:, step.group]
@@ -176,5 +171,4 @@ def margin_chart(motion: Motion) -> Chart:
         lines.append(Line(motion.inputs, values, label, TRACE_COLOURS[k % 4], _STYLES[k % 4]))
     if not lines:
         raise GeometryError("the mechanism has drivers only, no group: there is no margin to draw")
-    zero = [Line((), 0.0, "", "jam", "-")]
-    return Chart(lines, name, "margin [1]", marks=event_marks(motion), levels=zero, in_pi=in_pi)
+    return _over_input(motion, lines, "margin [1]", levels=[Line((), 0.0, "", "jam", "-")])

@@ -43,24 +43,26 @@ class Moving:
 
     def path(self, frames: Sequence[Points] | Points, paint: str, *, closed: bool = False) -> None:
         """Add a line through points, shape (frames, points, 2)."""
-        data = [_data(points, closed) for points in frames]
-        self._resting.append(f'<path d="{data[self.frame]}" {paint}/>')
-        self._moving.append(f'<path d="{data[0]}" {paint}>{self._animate("d", data)}</path>')
+        self._add("path", paint, d=[_data(points, closed) for points in frames])
 
     def circle(self, frames: Sequence[Sequence[float]] | Points, radius: float, paint: str) -> None:
         """Add a circle whose centre moves, shape (frames, 2)."""
         x, y = ([number(float(value)) for value in column] for column in np.asarray(frames, float).T)
-        size = f'r="{number(radius)}" {paint}'
-        self._resting.append(f'<circle cx="{x[self.frame]}" cy="{y[self.frame]}" {size}/>')
-        moves = self._animate("cx", x) + self._animate("cy", y)
-        self._moving.append(f'<circle cx="{x[0]}" cy="{y[0]}" {size}>{moves}</circle>')
+        self._add("circle", f'r="{number(radius)}" {paint}', cx=x, cy=y)
 
     def box(self, x: Iterable[float], top: float, width: float, height: float, paint: str) -> None:
         """Add a rectangle that moves sideways; ``x`` are its left edges."""
-        left = [number(float(value)) for value in x]
         size = f'y="{number(top)}" width="{number(width)}" height="{number(height)}" {paint}'
-        self._resting.append(f'<rect x="{left[self.frame]}" {size}/>')
-        self._moving.append(f'<rect x="{left[0]}" {size}>{self._animate("x", left)}</rect>')
+        self._add("rect", size, x=[number(float(value)) for value in x])
+
+    def _add(self, tag: str, same: str, **tracks: list[str]) -> None:
+        """Add an element with attributes that stay the same, and some that change from frame to frame."""
+        first, rest = (
+            " ".join(f'{name}="{values[frame]}"' for name, values in tracks.items()) for frame in (0, self.frame)
+        )
+        moves = "".join(self._animate(name, values) for name, values in tracks.items())
+        self._resting.append(f"<{tag} {rest} {same}/>")
+        self._moving.append(f"<{tag} {first} {same}>{moves}</{tag}>")
 
     def carried(self, track: Points, markup: str, more: str = "") -> None:
         """Add a group that is shifted and turned as a whole.
@@ -144,14 +146,25 @@ def linkage_animation(
     >>> svg.startswith("<svg"), svg.count("<path") > 0
     (True, True)
     """
-    frames = _frames(background, tracks)
+    arrays = {name: np.atleast_1d(np.asarray(track, dtype=np.complex128)) for name, track in tracks.items()}
+    count = max(len(array) for array in arrays.values())
+    frames: dict[str, Points] = {}  # on the page, all of the same length
+    for name, array in arrays.items():
+        if len(array) not in (1, count):
+            raise ValueError(f"the track of {name} has {len(array)} places; give {count}, or one for a joint at rest")
+        if not np.isfinite(array).all():
+            raise ValueError(f"the track of {name} has a place that is not finite; show assembled positions only")
+        frames[name] = np.array([background.xy(complex(point)) for point in np.broadcast_to(array, count)])
     drawing = Moving(background.width, background.height, seconds)
     for shape in background.ordered():
         drawing.fixed(element(shape, background.xy, background.scale, background.symbol))
     for corners in plates:
-        drawing.path(_through(frames, corners), _paint("link", 2.6, "fill", 0.8), closed=True)
+        drawing.path(
+            np.stack([frames[name] for name in corners], axis=1), _paint("link", 2.6, "fill", 0.8), closed=True
+        )
     for bar in bars:
-        drawing.path(_through(frames, (bar.start, bar.end)), _paint(bar.colour, bar.width * background.symbol))
+        ends = np.stack([frames[bar.start], frames[bar.end]], axis=1)
+        drawing.path(ends, _paint(bar.colour, bar.width * background.symbol))
     for name in joints:
         drawing.circle(frames[name], 5.0 * background.symbol, _paint("link", 2.0, "paper"))
     for name in dots:
@@ -159,25 +172,6 @@ def linkage_animation(
     for text, when in (notes or {}).items():
         drawing.shown(list(when), words(text, 12.0, 22.0, colour="ink"))
     return drawing.svg(background.title)
-
-
-def _frames(background: Sketch, tracks: Mapping[str, ArrayLike]) -> dict[str, Points]:
-    """Tracks on the page, all of the same length."""
-    arrays = {name: np.atleast_1d(np.asarray(track, dtype=np.complex128)) for name, track in tracks.items()}
-    count = max(len(array) for array in arrays.values())
-    for name, array in arrays.items():
-        if len(array) not in (1, count):
-            raise ValueError(f"the track of {name} has {len(array)} places; give {count}, or one for a joint at rest")
-        if not np.isfinite(array).all():
-            raise ValueError(f"the track of {name} has a place that is not finite; show assembled positions only")
-    return {
-        name: np.array([background.xy(complex(point)) for point in np.broadcast_to(array, count)])
-        for name, array in arrays.items()
-    }
-
-
-def _through(frames: Mapping[str, Points], names: Sequence[str]) -> Points:
-    return np.stack([frames[name] for name in names], axis=1)
 
 
 def _paint(stroke: str, width: float, fill: str = "", opacity: float = 1.0) -> str:

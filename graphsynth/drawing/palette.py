@@ -28,26 +28,18 @@ WHITE = "#fefefe"
 TRACE_COLOURS = ("a", "c", "d", "b")
 
 
-def _variables(colours: dict[str, str]) -> str:
-    return ";".join(f"--{name}:{value}" for name, value in colours.items())
-
-
-def _recoloured() -> str:
-    """Rules that give every element with a light colour its dark one; nothing above it counts, for copies by `use`."""
-    pairs = {LIGHT[name]: DARK[name] for name in LIGHT}
-    return "".join(
-        f'[{what}="{light}"]{{{what}:{dark}}}' for light, dark in pairs.items() for what in ("fill", "stroke")
-    )
-
-
+#: Rules that give every element with a light colour its dark one; nothing above it counts, for copies by `use`.
+_RECOLOURED = "".join(
+    f'[{what}="{light}"]{{{what}:{dark}}}'
+    for light, dark in dict(_PAIRS.values()).items()
+    for what in ("fill", "stroke")
+)
+_ON_LIGHT, _ON_DARK = (";".join(f"--{name}:{value}" for name, value in own.items()) for own in (LIGHT, DARK))
 #: Style sheet of every SVG.  The attributes alone are a right picture, on white paper, for programs that read no style
 #: sheets; these rules follow readers who ask for dark pages or for reduced motion (see `graphsynth.drawing.moving`).
 STYLE = (
-    f"@media (prefers-color-scheme:dark){{svg.gs:root{{color-scheme:dark}}{_recoloured()}}}"
+    f"@media (prefers-color-scheme:dark){{svg.gs:root{{color-scheme:dark}}{_RECOLOURED}}}"
     "@media (prefers-reduced-motion:reduce){.gs .move{display:none}.gs .rest{display:inline}}"
 )
 #: The same colours by name, for the style sheet of a page.
-VARIABLES = (
-    f":root{{color-scheme:light dark;{_variables(LIGHT)}}}"
-    f"@media (prefers-color-scheme:dark){{:root{{{_variables(DARK)}}}}}"
-)
+VARIABLES = f":root{{color-scheme:light dark;{_ON_LIGHT}}}@media (prefers-color-scheme:dark){{:root{{{_ON_DARK}}}}}"

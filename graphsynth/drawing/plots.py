@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from graphsynth.drawing.palette import LIGHT
+from graphsynth.drawing.palette import LIGHT, STYLE
+from graphsynth.drawing.svg import FONT, sound
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -83,10 +84,21 @@ class Chart:
 
     def draw(self, ax: Any = None) -> Any:
         """Draw on matplotlib axes (of a new figure by default), in the colours of a light page; return the axes."""
-        if ax is None:
-            ax = new_figure(self.size).add_subplot()
-        self._draw(ax)
-        return ax
+        axes = new_figure(self.size).add_subplot() if ax is None else ax
+        for band in self.bands:
+            axes.axvspan(band.start, band.stop, color=LIGHT[band.colour], alpha=0.16, lw=0, label=band.label or None)
+        for line in self.lines:
+            axes.plot(line.x, line.y, line.style, color=LIGHT[line.colour], lw=1.7, label=line.label or None)
+        for level in self.levels:
+            height = float(np.ravel(np.asarray(level.y))[0])
+            axes.axhline(height, ls=level.style, lw=1.2, color=LIGHT[level.colour], label=level.label or None)
+        seen: set[str] = set()
+        for mark in self.marks:
+            label = None if mark.label in seen else mark.label or None
+            seen.add(mark.label)
+            axes.axvline(mark.x, ls=mark.style, lw=1.4, color=LIGHT[mark.colour], label=label)
+        _dress(axes, self)
+        return axes
 
     def svg(self) -> str:
         """Return one ``<svg class="gs">`` element with unique ids, whose colours follow the page it is put in."""
@@ -94,7 +106,7 @@ class Chart:
 
         with matplotlib.rc_context(_RC):
             figure = new_figure(self.size)
-            self._draw(figure.add_subplot())
+            self.draw(figure.add_subplot())
         return themed_svg(figure, _RC)
 
     def _repr_svg_(self) -> str:
@@ -109,21 +121,6 @@ class Chart:
             Path(path).write_text(self.svg(), "utf-8")
         else:
             self.draw().figure.savefig(path, dpi=200)
-
-    def _draw(self, axes: Any) -> None:
-        for band in self.bands:
-            axes.axvspan(band.start, band.stop, color=LIGHT[band.colour], alpha=0.16, lw=0, label=band.label or None)
-        for line in self.lines:
-            axes.plot(line.x, line.y, line.style, color=LIGHT[line.colour], lw=1.7, label=line.label or None)
-        for level in self.levels:
-            height = float(np.ravel(np.asarray(level.y))[0])
-            axes.axhline(height, ls=level.style, lw=1.2, color=LIGHT[level.colour], label=level.label or None)
-        seen: set[str] = set()
-        for mark in self.marks:
-            label = None if mark.label in seen else mark.label or None
-            seen.add(mark.label)
-            axes.axvline(mark.x, ls=mark.style, lw=1.4, color=LIGHT[mark.colour], label=label)
-        _dress(axes, self)
 
 
 def line_plot(
@@ -156,7 +153,10 @@ def _dress(axes: Any, chart: Chart) -> None:
     else:
         axes.margins(x=0)
     if chart.in_pi:
-        _quarter_turns(axes)
+        low, high = axes.get_xlim()
+        quarter = math.pi / 2 * max(1, math.ceil((high - low) / (4.5 * math.pi)))
+        steps = range(math.ceil(low / quarter - 1e-9), math.floor(high / quarter + 1e-9) + 1)
+        axes.set_xticks([k * quarter for k in steps], [_in_pi(round(k * quarter / (math.pi / 2))) for k in steps])
     elif chart.xticks is not None:
         axes.set_xticks(list(chart.xticks))
     handles, labels = axes.get_legend_handles_labels()
@@ -174,13 +174,6 @@ def _dress(axes: Any, chart: Chart) -> None:
         )
         for text in legend.get_texts():
             text.set(color=ink, parse_math=False)
-
-
-def _quarter_turns(axes: Any) -> None:
-    low, high = axes.get_xlim()
-    quarter = math.pi / 2 * max(1, math.ceil((high - low) / (4.5 * math.pi)))
-    steps = range(math.ceil(low / quarter - 1e-9), math.floor(high / quarter + 1e-9) + 1)
-    axes.set_xticks([k * quarter for k in steps], [_in_pi(round(k * quarter / (math.pi / 2))) for k in steps])
 
 
 def _in_pi(halves: int) -> str:
@@ -232,9 +225,6 @@ def themed_svg(figure: Figure, settings: Mapping[str, Any] | None = None) -> str
 
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
-
-    from graphsynth.drawing.palette import LIGHT, STYLE
-    from graphsynth.drawing.svg import FONT, sound
 
     stream = io.StringIO()
     # text stays text: readable by screen readers and in the page's font; the same bytes for the same figure

@@ -43,8 +43,8 @@ class Sketch:
     title: str = ""
     symbol: float = 1.0
     shapes: list[Shape] = field(default_factory=list)
-    _scale: float = 1.0
-    _height: float = 0.0
+    scale: float = field(init=False)  # pixels per unit of the mechanism
+    height: float = field(init=False)  # of the picture, in pixels
     _link: int = FIXED
     _layer: str = LAYERS[0]
     _part: str = ""
@@ -53,28 +53,18 @@ class Sketch:
         size = self.upper - self.lower
         if not (cmath.isfinite(size) and size.real > 0 and size.imag > 0):
             raise ValueError(f"a sketch needs a box with positive finite sides, not {self.lower} .. {self.upper}")
-        self._scale = (self.width - 2 * self.margin) / size.real
-        self._height = self._scale * size.imag + 2 * self.margin
-
-    @property
-    def scale(self) -> float:
-        """Pixels per unit of the mechanism."""
-        return self._scale
+        self.scale = (self.width - 2 * self.margin) / size.real
+        self.height = self.scale * size.imag + 2 * self.margin
 
     @property
     def pixel(self) -> float:
         """Size of one pixel in the units of the mechanism."""
-        return 1.0 / self._scale
-
-    @property
-    def height(self) -> float:
-        """Height of the picture in pixels."""
-        return self._height
+        return 1.0 / self.scale
 
     def xy(self, point: Point) -> tuple[float, float]:
         """Carry a point of the plane to the page, in pixels from the upper left corner."""
-        offset = (point - self.lower) * self._scale
-        return self.margin + offset.real, self._height - self.margin - offset.imag
+        offset = (point - self.lower) * self.scale
+        return self.margin + offset.real, self.height - self.margin - offset.imag
 
     def on(self, link: int = FIXED, layer: str = LAYERS[0], part: str = "") -> Sketch:
         """Fix the shapes that follow to a link, put them in a layer and name them; return the sketch itself."""
@@ -213,10 +203,10 @@ class Sketch:
         """
         place = placement(pose)
         body = [self._element(shape, place) for shape in self.ordered()]
-        return picture(body, self.width, self._height, self.title)
+        return picture(body, self.width, self.height, self.title)
 
     def _element(self, shape: Shape, place: Placement) -> str:
-        return element(shape, lambda point: self.xy(place(shape.link, point)), self._scale, self.symbol)
+        return element(shape, lambda point: self.xy(place(shape.link, point)), self.scale, self.symbol)
 
 
 def _unit(vector: Point) -> Point:

@@ -30,13 +30,13 @@ def sound(text: str) -> str:
     return _NOT_XML.sub("\ufffd", text)
 
 
-def number(value: float) -> str:
-    """Write a coordinate with at most two decimals and no trailing zeros.
+def number(value: float, digits: int = 2) -> str:
+    """Write a coordinate with at most two decimals, or as many as told, and no trailing zeros.
 
     >>> number(1.0), number(-0.001), number(2.346)
     ('1', '0', '2.35')
     """
-    text = f"{value:.2f}".rstrip("0").rstrip(".")
+    text = f"{value:.{digits}f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
 
 

@@ -81,8 +81,11 @@ def draw_link(plan: Plan, body: Body) -> None:
         sketch.on(link, "joint", f"centre {part}")
         for d in (4.0 * plan.px, 4j * plan.px):
             sketch.line((centre - d, centre + d), "link", 1.2)
-        if plan.fixed(link):
-            _hatched_rim(plan, centre, radius)
+        if plan.fixed(link):  # a wheel that does not turn: hatching inside the lower part of its rim
+            sketch.on(link, "ground", "ground of a wheel")
+            for k in range(7):
+                rim = centre + radius * cmath.exp(1j * math.radians(-120 + 10 * k))
+                sketch.line((rim, rim + (0.6 + 1j) * 7.0 * plan.px), "link", 1.4)
     for cam, curve in body.cams:
         sketch.on(link, "pitch", f"cam {cam.a}-{cam.b}")
         sketch.plate(curve, plan.colour(link), 2.0, 0.8)
@@ -105,18 +108,6 @@ def draw_link(plan: Plan, body: Body) -> None:
         sketch.bar(corners[0], corners[1], plan.colour(link), 4.0)
 
 
-def _hatched_rim(plan: Plan, centre: complex, radius: float) -> None:
-    """Mark a wheel that does not turn: hatching inside the lower part of its rim."""
-    plan.sketch.on(plan.mechanism.frame, "ground", "ground of a wheel")
-    for k in range(7):
-        rim = centre + radius * cmath.exp(1j * math.radians(-120 + 10 * k))
-        plan.sketch.line((rim, rim + (0.6 + 1j) * 7.0 * plan.px), "link", 1.4)
-
-
-def _rectangle(middle: complex, t: complex, half: float, across: float) -> list[complex]:
-    return [middle + t * (x * half + 1j * y * across) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-
-
 def draw_slider(plan: Plan, joint: Prismatic | PinSlot) -> None:
     """Draw a block on its guide, or a slot; ground where the frame is one of the two."""
     sketch, px = plan.sketch, plan.px
@@ -124,15 +115,22 @@ def draw_slider(plan: Plan, joint: Prismatic | PinSlot) -> None:
     name = f"{joint.a}-{joint.b}"
     if isinstance(joint, PinSlot):
         sketch.on(joint.a, "block", f"slot {name}")
-        sketch.outline(_stadium(guide, _SLOT * px), plan.colour(joint.a), 1.8)
+        ends = [(guide.stop, -0.5), (guide.start, 0.5)]  # round
+        slot = [
+            end + _SLOT * px * guide.direction * cmath.exp(1j * math.pi * (first + k / 8))
+            for end, first in ends
+            for k in range(9)
+        ]
+        sketch.outline(slot, plan.colour(joint.a), 1.8)
         if plan.fixed(joint.a):
             _guide_ground(plan, guide, _SLOT + 1.0)
         return
-    turn = joint.angle_b if isinstance(joint, Prismatic) else 0.0
-    t = cmath.exp(1j * turn)
+    t = cmath.exp(1j * joint.angle_b)
     sketch.on(joint.b, "block", f"block {name}")
     middle = complex(*joint.at_b)
-    sketch.outline(_rectangle(middle, t, BLOCK * px, _HALF * px), plan.colour(joint.b))
+    signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    corners = [middle + t * (x * BLOCK * px + 1j * y * _HALF * px) for x, y in signs]
+    sketch.outline(corners, plan.colour(joint.b))
     if plan.fixed(joint.a):
         _guide_ground(plan, guide, _HALF + 1.5)
     elif plan.fixed(joint.b):
@@ -154,16 +152,6 @@ def _guide_ground(plan: Plan, guide: Guide, aside: float) -> None:
     strokes = max(4, round(abs(guide.stop - guide.start) / (9.0 * plan.px)))
     plan.sketch.on(guide.joint.a, "ground", f"ground {guide.joint.a}-{guide.joint.b}")
     plan.sketch.hatch(guide.start + shift, guide.stop + shift, down * plan.px, strokes)
-
-
-def _stadium(guide: Guide, half: float) -> list[complex]:
-    """Outline of a slot with round ends."""
-    ends = [(guide.stop, -0.5), (guide.start, 0.5)]
-    return [
-        end + half * guide.direction * cmath.exp(1j * math.pi * (first + k / 8))
-        for end, first in ends
-        for k in range(9)
-    ]
 
 
 def draw_joints(plan: Plan) -> list[tuple[complex, complex]]:
@@ -294,28 +282,19 @@ class _Room:
         return chosen
 
 
-def place_letters(
-    sketch: Sketch,
-    mechanism: Mechanism,
-    poses: Array,
-    bodies: list[Body],
-    grounds: list[tuple[complex, complex]],
-    numbers: bool,
-    grounded: bool,
-) -> None:
+def place_letters(plan: Plan, grounds: list[tuple[complex, complex]], numbers: bool) -> None:
     """Write the names of points and the numbers of links; the letters move with their link and stay upright."""
-    px = sketch.pixel * sketch.symbol
-    room = _Room(poses, px)
-    for body in bodies:
-        if not (grounded and body.link == mechanism.frame):
+    sketch, mechanism, px = plan.sketch, plan.mechanism, plan.px
+    room = _Room(plan.poses, px)
+    for body in plan.bodies:
+        if not plan.fixed(body.link):
             room.add(body.link, _along(outline(body.vertices(), 2.0 * px), 14.0 * px), body.link)
         room.add(body.link, body.points)
         for guide in body.guides:
             room.add(body.link, _along([guide.start, guide.stop], 14.0 * px), body.link)
-    frame = mechanism.frame
     for at, down in grounds:
-        room.add(frame, [at + down * r * px for r in (8.0, 16.0, 23.0)])
-        room.add(frame, [at + down * 18.0 * px + 1j * down * s * 12.0 * px for s in (-1, 1)])
+        room.add(mechanism.frame, [at + down * r * px for r in (8.0, 16.0, 23.0)])
+        room.add(mechanism.frame, [at + down * 18.0 * px + 1j * down * s * 12.0 * px for s in (-1, 1)])
     for driver in mechanism.drivers:
         joint = mechanism.joint(*driver.pair)
         at = complex(*(joint.at_a if joint.a == driver.base else joint.at_b))
@@ -326,8 +305,8 @@ def place_letters(
         sketch.on(link, "label", f"name {name}").label(room.best(link, ring), name, size=14.0 * sketch.symbol)
     if not numbers:
         return
-    for body in bodies:
-        if grounded and body.link == frame:
+    for body in plan.bodies:
+        if plan.fixed(body.link):
             spots = [at + down * 20.0 * px + s * 1j * down * 27.0 * px for at, down in grounds for s in (1, -1)]
             spots = spots or [g.start - g.direction * 14.0 * px for g in body.guides] or [0j]
         else:

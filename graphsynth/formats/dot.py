@@ -75,7 +75,9 @@ def _tokens(text: str) -> list[_Token]:
         mark = piece if kind == "mark" else ""
         if kind == "word" and piece.lower() in _KEYWORDS:
             mark = piece.lower()
-        found.append((_unquoted(piece) if kind == "quoted" else piece, end, mark))
+        if kind == "quoted":  # \" and \\ are the characters, a line end after a backslash is nothing
+            piece = re.sub(r'\\(["\\\n])', lambda escaped: escaped[1].strip("\n"), piece[1:-1])
+        found.append((piece, end, mark))
         if len(found) > TOKENS_MAX:
             raise FormatError(f"more than {TOKENS_MAX} words and marks; use json for so much", _line(text, end))
     return found
@@ -83,12 +85,6 @@ def _tokens(text: str) -> list[_Token]:
 
 def _line(text: str, at: int) -> str:
     return f"line {text.count(chr(10), 0, at) + 1}"
-
-
-def _unquoted(piece: str) -> str:
-    r"""Undo a quotation: ``\"`` and ``\\`` are the characters, a line end after a backslash is nothing."""
-    body = piece[1:-1]
-    return re.sub(r'\\(["\\\n])', lambda m: "" if m[1] == "\n" else m[1], body) if "\\" in body else body
 
 
 class _Reader:

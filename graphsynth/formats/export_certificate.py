@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,9 @@ from graphsynth.dynamics.elements import Spring, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.result import DynamicMotion
 from graphsynth.dynamics.start import StartReport, check_start
-from graphsynth.formats.exporting import EngineRun
-from graphsynth.formats.exudyn_model import ExudynSettings
+from graphsynth.formats.exudyn_model import ExudynSettings, run_exudyn
 from graphsynth.formats.mjcf import MujocoSettings, to_mjcf
+from graphsynth.formats.mujoco_run import run_mujoco
 
 Array = NDArray[np.float64]
 Settings = MujocoSettings | ExudynSettings
@@ -35,12 +36,10 @@ class Trial:
     ----------
     family : str
         Settings but for the step.
-    settings : str
     step : float
         Seconds.
     status : str
         "completed", "failed" or "not run".
-    message : str
     gap : float
         Largest violation of any joint at the output times, m.
     error : float
@@ -52,7 +51,6 @@ class Trial:
         Largest difference of the mechanical energy to the reference, over the largest kinetic energy.
     order : float
         Observed, against the next longer step of the family; NaN for the longest.
-    seconds : float
     """
 
     family: str
@@ -81,31 +79,26 @@ class ExportCertificate:
     ----------
     key : str
         Canonical key of the mechanism graph.
-    toolkit, engine, engine_version : str
     tree : tuple of (parent, link)
         Empty for an engine of absolute coordinates.
-    cuts : tuple of (a, b)
     coordinates : tuple of str
         Engine coordinate = internal coordinate.
     start_q, start_v : tuple of float
         Positions and velocities of the centres of mass and angles.
     closure, velocity_residual : float
         Of the start, m and m/s (rad and rad/s for angular rows).
-    times : tuple of float
     length : float
         Reference length of the error, m.
     reference : str
         Method of the internal reference.
     reference_error : float
         Its estimate, in the norm of ``Trial.error``.
-    tolerance : float
     trials : tuple of Trial
         From the longest step to the shortest, settings by settings.
     verdict : str
         "yes", "no" or "not run".
     limit : float
         The number that decided: error of the cheapest trial that meets the tolerance, or the smallest one reached.
-    statement : str
     """
 
     key: str
@@ -201,26 +194,24 @@ def certify_export(
     grid = np.atleast_1d(finite_array("times", times))
     check_start(model, start)
     names = _names(model, start, trials[0])
-    version = _version(names["engine"])
+    try:
+        version = metadata.version(names["engine"].lower())
+    except metadata.PackageNotFoundError:
+        version = ""
     common = {**names, "engine_version": version, "tolerance": float(tolerance), "times": tuple(grid.tolist())}
-    if not version:
-        empty = tuple(_nothing(s, "not run", "the engine is not installed", math.nan) for s in trials)
-        return ExportCertificate(
-            **common,
-            length=math.nan,
-            reference="",
-            reference_error=math.nan,
-            trials=empty,
-            verdict="not run",
-            limit=math.nan,
-            statement=f"{names['engine']} is not installed, so nothing was measured.",
-        )
-    reference, method, estimate = _reference(model, start, grid, rtol)
-    measured = _with_orders([_measure(model, start, grid, s, reference) for s in trials])
-    verdict, limit, statement = _judge(measured, float(tolerance), estimate)
+    length, method, estimate = math.nan, "", math.nan
+    if version:
+        reference, method, estimate = _reference(model, start, grid, rtol)
+        length = float(reference.compiled.tables.size)
+        measured = _with_orders([_measure(model, start, grid, s, reference) for s in trials])
+        verdict, limit, statement = _judge(measured, float(tolerance), estimate)
+    else:
+        measured = [_nothing(s, "not run", "the engine is not installed", math.nan) for s in trials]
+        statement = f"{names['engine']} is not installed, so nothing was measured."
+        verdict, limit = "not run", math.nan
     return ExportCertificate(
         **common,
-        length=float(reference.compiled.tables.size),
+        length=length,
         reference=method,
         reference_error=estimate,
         trials=tuple(measured),
@@ -247,15 +238,6 @@ def _checked(settings: Sequence[Settings], tolerance: float) -> list[Settings]:
     if not finite("tolerance", tolerance) > 0.0:
         raise GeometryError(f"tolerance = {tolerance} must be positive; give the error that is allowed")
     return trials
-
-
-def _version(engine: str) -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version(engine.lower())
-    except PackageNotFoundError:
-        return ""
 
 
 def _names(model: DynamicModel, start: StartReport, settings: Settings) -> dict[str, Any]:
@@ -312,22 +294,15 @@ def _distance(found: Array, expected: Array, size: float) -> float:
     return float((np.abs(found - expected) / np.array([size, size, 1.0])).max())
 
 
-def _run(model: DynamicModel, start: StartReport, grid: Array, settings: Settings) -> EngineRun:
-    if isinstance(settings, MujocoSettings):
-        from graphsynth.formats.mujoco_run import run_mujoco
-
-        return run_mujoco(model, start, grid, settings)
-    from graphsynth.formats.exudyn_model import run_exudyn
-
-    return run_exudyn(model, start, grid, settings)
-
-
 def _measure(
     model: DynamicModel, start: StartReport, grid: Array, settings: Settings, reference: DynamicMotion
 ) -> Trial:
     from graphsynth.mechanism.constraints import residual
 
-    run = _run(model, start, grid, settings)
+    if isinstance(settings, MujocoSettings):
+        run = run_mujoco(model, start, grid, settings)
+    else:
+        run = run_exudyn(model, start, grid, settings)
     if not run.completed:
         return _nothing(settings, run.status, run.message, run.seconds)
     size = float(reference.compiled.tables.size)
@@ -389,7 +364,7 @@ def _with_orders(trials: list[Trial]) -> list[Trial]:
         order = math.nan
         if before and before.error > 0.0 and trial.error > 0.0 and before.step > trial.step:
             order = math.log(before.error / trial.error) / math.log(before.step / trial.step)
-        found.append(Trial(**{**asdict(trial), "order": order}))
+        found.append(replace(trial, order=order))
     return found
 
 

@@ -6,7 +6,6 @@ The spanning tree and the joints that are cut are what an engine of joint coordi
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,16 +39,6 @@ def check_settings(settings: Any, kind: type) -> None:
         raise GeometryError(f"settings are {type(settings).__name__}, not {kind.__name__}; give these, or none")
 
 
-def carrier_of(model: DynamicModel, gear: Gear) -> int:
-    """Return the link that carries both wheels of a gear pair."""
-    for link in range(model.mechanism.graph.links):
-        if link in (gear.a, gear.b):
-            continue
-        if _bears(model, link, gear.a, gear.at_a) and _bears(model, link, gear.b, gear.at_b):
-            return link
-    raise GeometryError(f"gear pair {gear.a}-{gear.b} has no link that bears both wheels at their centres; give one")
-
-
 def _bears(model: DynamicModel, link: int, wheel: int, centre: Point) -> bool:
     """Whether the centre of a wheel is fixed in a link: revolute joints of both, at one point of one link."""
     for middle, spot in [(wheel, centre), *_hinges(model, wheel, centre)]:
@@ -71,7 +60,13 @@ def _hinges(model: DynamicModel, link: int, at: Point) -> list[tuple[int, Point]
 
 def gear_weights(model: DynamicModel, gear: Gear) -> dict[int, float]:
     """Weights of the link angles whose sum a gear pair keeps constant."""
-    carrier, sign = carrier_of(model, gear), -1.0 if gear.internal else 1.0
+    others = sorted(set(range(model.mechanism.graph.links)) - {gear.a, gear.b})
+    wheels = ((gear.a, gear.at_a), (gear.b, gear.at_b))
+    carrier = next((link for link in others if all(_bears(model, link, *wheel) for wheel in wheels)), None)
+    if carrier is None:
+        pair = f"{gear.a}-{gear.b}"
+        raise GeometryError(f"gear pair {pair} has no link that bears both wheels at their centres; give one")
+    sign = -1.0 if gear.internal else 1.0
     weights = {gear.a: gear.radius_a, gear.b: sign * gear.radius_b}
     weights[carrier] = weights.get(carrier, 0.0) - gear.radius_a - sign * gear.radius_b
     largest = max(gear.radius_a, gear.radius_b)
@@ -146,20 +141,39 @@ def spanning_tree(mechanism: Mechanism) -> SpanningTree:
     >>> spanning_tree(slider_crank)
     SpanningTree(edges=((0, 3, 1), (0, 1, 0), (3, 2, 3)), cuts=(2,))
     """
+    import networkx
+
     joints = mechanism.joints
-    slides = _forest(mechanism)
+    # prismatic joints, then slots, without a cycle (Kruskal)
+    sliding = networkx.Graph()
+    for index, joint in enumerate(joints):
+        if isinstance(joint, Prismatic | PinSlot):
+            weight = index + len(joints) * isinstance(joint, PinSlot)
+            sliding.add_edge(joint.a, joint.b, weight=weight, index=index)
+    slides = {data["index"] for *_, data in networkx.minimum_spanning_edges(sliding)}
     edges: list[tuple[int, int, int]] = []
-    seen = {mechanism.frame}
-    layer = deque(_component(joints, slides, mechanism.frame, seen, edges))
-    while layer:
-        link = layer.popleft()
+    seen: set[int] = set()
+
+    def reach(start: int) -> list[int]:
+        """Walk the chosen sliding joints from ``start``; return the links reached, ``start`` first."""
+        seen.add(start)
+        reached = [start]
+        for link in reached:
+            for index in sorted(slides):
+                other = _across(joints[index], link)
+                if other is not None and other not in seen:
+                    seen.add(other)
+                    edges.append((link, other, index))
+                    reached.append(other)
+        return reached
+
+    layer = reach(mechanism.frame)
+    for link in layer:
         for index, joint in enumerate(joints):
             other = _across(joint, link)
-            if not isinstance(joint, Revolute) or other is None or other in seen:
-                continue
-            seen.add(other)
-            edges.append((link, other, index))
-            layer.extend(_component(joints, slides, other, seen, edges))
+            if isinstance(joint, Revolute) and other is not None and other not in seen:
+                edges.append((link, other, index))
+                layer += reach(other)
     missing = sorted(set(range(mechanism.graph.links)) - seen)
     if missing:
         raise GraphError(f"links {missing} hang on gears or cams alone; give each a revolute or prismatic joint")
@@ -172,39 +186,6 @@ def _across(joint: JointGeometry, link: int) -> int | None:
     return joint.b if joint.a == link else joint.a if joint.b == link else None
 
 
-def _forest(mechanism: Mechanism) -> set[int]:
-    """Prismatic joints, then slots, without a cycle (Kruskal)."""
-    root = list(range(mechanism.graph.links))
-
-    def find(link: int) -> int:
-        while root[link] != link:
-            link = root[link]
-        return link
-
-    chosen: set[int] = set()
-    for kind in (Prismatic, PinSlot):
-        for index, joint in enumerate(mechanism.joints):
-            if isinstance(joint, kind) and find(joint.a) != find(joint.b):
-                root[find(joint.a)] = find(joint.b)
-                chosen.add(index)
-    return chosen
-
-
-def _component(
-    joints: tuple[JointGeometry, ...], slides: set[int], start: int, seen: set[int], edges: list[tuple[int, int, int]]
-) -> list[int]:
-    """Walk the chosen sliding joints from ``start``; return the links reached, ``start`` first."""
-    reached = [start]
-    for link in reached:
-        for index in sorted(slides):
-            other = _across(joints[index], link)
-            if other is not None and other not in seen:
-                seen.add(other)
-                edges.append((link, other, index))
-                reached.append(other)
-    return reached
-
-
 Array = NDArray[np.float64]
 
 
@@ -214,19 +195,14 @@ class EngineRun:
 
     Attributes
     ----------
-    engine, version : str
     settings : str
         Integrator, constraint parameters.
     step : float
         Seconds.
-    times : ndarray, shape (n,)
     poses, velocities : ndarray, shape (n, links, 3)
         ``(x, y, theta)`` of the link frames, m and rad; NaN from where the engine failed.
     status : str
         "completed" or "failed".
-    message : str
-        One sentence.
-    steps : int
     seconds : float
         Wall time of the integration alone.
     """

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import finite, positive
+from graphsynth.core.checks import choice, finite, positive
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Element, Force, Spring, Torque, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel, Rigid
@@ -67,20 +67,15 @@ class ExudynSettings:
     def __post_init__(self) -> None:
         positive("step", self.step)
         positive("newton_tolerance", self.newton_tolerance)
-        if not isinstance(self.integrator, str) or self.integrator not in INTEGRATORS:
-            raise GeometryError(
-                f"integrator = {self.integrator!r} is not offered; give one of {', '.join(INTEGRATORS)}"
-            )
+        choice("integrator", self.integrator, INTEGRATORS)
         if not 0.0 <= finite("spectral_radius", self.spectral_radius) <= 1.0:
             raise GeometryError(f"spectral_radius = {self.spectral_radius} must lie in 0..1; 0.9 is usual")
 
     @property
     def text(self) -> str:
         """Integrator and its parameter in one line."""
-        radius = (
-            f", spectral radius {self.spectral_radius:g}" if self.integrator == "generalized-alpha" else ", index 2"
-        )
-        return self.integrator + radius
+        damped = self.integrator == "generalized-alpha"
+        return self.integrator + (f", spectral radius {self.spectral_radius:g}" if damped else ", index 2")
 
     @property
     def family(self) -> str:
@@ -191,28 +186,22 @@ def _add_bodies(work: _Work) -> None:
             initialCoordinates=[0.0, 0.0, 0.0],
             initialVelocities=[float(v) for v in rate],
         )
-        inertia = body.inertia + _rotor(work.model, link)
+        rotor = 0.0
+        for element in work.model.elements:  # the rotors of torque sources between the link and the frame
+            if isinstance(element, TorqueSource) and element.rotor_inertia and link in (element.a, element.b):
+                if frame not in (element.a, element.b):
+                    between = f"{element.a}-{element.b} between moving links"
+                    raise GeometryError(f"rotor of torque source {between} is not exported")
+                rotor += element.ratio**2 * element.rotor_inertia
+        inertia = body.inertia + rotor
         export.bodies[link] = work.add("ObjectRigidBody2D", mass=body.mass, inertia=inertia, nodeNumber=node)
         gravity = [body.mass * g for g in (*work.model.gravity, 0.0)]
         work.add("LoadForceVector", markerNumber=work.spot(link, body.centre), loadVector=gravity)
         kept = {"nodeNumber": node, "storeInternal": True, "writeToFile": False}
-        first, second = (
-            work.add("SensorNode", outputVariableType=variable, **kept)
-            for variable in (kind.Coordinates, kind.Coordinates_t)
+        export.sensors[link] = (
+            work.add("SensorNode", outputVariableType=kind.Coordinates, **kept),
+            work.add("SensorNode", outputVariableType=kind.Coordinates_t, **kept),
         )
-        export.sensors[link] = (first, second)
-
-
-def _rotor(model: DynamicModel, link: int) -> float:
-    """Rotor inertia reflected to a link, of the torque sources between it and the frame."""
-    total, frame = 0.0, model.mechanism.frame
-    for element in model.elements:
-        if not isinstance(element, TorqueSource) or not element.rotor_inertia or link not in (element.a, element.b):
-            continue
-        if frame not in (element.a, element.b):
-            raise GeometryError(f"rotor of torque source {element.a}-{element.b} between moving links is not exported")
-        total += element.ratio**2 * element.rotor_inertia
-    return total
 
 
 def _add_joint(work: _Work, joint: Any) -> None:
@@ -231,18 +220,14 @@ def _add_joint(work: _Work, joint: Any) -> None:
             constrainRotation=isinstance(joint, Prismatic),
         )
     elif isinstance(joint, Gear):
-        _add_gear(work, joint)
+        frame = work.model.mechanism.frame
+        weights = {k: w for k, w in gear_weights(work.model, joint).items() if k != frame and abs(w) > 1e-14}
+        if len(weights) != 2:
+            raise GeometryError(f"gear pair {joint.a}-{joint.b} turns with a moving carrier: exported to MuJoCo only")
+        (k, wk), (m, wm) = weights.items()
+        work.add("ObjectConnectorCoordinate", markerNumbers=[work.turning(k), work.turning(m)], factor1=-wm / wk)
     else:
         raise GeometryError(f"{type(joint).__name__} is not exported to exudyn; leave it out")
-
-
-def _add_gear(work: _Work, gear: Gear) -> None:
-    frame = work.model.mechanism.frame
-    weights = {k: w for k, w in gear_weights(work.model, gear).items() if k != frame and abs(w) > 1e-14}
-    if len(weights) != 2:
-        raise GeometryError(f"gear pair {gear.a}-{gear.b} turns with a moving carrier: exported to MuJoCo only")
-    (k, wk), (m, wm) = weights.items()
-    work.add("ObjectConnectorCoordinate", markerNumbers=[work.turning(k), work.turning(m)], factor1=-wm / wk)
 
 
 def _add_element(work: _Work, element: Element) -> None:
@@ -256,30 +241,29 @@ def _add_element(work: _Work, element: Element) -> None:
         )
     elif isinstance(element, TorsionSpring):
         rest = element.free_angle - (work.angle(element.b) - work.angle(element.a))
-        _torsion(work, element.a, element.b, element.stiffness, element.damping, rest)
+        _torsion(work, element, element.stiffness, element.damping, rest)
     elif isinstance(element, Torque | TorqueSource):
-        _add_torque(work, element)
+        torque, damping = constant_torque(element)
+        if damping:
+            _torsion(work, element, 0.0, damping, 0.0)
+        for link, load in ((element.a, -torque), (element.b, torque)):
+            if link != work.model.mechanism.frame:
+                work.add("LoadCoordinate", markerNumber=work.turning(link), load=load)
     elif isinstance(element, Force):
         if callable(element.force):
             raise GeometryError(f"force on link {element.link} is a function; an exported one must be constant")
-        where, load = work.spot(element.link, element.at), [*element.force, 0.0]
-        work.add("LoadForceVector", markerNumber=where, loadVector=load, bodyFixed=element.frame == "body")
+        where, push = work.spot(element.link, element.at), [*element.force, 0.0]
+        work.add("LoadForceVector", markerNumber=where, loadVector=push, bodyFixed=element.frame == "body")
     else:
         raise GeometryError(f"{type(element).__name__} is not exported to exudyn; leave it out")
 
 
-def _torsion(work: _Work, a: int, b: int, stiffness: float, damping: float, rest: float) -> None:
+def _torsion(
+    work: _Work, between: TorsionSpring | Torque | TorqueSource, stiffness: float, damping: float, rest: float
+) -> None:
+    markers = [work.turning(between.a), work.turning(between.b)]
     spring = {"stiffness": stiffness, "damping": damping, "offset": rest}
-    work.add("ObjectConnectorCoordinateSpringDamper", markerNumbers=[work.turning(a), work.turning(b)], **spring)
-
-
-def _add_torque(work: _Work, element: Torque | TorqueSource) -> None:
-    torque, damping = constant_torque(element)
-    if damping:
-        _torsion(work, element.a, element.b, 0.0, damping, 0.0)
-    for link, load in ((element.a, -torque), (element.b, torque)):
-        if link != work.model.mechanism.frame:
-            work.add("LoadCoordinate", markerNumber=work.turning(link), load=load)
+    work.add("ObjectConnectorCoordinateSpringDamper", markerNumbers=markers, **spring)
 
 
 def _add_driver(work: _Work, driver: Driver) -> None:
@@ -304,7 +288,7 @@ def run_exudyn(
     model : DynamicModel
     start : StartReport
     times : array_like, shape (n,)
-        Output times, s; the step must divide them.
+        Output times, s; the step must divide them, else `GeometryError`.
     settings : ExudynSettings, optional
 
     Returns
@@ -314,10 +298,8 @@ def run_exudyn(
 
     Raises
     ------
-    GeometryError
-        A model that is not exported (see :func:`to_exudyn`), a step that does not divide the times.
-    GraphsynthError
-        exudyn is not installed.
+    GeometryError, GraphsynthError
+        As for :func:`to_exudyn`.
     """
     settings = ExudynSettings() if settings is None else settings
     check_settings(settings, ExudynSettings)

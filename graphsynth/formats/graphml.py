@@ -39,23 +39,17 @@ def compose(items: Iterable[Item]) -> Iterator[str]:
     for of, name, kind in _KEYS:
         yield f' <key id="{name}" for="{of}" attr.name="{name}" attr.type="{kind}"/>\n'
     for place, item in enumerate(items):
-        yield _graph(item, place)
+        graph, own, edges = attributes_of(item)
+        lines = [f' <graph id="G{place}" edgedefault="undirected">', *(f"  {data}" for data in _data(own))]
+        lines += [f'  <node id="{link}"/>' for link in range(graph.links)]
+        for joint, attributes in zip(graph.joints, edges):
+            lines.append(f'  <edge source="{joint.a}" target="{joint.b}">{"".join(_data(attributes))}</edge>')
+        yield "\n".join([*lines, " </graph>\n"])
     yield "</graphml>\n"
 
 
-def _graph(item: Item, place: int) -> str:
-    graph, own, edges = attributes_of(item)
-    lines = [f' <graph id="G{place}" edgedefault="undirected">']
-    lines += [f"  {_data(name, value)}" for name, value in own.items()]
-    lines += [f'  <node id="{link}"/>' for link in range(graph.links)]
-    for joint, attributes in zip(graph.joints, edges):
-        data = "".join(_data(name, value) for name, value in attributes.items())
-        lines.append(f'  <edge source="{joint.a}" target="{joint.b}">{data}</edge>')
-    return "\n".join([*lines, " </graph>\n"])
-
-
-def _data(name: str, value: str) -> str:
-    return f"<data key={quoteattr(name)}>{escape(value)}</data>"
+def _data(attributes: dict[str, str]) -> list[str]:
+    return [f"<data key={quoteattr(name)}>{escape(value)}</data>" for name, value in attributes.items()]
 
 
 @dataclass
@@ -95,9 +89,8 @@ class _Reader:
             raise FormatError(f"elements are nested deeper than {_DEPTH}", self.place)
         if len(self.stack) == 1 and name != "graphml":
             raise FormatError(f"<{name[:24]}> is not the root of GraphML; expected <graphml>", self.place)
-        handler = getattr(self, f"start_{name}", None) if name in _HANDLED else None
-        if handler:
-            handler(given, outer)
+        if name in _HANDLED:
+            getattr(self, f"start_{name}")(given, outer)
 
     def start_key(self, given: dict[str, str], outer: str) -> None:
         name = self._needed(given, "id", "key")
@@ -156,19 +149,16 @@ class _Reader:
             table[key] = "".join(self.text)
             self.into = None
         elif name == "graph" and self.graph is not None and len(self.stack) == 1:
-            self._close(self.graph)
-            self.graph = None
+            graph, self.graph = self.graph, None
+            for edge in graph.edges:
+                for end in (edge.source, edge.target):
+                    if end not in graph.nodes:
+                        raise FormatError(f"the edge ends at {end[:24]!r}, which is not a vertex", edge.place)
+            self.found.append(item_from(list(graph.nodes), graph.edges, graph.own, graph.place, self.spent))
 
     def characters(self, text: str) -> None:
         if self.into is not None:
             self.text.append(text)
-
-    def _close(self, graph: _Graph) -> None:
-        for edge in graph.edges:
-            for name in (edge.source, edge.target):
-                if name not in graph.nodes:
-                    raise FormatError(f"the edge ends at {name[:24]!r}, which is not a vertex", edge.place)
-        self.found.append(item_from(list(graph.nodes), graph.edges, graph.own, graph.place, self.spent))
 
     def _open(self, name: str) -> _Graph:
         if self.graph is None:

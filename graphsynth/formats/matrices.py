@@ -45,10 +45,7 @@ def head_of(graph: MechanismGraph) -> str:
 def read_rows(text: str, most: int, opening: str = "") -> tuple[dict[str, int], list[NumberRow]]:
     """Return the head and the rows, at most ``most``; ``opening`` are characters read as spaces besides commas.
 
-    Raises
-    ------
-    FormatError
-        A text too long, too many rows, a word that is not a whole number, something said twice.
+    `FormatError` for a text too long, too many rows, a word that is not a whole number, something said twice.
     """
     if len(text) > LENGTH_MAX:
         raise FormatError(f"{len(text)} characters; at most {LENGTH_MAX} are read", "length")
@@ -88,14 +85,6 @@ def _numbers(line: str, place: str) -> list[int]:
     return [int(word) for word in words]
 
 
-def within(text: str, what: str) -> str:
-    """Return a text if a reader will take it."""
-    if len(text) > LENGTH_MAX:
-        raise GraphError(f"the {what} of this graph has {len(text)} characters, at most {LENGTH_MAX}; use graphml")
-    return text
-
-
-_MOST = LINKS_MAX * (LINKS_MAX - 1) // 2
 _DICTIONARY = re.compile(r"\{(?:'mobility': ([0-9]))?\}", re.ASCII)  # what networkx.write_edgelist puts behind an edge
 
 
@@ -108,7 +97,7 @@ def compose_edges(graphs: Iterable[MechanismGraph]) -> Iterator[str]:
 
 def parse_edges(text: str) -> list[MechanismGraph]:
     """Read one graph; without ``# links`` it has one link more than its highest number."""
-    head, rows = read_rows(_DICTIONARY.sub(lambda match: match[1] or "", text), _MOST)
+    head, rows = read_rows(_DICTIONARY.sub(lambda match: match[1] or "", text), WORDS_MAX)
     for row in rows:
         if len(row.numbers) not in (2, 3):
             raise FormatError(f"a joint is 'a b' or 'a b mobility', not {len(row.numbers)} numbers", row.place)
@@ -215,10 +204,8 @@ def graph_from_incidence(matrix: ArrayLike, *, frame: int | None = None, space: 
     ----------
     matrix : array_like, shape (links, joints)
         In each column the mobility of the joint, at its two links.
-    frame : int, optional
-        The fixed link; none by default.
-    space : int, optional
-        Mobility of the space; 3 is the plane.
+    frame, space : int, optional
+        As for :func:`graph_from_adjacency`.
 
     Returns
     -------
@@ -263,7 +250,11 @@ def compose_adjacency(graphs: Iterable[MechanismGraph]) -> Iterator[str]:
 def compose_incidence(graphs: Iterable[MechanismGraph]) -> Iterator[str]:
     """Write the incidence matrix of one graph."""
     for graph in graphs:
-        yield within(head_of(graph) + _rows(incidence_matrix(graph)), "incidence matrix")
+        text = head_of(graph) + _rows(incidence_matrix(graph))
+        if len(text) > LENGTH_MAX:
+            most = f"{len(text)} characters, at most {LENGTH_MAX}"
+            raise GraphError(f"the incidence matrix of this graph has {most}; use graphml")
+        yield text
 
 
 def _rows(matrix: Matrix) -> str:

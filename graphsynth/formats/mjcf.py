@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.checks import finite, point, positive, three
+from graphsynth.core.checks import choice, finite, point, positive, three
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Element, Force, Spring, Torque, TorqueSource, TorsionSpring
-from graphsynth.dynamics.model import DynamicModel, Rigid
+from graphsynth.dynamics.model import Coupling, DynamicModel, Rigid
 from graphsynth.dynamics.start import StartReport
 from graphsynth.formats.exporting import (
     SpanningTree,
@@ -27,7 +27,7 @@ from graphsynth.formats.exporting import (
     spanning_tree,
     turn,
 )
-from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
 
 Point = tuple[float, float]
 
@@ -40,7 +40,6 @@ class Work:
     start: StartReport
     tree: SpanningTree
     names: list[tuple[str, int, int]] = field(default_factory=list)
-    hinge: list[bool] = field(default_factory=list)
     qpos: list[float] = field(default_factory=list)
     qvel: list[float] = field(default_factory=list)
     chain: dict[int, dict[int, int]] = field(default_factory=dict)  # link -> coordinate -> sign of its hinge
@@ -103,24 +102,30 @@ def write_load(work: Work, element: Element, name: str, tendon: ET.Element, actu
         for link, at in ((element.a, element.at_a), (element.b, element.at_b)):
             add(spatial, "site", site=site(work, link, at))
     elif isinstance(element, TorsionSpring):
-        _torsion(work, element, name, tendon)
+        combined = combine(work, {element.a: -1.0, element.b: 1.0})
+        if not combined:
+            return  # the two links cannot turn against each other
+        constant = work.angle(element.b) - work.angle(element.a) - sum(w * work.qpos[k] for k, w in combined.items())
+        free = element.free_angle - constant
+        if free < 0.0:  # a rest length must not be negative
+            free, combined = -free, {k: -w for k, w in combined.items()}
+        own = {"stiffness": element.stiffness, "damping": element.damping, "springlength": free}
+        fixed(work, tendon, name, combined, **own)
     elif isinstance(element, Torque | TorqueSource):
         _torque(work, element, name, tendon, actuator)
     elif isinstance(element, Force):
-        _force(work, element, name, actuator)
+        if callable(element.force):
+            raise GeometryError(f"force on link {element.link} is a function; an exported one must be constant")
+        size = math.hypot(*element.force)
+        if size == 0.0:
+            return
+        unit = (element.force[0] / size, element.force[1] / size)
+        where = {"site": site(work, element.link, element.at), "gear": text(*unit, 0.0, 0.0, 0.0, 0.0)}
+        if element.frame == "world":
+            where["refsite"] = site(work, work.model.mechanism.frame, (0.0, 0.0))
+        _constant(actuator, size, name=name, **where)
     else:
         raise GeometryError(f"{type(element).__name__}: MuJoCo's dry friction is another law; leave the element out")
-
-
-def _torsion(work: Work, spring: TorsionSpring, name: str, tendon: ET.Element) -> None:
-    combined = combine(work, {spring.a: -1.0, spring.b: 1.0})
-    if not combined:
-        return  # the two links cannot turn against each other
-    constant = work.angle(spring.b) - work.angle(spring.a) - sum(w * work.qpos[k] for k, w in combined.items())
-    free = spring.free_angle - constant
-    if free < 0.0:  # a rest length must not be negative
-        free, combined = -free, {k: -w for k, w in combined.items()}
-    fixed(work, tendon, name, combined, stiffness=spring.stiffness, damping=spring.damping, springlength=free)
 
 
 def _torque(work: Work, element: Torque | TorqueSource, name: str, tendon: ET.Element, actuator: ET.Element) -> None:
@@ -144,19 +149,6 @@ def _constant(actuator: ET.Element, size: float, **where: str) -> None:
     """Add an actuator that pushes with a constant force, without control."""
     bias = (size, 0.0, 0.0)
     add(actuator, "general", **where, gaintype="fixed", gainprm="0", biastype="affine", biasprm=bias)
-
-
-def _force(work: Work, force: Force, name: str, actuator: ET.Element) -> None:
-    if callable(force.force):
-        raise GeometryError(f"force on link {force.link} is a function; an exported one must be constant")
-    size = math.hypot(*force.force)
-    if size == 0.0:
-        return
-    unit = (force.force[0] / size, force.force[1] / size)
-    where = {"site": site(work, force.link, force.at), "gear": text(*unit, 0.0, 0.0, 0.0, 0.0)}
-    if force.frame == "world":
-        where["refsite"] = site(work, work.model.mechanism.frame, (0.0, 0.0))
-    _constant(actuator, size, name=name, **where)
 
 
 Array = NDArray[np.float64]
@@ -194,10 +186,7 @@ class MujocoSettings:
 
     def __post_init__(self) -> None:
         positive("step", self.step)
-        if not isinstance(self.integrator, str) or self.integrator not in INTEGRATORS:
-            raise GeometryError(
-                f"integrator = {self.integrator!r} is not MuJoCo's; give one of {', '.join(INTEGRATORS)}"
-            )
+        choice("integrator", self.integrator, INTEGRATORS)
         if self.solref is not None:
             object.__setattr__(self, "solref", point("solref", self.solref))
         object.__setattr__(self, "solimp", tuple(finite("solimp", part) for part in three("solimp", self.solimp)))
@@ -291,7 +280,16 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
     """
     settings = MujocoSettings() if settings is None else settings
     check_settings(settings, MujocoSettings)
-    _check(model, start)
+    check_common(model, start, "MuJoCo")
+    for link, body in model.bodies.items():
+        if min(body.mass, body.inertia) <= _LEAST:
+            raise GeometryError(
+                f"mass = {body.mass:g} kg and inertia = {body.inertia:g} kg m^2 of link {link}: MuJoCo takes none "
+                f"below {_LEAST:g}; change the units, or leave out what hardly weighs"
+            )
+    if model.prescribed:
+        pair = model.prescribed[0].pair
+        raise GeometryError(f"prescribed motion of joint {pair[0]}-{pair[1]}: MuJoCo has none; use exudyn or a torque")
     work = Work(model, start, spanning_tree(model.mechanism))
     root = ET.Element("mujoco", model="graphsynth")
     add(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
@@ -301,9 +299,10 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
     _hang(work, model.mechanism.frame)
     tendon, equality, actuator = (ET.Element(tag) for tag in ("tendon", "equality", "actuator"))
     for index in work.tree.cuts:
-        _close(work, model.mechanism.joints[index], tendon, equality)
+        joint = model.mechanism.joints[index]
+        _close(work, joint, {"name": f"j{joint.a}_{joint.b}"}, tendon, equality)
     for extra in model.additional:
-        _close_extra(work, extra, equality)
+        _close(work, extra, {}, tendon, equality)
     for number, element in enumerate(model.elements):
         write_load(work, element, f"e{number}", tendon, actuator)
     for constraint in equality:
@@ -327,20 +326,6 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
         start,
         settings,
     )
-
-
-def _check(model: DynamicModel, start: StartReport) -> None:
-    """Refuse what MuJoCo cannot run."""
-    check_common(model, start, "MuJoCo")
-    for link, body in model.bodies.items():
-        if min(body.mass, body.inertia) <= _LEAST:
-            raise GeometryError(
-                f"mass = {body.mass:g} kg and inertia = {body.inertia:g} kg m^2 of link {link}: MuJoCo takes none "
-                f"below {_LEAST:g}; change the units, or leave out what hardly weighs"
-            )
-    if model.prescribed:
-        pair = model.prescribed[0].pair
-        raise GeometryError(f"prescribed motion of joint {pair[0]}-{pair[1]}: MuJoCo has none; use exudyn or a torque")
 
 
 def _options(root: ET.Element, model: DynamicModel, settings: MujocoSettings) -> None:
@@ -385,16 +370,16 @@ def _joint(work: Work, body: ET.Element, joint: JointGeometry, child: int) -> No
         return
     assert isinstance(joint, Prismatic | PinSlot)
     d, rate = displacement(joint, work.start)
-    along = work.angle(joint.a) + joint.angle_a - work.angle(child)
-    if child == joint.b:
-        _slide(work, body, joint, turn(along, (1.0, 0.0)), d, rate)
-        if isinstance(joint, PinSlot):
-            _hinge(work, body, joint, child, joint.at_b)
-        return
-    if isinstance(joint, PinSlot):
+    if child != joint.b and isinstance(joint, PinSlot):
         dx, dy = turn(joint.angle_a, (d, 0.0))
         _hinge(work, body, joint, child, (joint.at_a[0] + dx, joint.at_a[1] + dy))
-    _slide(work, body, joint, turn(along, (-1.0, 0.0)), d, rate)
+    along = work.angle(joint.a) + joint.angle_a - work.angle(child)
+    axis = (*turn(along, (1.0 if child == joint.b else -1.0, 0.0)), 0.0)
+    name = f"j{joint.a}_{joint.b}"
+    add(body, "joint", name=name, type="slide", axis=axis, ref=d)
+    _count(work, name, joint, d, rate)
+    if child == joint.b and isinstance(joint, PinSlot):
+        _hinge(work, body, joint, child, joint.at_b)
 
 
 def displacement(joint: Prismatic | PinSlot, start: StartReport) -> tuple[float, float]:
@@ -415,62 +400,38 @@ def _hinge(work: Work, body: ET.Element, joint: JointGeometry, child: int, at: P
     name = f"j{joint.a}_{joint.b}{suffix}"
     add(body, "joint", name=name, type="hinge", pos=(*at, 0.0), axis=(0.0, 0.0, sign), ref=q)
     work.chain[child][len(work.names)] = sign
-    _count(work, name, joint, q, rate, True)
+    _count(work, name, joint, q, rate)
 
 
-def _slide(work: Work, body: ET.Element, joint: JointGeometry, axis: Point, d: float, rate: float) -> None:
-    name = f"j{joint.a}_{joint.b}"
-    add(body, "joint", name=name, type="slide", axis=(*axis, 0.0), ref=d)
-    _count(work, name, joint, d, rate, False)
-
-
-def _count(work: Work, name: str, joint: JointGeometry, q: float, rate: float, hinge: bool) -> None:
+def _count(work: Work, name: str, joint: JointGeometry, q: float, rate: float) -> None:
     work.names.append((name, joint.a, joint.b))
-    work.hinge.append(hinge)
     work.qpos.append(q)
     work.qvel.append(rate)
 
 
-def _close(work: Work, joint: JointGeometry, tendon: ET.Element, equality: ET.Element) -> None:
-    """Close a cut joint by an equality."""
-    name = f"j{joint.a}_{joint.b}"
+def _close(
+    work: Work, joint: JointGeometry | Coupling, name: dict[str, str], tendon: ET.Element, equality: ET.Element
+) -> None:
+    """Close a cut joint, which has a name, or an additional one by an equality."""
     if isinstance(joint, Revolute):
         sites = site(work, joint.a, joint.at_a), site(work, joint.b, joint.at_b)
-        add(equality, "connect", name=name, site1=sites[0], site2=sites[1])
+        add(equality, "connect", **name, site1=sites[0], site2=sites[1])
     elif isinstance(joint, Gear):
-        _gear(work, joint, name, tendon, equality)
-    elif isinstance(joint, Prismatic | PinSlot):
+        combined = combine(work, gear_weights(work.model, joint))
+        if len(combined) == 2:
+            (k, wk), (m, wm) = combined.items()
+            ends = {"joint1": work.names[k][0], "joint2": work.names[m][0]}
+            add(equality, "joint", **name, **ends, polycoef=(0.0, -wm / wk, 0.0, 0.0, 0.0))
+            return
+        length = f"t_{name['name']}"
+        fixed(work, tendon, length, combined)
+        add(equality, "tendon", **name, tendon1=length, polycoef="0 0 0 0 0")
+    elif isinstance(joint, Rigid):
+        frame = work.model.mechanism.frame
+        bodies = ["world" if link == frame else f"link{link}" for link in (joint.b, joint.a)]
+        add(equality, "weld", body1=bodies[0], body2=bodies[1])
+    elif name and isinstance(joint, Prismatic | PinSlot):
         raise GeometryError(f"{joint.kind} {joint.a}-{joint.b} closes a loop of prismatic joints; use exudyn for it")
     else:
-        raise GeometryError(f"{joint.kind} joint {joint.a}-{joint.b}: MuJoCo has no such joint; leave it out")
-
-
-def _close_extra(work: Work, extra: object, equality: ET.Element) -> None:
-    if isinstance(extra, Revolute):
-        sites = site(work, extra.a, extra.at_a), site(work, extra.b, extra.at_b)
-        add(equality, "connect", site1=sites[0], site2=sites[1])
-    elif isinstance(extra, Rigid):
-        add(equality, "weld", body1=_body(work, extra.b), body2=_body(work, extra.a))
-    else:
-        raise GeometryError(f"additional {type(extra).__name__}: MuJoCo has no such constraint; leave it out")
-
-
-def _body(work: Work, link: int) -> str:
-    return "world" if link == work.model.mechanism.frame else f"link{link}"
-
-
-def _gear(work: Work, gear: Gear, name: str, tendon: ET.Element, equality: ET.Element) -> None:
-    combined = combine(work, gear_weights(work.model, gear))
-    if len(combined) == 2:
-        (k, wk), (m, wm) = combined.items()
-        add(
-            equality,
-            "joint",
-            name=name,
-            joint1=work.names[k][0],
-            joint2=work.names[m][0],
-            polycoef=(0.0, -wm / wk, 0.0, 0.0, 0.0),
-        )
-        return
-    fixed(work, tendon, f"t_{name}", combined)
-    add(equality, "tendon", name=name, tendon1=f"t_{name}", polycoef="0 0 0 0 0")
+        cam = f"{joint.kind} joint {joint.a}-{joint.b}" if isinstance(joint, Cam) else ""
+        raise GeometryError(f"{cam or f'additional {type(joint).__name__}'}: MuJoCo has no such joint; leave it out")

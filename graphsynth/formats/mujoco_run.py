@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from time import perf_counter
 from typing import Any
 
@@ -55,38 +53,28 @@ def run_mujoco(
     links = model.mechanism.graph.links
     poses, rates = np.full((2, grid.size, links, 3), np.nan)
     seconds, message = 0.0, ""
-    with _quiet(mujoco):
+    # the engine's warnings, which the status tells, stay off the terminal and out of a log file
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: None)
+    try:
         for k in range(grid.size):
             begin = perf_counter()
             if k:
                 mujoco.mj_step(engine, data, counts[k] - counts[k - 1])
             seconds += perf_counter() - begin
-            message = _complaint(data, grid[k] - grid[0] + start.time, settings.step)
+            time = grid[k] - grid[0] + start.time
+            if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
+                message = f"numbers that are not finite at t = {time:g} s"
+            elif abs(data.time - time) > 0.5 * settings.step or data.warning.number.any():  # a reset moves the clock
+                message = f"the engine warned or reset itself before t = {time:g} s"
+                message += ": the step is too long for the constraints"
             if message:
                 break
             poses[k], rates[k] = _state(mujoco, engine, data, export)
-    version = mujoco.__version__
-    return finished("MuJoCo", version, settings, grid, (poses, rates), message, counts[-1], seconds)
-
-
-@contextmanager
-def _quiet(mujoco: Any) -> Iterator[None]:
-    """Keep the engine's warnings, which the status tells, off the terminal and out of a log file."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda text: None)
-    try:
-        yield
     finally:
         mujoco.set_mju_user_warning(before)
-
-
-def _complaint(data: Any, time: float, step: float) -> str:
-    """Return why the state cannot be trusted; the engine resets itself, with its clock, where it diverges."""
-    if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
-        return f"numbers that are not finite at t = {time:g} s"
-    if abs(data.time - time) > 0.5 * step or data.warning.number.any():
-        return f"the engine warned or reset itself before t = {time:g} s: the step is too long for the constraints"
-    return ""
+    version = mujoco.__version__
+    return finished("MuJoCo", version, settings, grid, (poses, rates), message, counts[-1], seconds)
 
 
 def _state(mujoco: Any, engine: Any, data: Any, export: MjcfModel) -> tuple[Array, Array]:

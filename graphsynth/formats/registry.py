@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -98,8 +99,8 @@ _MATRIX = 4_000_000
 _LISTED: tuple[tuple[str, str, str, str, dict[str, Any]], ...] = (
     ("text", ".g6 .txt", "graph6 with frame and joint mobilities, one graph a line", "plain:text", {"feed": "lines"}),
     ("graph6", "", "graph6 alone: chains of revolute joints, one a line", "plain:graph6", {"feed": "lines"}),
-    ("jsonl", ".jsonl .ndjson", "JSON lines, one graph a line", "graph_json:lines", {"feed": "lines"}),
-    ("json", ".json", "JSON: a graph, a list of graphs, or a mechanism", "graph_json", {"mechanisms": True}),
+    ("jsonl", ".jsonl .ndjson", "JSON lines, one graph a line", "plain:jsonl", {"feed": "lines"}),
+    ("json", ".json", "JSON: a graph, a list of graphs, or a mechanism", "plain:json", {"mechanisms": True}),
     ("toml", ".toml", "TOML: a mechanism", "plain:toml", {"many": False, "mechanisms": True, "limit": 400_000}),
     ("graphml", ".graphml", "GraphML", "graphml", {"mechanisms": True, "feed": "blocks", "piece": 3_000_000}),
     ("dot", ".dot .gv", "DOT of Graphviz", "dot", {"mechanisms": True, "limit": 2_000_000}),
@@ -180,18 +181,21 @@ def read_text(text: str | bytes, format: str) -> list[Item]:
     entry = format_of("", format)
     if not isinstance(text, str | bytes):
         raise SpecError(f"text is {type(text).__name__}; give str or bytes")
+    found: list[Item] = []
+    joints = 0
     with _sentences(""):
         _check_length(len(text), entry)
-        return _bounded(_fed(io.BytesIO(_encoded(text)), entry))
-
-
-def _encoded(text: str | bytes) -> bytes:
-    if not isinstance(text, str):
-        return text
-    try:
-        return text.encode()
-    except UnicodeEncodeError as error:
-        raise FormatError("half of a character that takes two", f"character {error.start}") from None
+        try:
+            data = text.encode() if isinstance(text, str) else text
+        except UnicodeEncodeError as error:
+            raise FormatError("half of a character that takes two", f"character {error.start}") from None
+        for item in _fed(io.BytesIO(data), entry):
+            found.append(item)
+            joints += len(item.joints) if isinstance(item, Mechanism) else len(item.packed) // 3
+            if len(found) > GRAPHS_MAX or joints > JOINTS_MAX:
+                most = f"{GRAPHS_MAX} graphs, or {JOINTS_MAX} joints in all,"
+                raise FormatError(f"more than {most} at once; split the text, or use a file of text or jsonl", "length")
+    return found
 
 
 def _check_length(length: int, entry: Format) -> None:
@@ -200,18 +204,6 @@ def _check_length(length: int, entry: Format) -> None:
         if entry.feed != "whole":
             remedy = "split it, or put it into a file, which is read graph by graph"
         raise FormatError(f"more than {entry.limit} bytes of {entry.name} at once; {remedy}", "length")
-
-
-def _bounded(items: Iterable[Item]) -> list[Item]:
-    found: list[Item] = []
-    joints = 0
-    for item in items:
-        found.append(item)
-        joints += len(item.joints) if isinstance(item, Mechanism) else len(item.packed) // 3
-        if len(found) > GRAPHS_MAX or joints > JOINTS_MAX:
-            most = f"{GRAPHS_MAX} graphs, or {JOINTS_MAX} joints in all,"
-            raise FormatError(f"more than {most} at once; split the text, or use a file of text or jsonl", "length")
-    return found
 
 
 @contextmanager
@@ -231,53 +223,32 @@ def _fed(file: io.BufferedIOBase, entry: Format) -> Iterator[Item]:
     """Read the items of an open file as its format wants it."""
     parse = entry.function("parse")
     if entry.feed == "lines":
-        return _lines(file, entry)
+        return (parse(text, place) for line, place in _lines(file, entry) if (text := line.strip()))
     if entry.feed == "rows":
-        return iter(parse(_rows(file, entry)))
+        return iter(parse(line for line, _ in _lines(file, entry)))
     if entry.feed == "blocks":
-        return iter(parse(_blocks(file)))
+        return iter(parse(iter(lambda: file.read(_BLOCK), b"")))
     data = file.read(entry.limit + 1)
     _check_length(len(data), entry)
-    return iter(parse(_decoded(data)))
-
-
-def _decoded(text: bytes) -> str:
     try:
-        return text.decode("utf-8-sig")
+        return iter(parse(data.decode("utf-8-sig")))
     except UnicodeDecodeError as error:
         raise FormatError(f"not UTF-8 text ({error.reason})", f"byte {error.start}") from None
 
 
-def _lines(file: io.BufferedIOBase, entry: Format) -> Iterator[Item]:
-    one, number = entry.function("parse"), 0
-    while line := file.readline(entry.piece + 2):
-        number += 1
-        place = f"line {number}"
+def _lines(file: io.BufferedIOBase, entry: Format) -> Iterator[tuple[str, str]]:
+    """Yield every line and its place."""
+    for number in count(1):
+        line, place = file.readline(entry.piece + 2), f"line {number}"
+        if not line:
+            return
         if len(line) > entry.piece:
-            raise FormatError(f"more than {entry.piece} bytes on one line", place)
+            raise FormatError(f"more than {entry.piece} bytes {'on one line' if entry.line else 'in one row'}", place)
         try:
-            text = _decoded(line).strip()
-        except FormatError as error:
-            raise FormatError(str(error), place) from None
-        if text:
-            yield one(text, place)
-
-
-def _rows(file: io.BufferedIOBase, entry: Format) -> Iterator[str]:
-    number = 0
-    while line := file.readline(entry.piece + 2):
-        number += 1
-        if len(line) > entry.piece:
-            raise FormatError(f"more than {entry.piece} bytes in one row", f"line {number}")
-        try:
-            yield _decoded(line) if number == 1 else line.decode()
-        except (FormatError, UnicodeDecodeError):
-            raise FormatError("not UTF-8 text", f"line {number}") from None
-
-
-def _blocks(file: io.BufferedIOBase) -> Iterator[bytes]:
-    while block := file.read(_BLOCK):
-        yield block
+            text = line.decode("utf-8-sig" if entry.line or number == 1 else "utf-8")
+        except UnicodeDecodeError:
+            raise FormatError("not UTF-8 text", place) from None
+        yield text, place
 
 
 def read_stream(file: io.BufferedIOBase, format: str, name: str = "") -> Iterator[Item]:
@@ -300,10 +271,8 @@ def read_stream(file: io.BufferedIOBase, format: str, name: str = "") -> Iterato
 
     Raises
     ------
-    FormatError
-        For a file that is not of this format, with its name and the place.
-    SpecError
-        For an unknown format.
+    FormatError, SpecError
+        For a file that is not of this format, with its name and the place; for an unknown format.
 
     Examples
     --------
@@ -323,7 +292,7 @@ def read_stream(file: io.BufferedIOBase, format: str, name: str = "") -> Iterato
 def read_all(path: str | os.PathLike[str], format: str | None = None) -> Iterator[Item]:
     """Read every graph and mechanism of a file, in its order, as they are asked for.
 
-    Lines, rows and GraphML take the memory of one graph, whatever the length of the file.
+    Lines, rows and GraphML take the memory of one graph.
 
     Parameters
     ----------
@@ -337,10 +306,8 @@ def read_all(path: str | os.PathLike[str], format: str | None = None) -> Iterato
 
     Raises
     ------
-    FormatError
-        For a file that is not of this format, with its name and the place.
-    SpecError
-        For an unknown format.
+    FormatError, SpecError
+        As for :func:`read_stream`.
     OSError
         For a file that cannot be opened, when the first item is asked for.
     """
@@ -373,11 +340,11 @@ def read(path: str | os.PathLike[str], format: str | None = None, *, number: int
     FormatError
         For a file that is not of this format or holds fewer graphs.
     """
-    count = 0
-    for count, item in enumerate(read_all(path, format), 1):
-        if count == number:
+    found = 0
+    for found, item in enumerate(read_all(path, format), 1):
+        if found == number:
             return item
-    raise FormatError(f"graph {number} does not exist, the file has {count}", Path(path).name)
+    raise FormatError(f"graph {number} does not exist, the file has {found}", Path(path).name)
 
 
 def write_text(items: Item | Iterable[Item], format: str) -> str:
@@ -395,10 +362,8 @@ def write_text(items: Item | Iterable[Item], format: str) -> str:
 
     Raises
     ------
-    GraphError
-        If the format cannot hold them: several graphs, a mechanism, a frame.
-    SpecError
-        For an unknown format.
+    GraphError, SpecError
+        If the format cannot hold them: several graphs, a mechanism, a frame; for an unknown format.
 
     Examples
     --------
@@ -409,21 +374,19 @@ def write_text(items: Item | Iterable[Item], format: str) -> str:
 
 
 def _pieces(items: Item | Iterable[Item], entry: Format) -> Iterator[str]:
-    given: Iterable[Item] = (items,) if isinstance(items, MechanismGraph | Mechanism) else items
-    pieces: Iterator[str] = entry.function("compose")(_checked(given, entry))
+    def checked() -> Iterator[Item]:
+        for number, item in enumerate((items,) if isinstance(items, MechanismGraph | Mechanism) else items):
+            if number and not entry.many:
+                raise GraphError(f"{entry.name} holds one graph in a file; write each to its own")
+            if isinstance(item, Mechanism) and not entry.mechanisms:
+                able = ", ".join(name for name, other in FORMATS.items() if other.mechanisms)
+                raise GraphError(f"{entry.name} holds graphs, no dimensions; write mechanism.graph, or use {able}")
+            if not isinstance(item, MechanismGraph | Mechanism):
+                raise GraphError(f"{type(item).__name__} is neither a MechanismGraph nor a Mechanism")
+            yield item
+
+    pieces: Iterator[str] = entry.function("compose")(checked())
     return pieces
-
-
-def _checked(items: Iterable[Item], entry: Format) -> Iterator[Item]:
-    for count, item in enumerate(items):
-        if count and not entry.many:
-            raise GraphError(f"{entry.name} holds one graph in a file; write each to its own")
-        if isinstance(item, Mechanism) and not entry.mechanisms:
-            able = ", ".join(name for name, other in FORMATS.items() if other.mechanisms)
-            raise GraphError(f"{entry.name} holds graphs, no dimensions; write mechanism.graph, or use {able}")
-        if not isinstance(item, MechanismGraph | Mechanism):
-            raise GraphError(f"{type(item).__name__} is neither a MechanismGraph nor a Mechanism")
-        yield item
 
 
 def write(items: Item | Iterable[Item], path: str | os.PathLike[str], format: str | None = None) -> int:
@@ -446,10 +409,8 @@ def write(items: Item | Iterable[Item], path: str | os.PathLike[str], format: st
 
     Raises
     ------
-    GraphError
-        If the format cannot hold them.
-    SpecError
-        For an unknown format.
+    GraphError, SpecError
+        As for :func:`write_text`.
     """
     entry, path = format_of(path, format), Path(path)
     count = 0

@@ -131,7 +131,12 @@ class _System:
     def __init__(self, graph: MechanismGraph, drivers: tuple[Joint, ...], base: int, within: int = -1) -> None:
         self.graph = graph
         self.drivers = drivers
-        self.body_of = self._bodies(drivers)
+        #: for each link the smallest link of its body
+        self.body_of = list(range(graph.links))
+        for a, b, mobility in drivers:
+            if mobility == 1:
+                low, high = sorted((self.body_of[a], self.body_of[b]))
+                self.body_of = [low if body == high else body for body in self.body_of]
         self.placed = self.body_of[base]
         #: (body, body, mobility left, joint); a driven joint keeps one freedom less.
         self.constraints = [
@@ -142,15 +147,6 @@ class _System:
         moving = {body for link, body in enumerate(self.body_of) if within >> link & 1 and body != self.placed}
         self.moving = sorted(moving)
         self.game = PebbleGame(graph.space if link in moving else 0 for link in range(graph.links))
-
-    def _bodies(self, drivers: tuple[Joint, ...]) -> list[int]:
-        """Return for each link the smallest link of its body."""
-        body_of = list(range(self.graph.links))
-        for a, b, mobility in drivers:
-            if mobility == 1:
-                low, high = sorted((body_of[a], body_of[b]))
-                body_of = [low if body == high else body for body in body_of]
-        return body_of
 
     def assign(self) -> int:
         """Assign the constraints; return a bit mask of bodies that have too many, or 0."""
@@ -165,11 +161,6 @@ class _System:
     def links_of(self, bodies: Iterable[int]) -> tuple[int, ...]:
         wanted = set(bodies)
         return tuple(link for link, body in enumerate(self.body_of) if body in wanted)
-
-    def free(self) -> tuple[int, ...]:
-        """Return the links whose place the constraints leave open."""
-        loose = [body for body in self.moving if any(self.game.free[other] for other in bits(self.game.reach(body)))]
-        return self.links_of(loose)
 
     def inner(self, group: int) -> list[tuple[int, int, int]]:
         """Return the constraints ``(body, body, mobility)`` inside a set of bodies."""
@@ -198,20 +189,13 @@ def find_fault(mechanism: MechanismGraph, drivers: Iterable[int | tuple[int, int
 
     Parameters
     ----------
-    mechanism : MechanismGraph
-        A graph with a frame.
-    drivers : iterable of int or (int, int)
-        Driven joints: a link stands for its joint with the frame, a pair for the joint between the two links.
+    mechanism, drivers
+        As for :func:`decompose`, also what is raised for them.
 
     Returns
     -------
     Fault or None
         The links that have too many constraints and those that stay free, and a sentence.
-
-    Raises
-    ------
-    GraphError
-        If there is no frame, or a driver is not a joint or is given twice.
 
     Examples
     --------
@@ -219,21 +203,34 @@ def find_fault(mechanism: MechanismGraph, drivers: Iterable[int | tuple[int, int
     >>> find_fault(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0), [1, 3]).message
     'mobility 1 needs 1 driver, not 2; links 2 have too many constraints'
     """
-    return _assign(_start(mechanism, drivers))
+    return _fault(_system_of(mechanism, drivers))
 
 
-def _start(graph: MechanismGraph, drivers: Iterable[int | tuple[int, int]]) -> _System:
+def _system_of(graph: MechanismGraph, drivers: Iterable[int | tuple[int, int]]) -> _System:
+    """Return bodies and constraints of a mechanism, its drivers in the order given."""
     if graph.frame is None:
         raise GraphError("structural groups hang on the frame, and this chain has none; use with_frame()")
-    return _System(graph, _resolve(graph, graph.frame, drivers), graph.frame)
+    by_pair = {(joint.a, joint.b): joint for joint in graph.joints}
+    found: list[Joint] = []
+    for driver in drivers:
+        pair = (graph.frame, driver) if isinstance(driver, int) else (driver[0], driver[1])
+        joint = by_pair.get((min(pair), max(pair)))
+        if joint is None:
+            raise GraphError(f"links {pair[0]} and {pair[1]} have no joint to drive; name a joint of the graph")
+        if joint in found:
+            raise GraphError(f"joint {joint.a}-{joint.b} is driven twice")
+        found.append(joint)
+    return _System(graph, tuple(found), graph.frame)
 
 
-def _assign(system: _System) -> Fault | None:
+def _fault(system: _System) -> Fault | None:
     """Assign the constraints of a fresh system; return what stands in the way of groups."""
     graph, given = system.graph, len(system.drivers)
     refused = system.assign()
     too_many = system.links_of(bits(refused & ~(1 << system.placed))) or system.links_of(bits(refused))
-    free = system.free()
+    game = system.game
+    loose = [body for body in system.moving if any(game.free[other] for other in bits(game.reach(body)))]
+    free = system.links_of(loose)
     if graph.mobility != given:
         text = f"mobility {graph.mobility} needs {graph.mobility} driver{'s' * (graph.mobility != 1)}, not {given}"
         if graph.mobility < 0:
@@ -242,10 +239,8 @@ def _assign(system: _System) -> Fault | None:
         text += f"; links {_list(free)} remain free" if free else ""
         return Fault("drivers", free, text)
     if refused:
-        text = (
-            f"links {_list(too_many)} have too many constraints with these drivers, and links {_list(free)} remain free"
-        )
-        return Fault("over-constrained", too_many, text + "; drive another joint")
+        text = f"links {_list(too_many)} have too many constraints with these drivers, and links {_list(free)}"
+        return Fault("over-constrained", too_many, text + " remain free; drive another joint")
     for group in system.groups():
         # Moving bodies that no assignment can save: more than Pi (|S| - 1) constraints among themselves.
         game = PebbleGame([graph.space] * graph.links)
@@ -285,9 +280,8 @@ def decompose(mechanism: MechanismGraph, drivers: Iterable[int | tuple[int, int]
     >>> print(decompose(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0), [1]))
     mechanism of class II: class II order 2: links 2, 3
     """
-    system = _start(mechanism, drivers)
-    fault = _assign(system)
-    if fault:
+    system = _system_of(mechanism, drivers)
+    if fault := _fault(system):
         raise GraphError(fault.message)
     return Decomposition(system.drivers, system.links_of([system.placed]), _groups(system))
 
@@ -297,47 +291,39 @@ def _groups(system: _System) -> tuple[AssurGroup, ...]:
     stage_of = {system.placed: 0}
     groups = []
     for mask in system.groups():
-        group = _describe(system, mask, stage_of)
+        locked = rigid_bodies(system.graph.links, system.inner(mask), system.graph.space, mask)
+        merged = {body: min(bits(rigid)) for rigid in locked for body in bits(rigid)}
+        floating: list[AssurGroup] = []
+        for rigid in locked:  # bodies rigid among themselves are assembled on the smallest of them
+            links = system.links_of(bits(rigid))
+            part = _System(system.graph, system.drivers, links[0], sum(1 << link for link in links))
+            part.assign()
+            floating += _groups(part)
+        inner, outer, contours, stage = [], [], [], 0
+        for a, b, mobility, joint in system.constraints:
+            near, far = (a, b) if mask >> a & 1 else (b, a)
+            if mask >> a & mask >> b & 1:
+                inner.append(joint)
+                contours.append((merged.get(a, a), merged.get(b, b), mobility))
+            elif mask >> near & 1 and far in stage_of:
+                outer.append(joint)
+                contours.append((merged.get(near, near), -1, mobility))
+                stage = max(stage, stage_of[far])
+        own = contour_class((a, b, mobility) for a, b, mobility in contours if a != b)
+        bodies = [bits(rigid) for rigid in locked] + [[body] for body in bits(mask) if body not in merged]
+        group = AssurGroup(
+            links=system.links_of(bits(mask)),
+            inner=tuple(inner),
+            outer=tuple(outer),
+            group_class=max([own, *(group.group_class for group in floating)]),
+            order=len(outer),
+            stage=stage + 1,
+            bodies=tuple(sorted(system.links_of(body) for body in bodies)),
+            floating=tuple(floating),
+        )
         stage_of.update(dict.fromkeys(bits(mask), group.stage))
         groups.append(group)
     return tuple(groups)
-
-
-def _describe(system: _System, mask: int, stage_of: dict[int, int]) -> AssurGroup:
-    """Return the report on a group; ``stage_of`` holds the stages of the bodies placed before it."""
-    locked = rigid_bodies(system.graph.links, system.inner(mask), system.graph.space, mask)
-    merged = {body: min(bits(rigid)) for rigid in locked for body in bits(rigid)}
-    floating = tuple(group for rigid in locked for group in _assemble(system, rigid))
-    inner, outer, contours, stage = [], [], [], 0
-    for a, b, mobility, joint in system.constraints:
-        near, far = (a, b) if mask >> a & 1 else (b, a)
-        if mask >> a & mask >> b & 1:
-            inner.append(joint)
-            contours.append((merged.get(a, a), merged.get(b, b), mobility))
-        elif mask >> near & 1 and far in stage_of:
-            outer.append(joint)
-            contours.append((merged.get(near, near), -1, mobility))
-            stage = max(stage, stage_of[far])
-    own = contour_class((a, b, mobility) for a, b, mobility in contours if a != b)
-    bodies = [bits(rigid) for rigid in locked] + [[body] for body in bits(mask) if body not in merged]
-    return AssurGroup(
-        links=system.links_of(bits(mask)),
-        inner=tuple(inner),
-        outer=tuple(outer),
-        group_class=max([own, *(group.group_class for group in floating)]),
-        order=len(outer),
-        stage=stage + 1,
-        bodies=tuple(sorted(system.links_of(body) for body in bodies)),
-        floating=floating,
-    )
-
-
-def _assemble(system: _System, rigid: int) -> tuple[AssurGroup, ...]:
-    """Return the groups that assemble bodies rigid among themselves, on the smallest of them."""
-    links = system.links_of(bits(rigid))
-    part = _System(system.graph, system.drivers, links[0], sum(1 << link for link in links))
-    part.assign()
-    return _groups(part)
 
 
 def is_assur_group(graph: MechanismGraph) -> bool:
@@ -396,21 +382,6 @@ def is_baranov_truss(graph: MechanismGraph) -> bool:
         return False
     everything = (1 << graph.links) - 1
     return all(is_sparse(graph, everything & ~(1 << link)) for link in range(graph.links))
-
-
-def _resolve(graph: MechanismGraph, frame: int, drivers: Iterable[int | tuple[int, int]]) -> tuple[Joint, ...]:
-    """Return the driven joints in the order given."""
-    by_pair = {(joint.a, joint.b): joint for joint in graph.joints}
-    found: list[Joint] = []
-    for driver in drivers:
-        pair = (frame, driver) if isinstance(driver, int) else (driver[0], driver[1])
-        joint = by_pair.get((min(pair), max(pair)))
-        if joint is None:
-            raise GraphError(f"links {pair[0]} and {pair[1]} have no joint to drive; name a joint of the graph")
-        if joint in found:
-            raise GraphError(f"joint {joint.a}-{joint.b} is driven twice")
-        found.append(joint)
-    return tuple(found)
 
 
 def _list(links: Iterable[int]) -> str:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from base64 import urlsafe_b64decode, urlsafe_b64encode
 from binascii import Error as Base64Error
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isqrt, prod
 from typing import TYPE_CHECKING
@@ -70,35 +69,29 @@ def label(graph: MechanismGraph) -> Labelling:
     colours = link_colours(graph)
     if graph.links <= _KERNEL_LINKS_MAX:
         if _labelled_without_kernel >= _GRAPHS_WORTH_THE_KERNEL:
-            return _label_compiled(graph, colours)
+            return _label(graph, colours, compiled=True)
         _labelled_without_kernel += 1
-    return _label_python(graph, colours)
+    return _label(graph, colours, compiled=False)
 
 
-def _label_python(graph: MechanismGraph, colours: list[int]) -> Labelling:
-    layers = [[0] * graph.links for _ in range(max(graph.packed[2::3], default=1))]
-    for a, b, mobility in graph.joints:
-        layers[mobility - 1][a] |= 1 << b
-        layers[mobility - 1][b] |= 1 << a
-    found = CanonicalSearch(graph.links, layers, colours, twins=graph.links > _KERNEL_LINKS_MAX).run()
-    return _labelling(found.order_of_vertices, found.generators, found.index, found.orbits)
+def _label(graph: MechanismGraph, colours: list[int], *, compiled: bool) -> Labelling:
+    if compiled:
+        import numpy as np
 
+        from graphsynth.structure.kernels import canon_packed
 
-def _label_compiled(graph: MechanismGraph, colours: list[int]) -> Labelling:
-    import numpy as np
-
-    from graphsynth.structure.kernels import canon_packed
-
-    packed = np.frombuffer(graph.packed, dtype=np.uint8)
-    lab, generators, index, orbits = canon_packed(graph.links, packed, np.array(colours, dtype=np.int64))
-    return _labelling(lab.tolist(), generators.tolist(), index.tolist(), orbits.tolist())
-
-
-def _labelling(
-    order_of_links: list[int], generators: Sequence[list[int]], index: list[int], orbits: list[int]
-) -> Labelling:
-    permutation = [0] * len(order_of_links)
-    for position, link in enumerate(order_of_links):
+        packed = np.frombuffer(graph.packed, dtype=np.uint8)
+        found = canon_packed(graph.links, packed, np.array(colours, dtype=np.int64))
+        order, generators, index, orbits = (part.tolist() for part in found)
+    else:
+        layers = [[0] * graph.links for _ in range(max(graph.packed[2::3], default=1))]
+        for a, b, mobility in graph.joints:
+            layers[mobility - 1][a] |= 1 << b
+            layers[mobility - 1][b] |= 1 << a
+        search = CanonicalSearch(graph.links, layers, colours, twins=graph.links > _KERNEL_LINKS_MAX).run()
+        order, generators, index, orbits = search.order_of_vertices, search.generators, search.index, search.orbits
+    permutation = [0] * graph.links
+    for position, link in enumerate(order):
         permutation[link] = position
     return Labelling(tuple(permutation), tuple(map(tuple, generators)), prod(index), tuple(orbits))
 
@@ -158,7 +151,19 @@ def decode_key(text: object) -> tuple[int, list[tuple[int, int, int]], int | Non
     >>> decode_key("1BAN4")
     (4, [(0, 2, 1), (0, 3, 1), (1, 2, 1), (1, 3, 1)], None, 3)
     """
-    data = _key_bytes(text)
+    if not isinstance(text, str):
+        raise FormatError(f"a key is a str, not {type(text).__name__}", "key")
+    if len(text) > 25_000:
+        raise FormatError(f"{len(text)} characters are more than the key of any graph", "key")
+    if not text.startswith(KEY_VERSION):
+        raise FormatError(f"a key of this version starts with {KEY_VERSION!r}", "key character 1")
+    body = text[1:]
+    try:
+        data = urlsafe_b64decode(body + "=" * (-len(body) % 4))
+    except (Base64Error, ValueError):
+        raise FormatError("a key is base64url text without padding", "key") from None
+    if len(data) < 2 or urlsafe_b64encode(data).decode("ascii").rstrip("=") != body:
+        raise FormatError("a key is base64url text without padding, two bytes at least", "key")
     links, flags = data[0], data[1]
     space, framed, coloured = flags & 7, flags >> 3 & 1, flags >> 4 & 1
     if not 1 <= links <= LINKS_MAX or not 2 <= space <= 6 or flags >> 5:
@@ -181,20 +186,3 @@ def decode_key(text: object) -> tuple[int, list[tuple[int, int, int]], int | Non
     places = range(size, total, 3)
     joints = [(a, b, int(stream[p : p + 3], 2) + 1) for (a, b), p in zip(pairs, places, strict=True)]
     return links, joints, 0 if framed else None, space
-
-
-def _key_bytes(text: object) -> bytes:
-    if not isinstance(text, str):
-        raise FormatError(f"a key is a str, not {type(text).__name__}", "key")
-    if len(text) > 25_000:
-        raise FormatError(f"{len(text)} characters are more than the key of any graph", "key")
-    if not text.startswith(KEY_VERSION):
-        raise FormatError(f"a key of this version starts with {KEY_VERSION!r}", "key character 1")
-    body = text[1:]
-    try:
-        data = urlsafe_b64decode(body + "=" * (-len(body) % 4))
-    except (Base64Error, ValueError):
-        raise FormatError("a key is base64url text without padding", "key") from None
-    if len(data) < 2 or urlsafe_b64encode(data).decode("ascii").rstrip("=") != body:
-        raise FormatError("a key is base64url text without padding, two bytes at least", "key")
-    return data

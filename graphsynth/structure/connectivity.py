@@ -6,6 +6,7 @@ between neighbouring levels (docs/explanation/mechanism-graph.md, section *Level
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -131,21 +132,7 @@ def girth(graph: MechanismGraph) -> int | None:
     >>> girth(MechanismGraph(5, [(0, 1), (1, 2), (2, 3), (0, 3), (3, 4)]))
     4
     """
-    shortest = min((_shortest_loop_through(graph, link) for link in range(graph.links)), default=0)
-    return None if shortest > graph.links else shortest
+    import networkx
 
-
-def _shortest_loop_through(graph: MechanismGraph, link: int) -> int:
-    """Return the length of some loop, the shortest of all if ``link`` lies on it; more than N without loops."""
-    distance = {link: 0}
-    parent = {link: link}
-    queue = [link]
-    shortest = graph.links + 1
-    for near in queue:
-        for far in bits(graph.neighbours[near]):
-            if far not in distance:
-                distance[far], parent[far] = distance[near] + 1, near
-                queue.append(far)
-            elif far != parent[near]:
-                shortest = min(shortest, distance[near] + distance[far] + 1)
-    return shortest
+    shortest = networkx.girth(graph.to_networkx())
+    return None if shortest == math.inf else int(shortest)

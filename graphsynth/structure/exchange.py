@@ -1,4 +1,4 @@
-"""What a mechanism graph is made from and turned into: checked joints, and graphs of networkx both ways.
+"""What a mechanism graph is made from: checked joints, and graphs of networkx.
 
 Whatever comes in, only FormatError goes out.
 """
@@ -7,32 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from operator import index
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from graphsynth.core.errors import FormatError
 from graphsynth.structure.text import LINKS_MAX
-
-if TYPE_CHECKING:
-    from graphsynth.structure.graph import MechanismGraph
-
-
-def to_networkx(graph: MechanismGraph) -> Any:
-    """Return a ``networkx.Graph`` with nodes 0..N-1.
-
-    Edges carry ``mobility``; the graph carries ``space`` and, if chosen, ``frame``.
-
-    >>> from graphsynth.structure.graph import MechanismGraph
-    >>> sorted(to_networkx(MechanismGraph(3, [(0, 1), (1, 2, 2)])).edges(data="mobility"))
-    [(0, 1, 1), (1, 2, 2)]
-    """
-    import networkx
-
-    view = networkx.Graph(space=graph.space)
-    if graph.frame is not None:
-        view.graph["frame"] = graph.frame
-    view.add_nodes_from(range(graph.links))
-    view.add_edges_from((a, b, {"mobility": mobility}) for a, b, mobility in graph.joints)
-    return view
 
 
 def from_networkx(graph: Any) -> tuple[int, list[tuple[int, int, Any]], Any, Any]:
@@ -50,7 +28,9 @@ def from_networkx(graph: Any) -> tuple[int, list[tuple[int, int, Any]], Any, Any
     links = len(graph)
     if not 1 <= links <= LINKS_MAX:
         raise FormatError(f"{links} nodes; a mechanism graph has 1 to {LINKS_MAX} links", "graph")
-    number = _numbering(graph)
+    number = {node: place for place, node in enumerate(graph)}
+    if all(type(node) is int and 0 <= node < links for node in graph):  # these keep their number
+        number = {node: node for node in graph}
     joints = [(number[a], number[b], data.get("mobility", 1)) for a, b, data in graph.edges(data=True)]
     frame = graph.graph.get("frame")
     if frame is not None:
@@ -59,14 +39,6 @@ def from_networkx(graph: Any) -> tuple[int, list[tuple[int, int, Any]], Any, Any
         except (KeyError, TypeError):
             raise FormatError("the graph attribute 'frame' is not a node of the graph", "frame") from None
     return links, joints, frame, graph.graph.get("space", 3)
-
-
-def _numbering(graph: Any) -> dict[Any, int]:
-    """Return the link number of each node: 0..N-1 stay, other names are numbered in their order."""
-    nodes = list(graph)
-    if all(type(node) is int and 0 <= node < len(nodes) for node in nodes):
-        return {node: node for node in nodes}
-    return {node: place for place, node in enumerate(nodes)}
 
 
 def integer(value: object, place: str, low: int, high: int, what: str) -> int:

@@ -348,10 +348,7 @@ class MechanismGraph:
         return self._lazy("girth", girth)
 
     def rigid_subchain(self) -> RigidSubchain | None:
-        """Return a report on a rigid or over-constrained sub-chain, or None if there is none (exact).
-
-        See :func:`graphsynth.structure.rigidity.find_rigid_subchain`.
-        """
+        """Return a report on a rigid or over-constrained sub-chain, or None if there is none (exact)."""
         from graphsynth.structure.rigidity import find_rigid_subchain
 
         return self._lazy("rigid_subchain", find_rigid_subchain)
@@ -412,10 +409,19 @@ class MechanismGraph:
         return picture
 
     def to_networkx(self) -> Any:
-        """Return a ``networkx.Graph``: edge attribute ``mobility``, graph attributes ``frame`` and ``space``."""
-        from graphsynth.structure.exchange import to_networkx
+        """Return a ``networkx.Graph``: edge attribute ``mobility``, graph attributes ``frame`` and ``space``.
 
-        return to_networkx(self)
+        >>> sorted(MechanismGraph(3, [(0, 1), (1, 2, 2)]).to_networkx().edges(data="mobility"))
+        [(0, 1, 1), (1, 2, 2)]
+        """
+        import networkx
+
+        view = networkx.Graph(space=self.space)
+        if self.frame is not None:
+            view.graph["frame"] = self.frame
+        view.add_nodes_from(range(self.links))
+        view.add_edges_from((a, b, {"mobility": mobility}) for a, b, mobility in self.joints)
+        return view
 
     @classmethod
     def from_networkx(cls, graph: Any) -> MechanismGraph:

@@ -198,32 +198,15 @@ def _next(n, level, on_path, left, path, parent, orbits, gens, merging, others):
 def canon(n, layers, masks, colours, lab, form, gens, index, orbits, wi, wu):
     """Label a coloured graph canonically; the arrays after ``colours`` come from ``canon_workspace(n, layers)``.
 
-    Parameters
-    ----------
-    n : int64
-        Number of vertices, 1 to 64.
-    layers : int64
-        Number of edge colours; a pair of vertices is joined in one layer at most.
-    masks : uint64[layers or more, n or more]
-        ``masks[c, v]``: the vertices joined to ``v`` by an edge of colour ``c``.
-    colours : int64[n or more]
-        Vertex colours; canonical positions run through the colours in ascending order.
-    lab : int64[n], output
-        Vertex at each canonical position.
-    form : uint64[layers, n], output
-        The canonical adjacency: two graphs with the same n, layers and sorted colours are isomorphic exactly when
-        their forms are equal.
-    gens : int64[2 n, n], output
-        Rows 0 .. (return value - 1): automorphisms (vertex to vertex) that generate the group; the rest is scratch.
-    index : int64[n], output
-        Factors of the group order, 1 beyond the path.
-    orbits : int64[n], output
-        Smallest vertex of the orbit of each vertex.
+    ``n``: number of vertices, 1 to 64; ``layers``: number of edge colours, a pair of vertices is joined in one layer at
+    most; ``masks`` uint64[layers, n]: ``masks[c, v]``, the vertices joined to ``v`` by an edge of colour ``c``;
+    ``colours`` int64[n]: of the vertices, canonical positions run through them in ascending order.
 
-    Returns
-    -------
-    int64
-        Number of generators.
+    Output: ``lab``, the vertex at each canonical position; ``form`` uint64[layers, n], the canonical adjacency: two
+    graphs with the same n, layers and sorted colours are isomorphic exactly when their forms are equal; ``gens``
+    int64[2 n, n], in the first rows automorphisms (vertex to vertex) that generate the group, the rest is scratch;
+    ``index``, factors of the group order, 1 beyond the path; ``orbits``, the smallest vertex of the orbit of each
+    vertex.  Returns the number of generators.
     """
     first_form = ROWS_U
     leaf_form = ROWS_U + layers

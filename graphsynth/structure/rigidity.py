@@ -27,29 +27,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RigidSubchain:
-    """A sub-chain that cannot move in itself (exact, by counting).
+    """A sub-chain that cannot move in itself (exact, by counting)."""
 
-    Parameters
-    ----------
-    links : tuple of int
-        A largest set of links that generically move as one body.
-    joints : tuple of Joint
-        The joints between them.
-    mobility : int
-        DOF of this set, 0 (rigid) or negative (over-constrained).
-    minimal_links, minimal_joints, minimal_mobility
-        The same for a smallest culprit inside it: every smaller set of two links or more has DOF 1 at least.
-    bodies : tuple of tuple of int
-        All sets of two links or more that generically move as one body; they do not overlap.
-    """
-
-    links: tuple[int, ...]
-    joints: tuple[Joint, ...]
-    mobility: int
+    links: tuple[int, ...]  # a largest set of links that generically move as one body
+    joints: tuple[Joint, ...]  # the joints between them
+    mobility: int  # DOF of this set, 0 (rigid) or negative (over-constrained)
+    #: the same for a smallest culprit inside it: every smaller set of two links or more has DOF 1 at least
     minimal_links: tuple[int, ...]
     minimal_joints: tuple[Joint, ...]
     minimal_mobility: int
-    bodies: tuple[tuple[int, ...], ...]
+    bodies: tuple[tuple[int, ...], ...]  # all sets of two links or more that move as one body; they do not overlap
 
     def __str__(self) -> str:
         kind = "a rigid" if self.mobility == 0 else "an over-constrained"
@@ -63,14 +50,8 @@ class RigidSubchain:
 class PebbleGame:
     """The (k, l)-pebble game on a multigraph whose edges are oriented as they are accepted.
 
-    Parameters
-    ----------
-    free : iterable of int
-        Pebbles on each vertex at the start: k, or another capacity.
-
-    Examples
-    --------
-    A triangle of double edges has 3 * 3 - 3 edges: more than 3 * 3 - 4.
+    ``free``: pebbles on each vertex at the start, k or another capacity.  A triangle of double edges has 3 * 3 - 3
+    edges: more than 3 * 3 - 4.
 
     >>> game = PebbleGame([3, 3, 3])
     >>> [game.insert(a, b, 4) for a, b in ((0, 1), (0, 1), (1, 2), (1, 2), (0, 2), (0, 2))]
@@ -122,21 +103,18 @@ class PebbleGame:
                 came_from[other] = vertex
                 if self.free[other]:
                     self.free[other] -= 1
-                    self._reverse(came_from, to, other)
                     self.free[to] += 1
+                    while other != to:  # reverse the path
+                        tail = came_from[other]
+                        edges = self.out[tail]
+                        edges[other] -= 1
+                        if not edges[other]:
+                            del edges[other]
+                        self.out[other][tail] = self.out[other].get(tail, 0) + 1
+                        other = tail
                     return True
                 stack.append(other)
         return False
-
-    def _reverse(self, came_from: dict[int, int], start: int, end: int) -> None:
-        while end != start:
-            tail = came_from[end]
-            edges = self.out[tail]
-            edges[end] -= 1
-            if not edges[end]:
-                del edges[end]
-            self.out[end][tail] = self.out[end].get(tail, 0) + 1
-            end = tail
 
 
 def first_violation(links: int, joints: Iterable[Sequence[int]], space: int, within: int = -1) -> int:
@@ -175,8 +153,6 @@ def find_rigid_subchain(graph: MechanismGraph) -> RigidSubchain | None:
     The report has the largest body (ties: with the smallest link) and a minimal culprit inside it.  Bodies are the
     components of the (Pi, Pi)-sparsity matroid: two bodies with a common link would be one, so they do not overlap.
 
-    Examples
-    --------
     >>> from graphsynth.structure.graph import MechanismGraph
     >>> print(find_rigid_subchain(MechanismGraph(4, [(0, 1), (1, 2), (0, 2), (2, 3), (3, 0)])))
     links 0, 1, 2, 3 form an over-constrained sub-chain of mobility -1; already links 0, 1, 2 have mobility 0; \
@@ -186,7 +162,11 @@ remove or free one of the joints 0-1, 0-2, 1-2
         return None
     bodies = rigid_bodies(graph.links, graph.joints, graph.space)
     body = max(bodies, key=int.bit_count)  # the first of the largest
-    culprit = _minimal(graph, first_violation(graph.links, graph.joints, graph.space, body))
+    culprit = first_violation(graph.links, graph.joints, graph.space, body)
+    for link in bits(culprit):  # until no link can be left out
+        if culprit >> link & 1:
+            smaller = first_violation(graph.links, graph.joints, graph.space, culprit & ~(1 << link))
+            culprit = smaller or culprit
     return RigidSubchain(
         *_induced(graph, body), *_induced(graph, culprit), bodies=tuple(tuple(bits(mask)) for mask in bodies)
     )
@@ -217,15 +197,6 @@ def rigid_bodies(links: int, joints: Iterable[Sequence[int]], space: int, within
     return [body for body in bodies if body.bit_count() > 1]
 
 
-def _minimal(graph: MechanismGraph, culprit: int) -> int:
-    """Shrink a violating set until no link can be left out."""
-    for link in bits(culprit):
-        if culprit >> link & 1:
-            smaller = first_violation(graph.links, graph.joints, graph.space, culprit & ~(1 << link))
-            culprit = smaller or culprit
-    return culprit
-
-
 def _induced(graph: MechanismGraph, mask: int) -> tuple[tuple[int, ...], tuple[Joint, ...], int]:
     joints = tuple(joint for joint in graph.joints if mask >> joint.a & mask >> joint.b & 1)
     links = tuple(bits(mask))
@@ -249,25 +220,14 @@ class GenericMobility:
 
     The random values are integers modulo a prime, so the rank is exact for them.  ``mobility`` is never below the
     generic value and equals it with probability at least ``1 - failure_bound`` (Schwartz-Zippel).
-
-    Parameters
-    ----------
-    mobility : int
-        Mobility found.
-    structural : int
-        Mobility by the structural formula; the difference is the number of redundant constraints.
-    sub_edges, rank, loops : int
-        Columns G, rank, and number of independent loops v of the loop matrix.
-    failure_bound : float
-        Upper bound of the probability that the rank is too small.
     """
 
     mobility: int
-    structural: int
-    sub_edges: int
+    structural: int  # by the structural formula; the difference is the number of redundant constraints
+    sub_edges: int  # columns G of the loop matrix
     rank: int
-    loops: int
-    failure_bound: float
+    loops: int  # independent loops v
+    failure_bound: float  # upper bound of the probability that the rank is too small
 
     @property
     def redundant_constraints(self) -> int:
@@ -280,27 +240,10 @@ def generic_mobility(graph: MechanismGraph, seed: int = 0) -> GenericMobility:
 
     Each joint of mobility f gets f random screws of the Pi-dimensional space: in the plane a revolute joint at a random
     point, for f = 2 a pin in a random slot.  Each independent loop gives Pi rows.  By Tay's theorem and its
-    extension to hinges [Whiteley 1988] random screws have the rank of random joints.
+    extension to hinges [Whiteley 1988] random screws have the rank of random joints.  A graph in c connected parts has
+    Pi (c - 1) freedoms more than its joints show; they are counted.  Raises `TooLargeError` for a loop matrix with more
+    than a million entries (a dense graph of more than about 60 links).
 
-    Parameters
-    ----------
-    graph : MechanismGraph
-        A graph in c connected parts has Pi (c - 1) freedoms more than its joints show; they are counted.
-    seed : int, optional
-        Seed of the random geometry.
-
-    Returns
-    -------
-    GenericMobility
-        Exact with probability at least ``1 - failure_bound``; never too small.
-
-    Raises
-    ------
-    TooLargeError
-        If the loop matrix has more than a million entries (a dense graph of more than about 60 links).
-
-    Examples
-    --------
     The triangle is rigid; the second brace of a square is redundant.
 
     >>> from graphsynth.structure.graph import MechanismGraph
@@ -332,45 +275,27 @@ def _loop_matrix(graph: MechanismGraph, seed: int) -> Any:
     """Return the loop matrix modulo the prime, shape (Pi v, G), for the fundamental loops of a spanning forest."""
     import numpy as np
 
-    space = graph.space
-    random = np.random.default_rng(seed)
-    screws = random.integers(1, _PRIME, size=(space, graph.sub_edges), dtype=np.int64)
-    columns: dict[tuple[int, int], slice] = {}
-    begin = 0
-    for a, b, mobility in graph.joints:
-        columns[a, b] = slice(begin, begin + mobility)
-        begin += mobility
-    parent, depth = _forest(graph)
-    matrix = np.zeros((space * graph.loops, graph.sub_edges), dtype=np.int64)
-    row = 0
-    for a, b, _ in graph.joints:
-        if parent[a] == b or parent[b] == a:
-            continue
-        block = matrix[row : row + space]
-        row += space
-        block[:, columns[a, b]] = screws[:, columns[a, b]]
-        while a != b:  # back from b to a along the tree
-            lower = a if depth[a] >= depth[b] else b
-            upper = parent[lower]
-            sign = 1 if (lower == b) == (lower < upper) else -1
-            where = columns[min(lower, upper), max(lower, upper)]
-            block[:, where] = sign * screws[:, where] % _PRIME
-            a, b = (upper, b) if lower == a else (a, upper)
-    return matrix
-
-
-def _forest(graph: MechanismGraph) -> tuple[list[int], list[int]]:
-    """Return parent (-1 at roots) and depth of each link in a breadth-first spanning forest."""
-    parent, depth = [-1] * graph.links, [0] * graph.links
+    size = (graph.space, graph.sub_edges)
+    screws = np.random.default_rng(seed).integers(1, _PRIME, size=size, dtype=np.int64)
+    number = {(a, b): k for k, (a, b, _) in enumerate(graph.joints)}
+    paths = np.zeros((graph.links, len(number)), np.int8)  # joints from the root of its tree to each link, by sense
+    chords = dict.fromkeys(number.values())
     for part in graph.components:
         queue = [part[0]]
         seen = 1 << part[0]
         for link in queue:
             for other in bits(graph.neighbours[link] & ~seen):
                 seen |= 1 << other
-                parent[other], depth[other] = link, depth[link] + 1
+                joint = number[min(link, other), max(link, other)]
+                paths[other] = paths[link]
+                paths[other, joint] = 1 if link < other else -1
                 queue.append(other)
-    return parent, depth
+                del chords[joint]
+    loops = np.array([paths[a] - paths[b] for a, b, _ in (graph.joints[k] for k in chords)], np.int8)
+    loops = loops.reshape(len(chords), len(number))
+    loops[range(len(chords)), list(chords)] = 1  # along the chord from a to b, back along the tree
+    signs = np.repeat(loops, [mobility for _, _, mobility in graph.joints], axis=1)
+    return (signs[:, None] * screws % _PRIME).reshape(graph.space * len(chords), graph.sub_edges)
 
 
 def _rank(matrix: Any) -> int:

@@ -119,7 +119,12 @@ class CanonicalSearch:
 
         Raises `TooLargeError` after ``WORK_MAX`` looks.
         """
-        self._root()
+        self.lab[0] = sorted(range(self.n), key=self.colours.__getitem__)
+        starts = 0
+        for place, vertex in enumerate(self.lab[0]):
+            if place == 0 or self.colours[vertex] != self.colours[self.lab[0][place - 1]]:
+                starts |= 1 << place
+        self._refine(0, starts, starts)
         level = 0
         while True:
             level = self._visit(level)
@@ -135,28 +140,17 @@ class CanonicalSearch:
                 level -= 1
             if level < 0:
                 break
-            self._child(level, vertex)
+            # make the vertex a cell of its own and refine
+            lab = self.lab[level].copy()
+            place = self.cell[level]
+            where = lab.index(vertex, place)
+            lab[place], lab[where] = lab[where], lab[place]
+            self.path[level] = vertex
+            self.lab[level + 1] = lab
+            self._refine(level + 1, self.starts[level] | 1 << place + 1, 1 << place)
             level += 1
         self.orbits = [find_root(self.orbits, v) for v in range(self.n)]
         return self
-
-    def _root(self) -> None:
-        self.lab[0] = sorted(range(self.n), key=self.colours.__getitem__)
-        starts = 0
-        for place, vertex in enumerate(self.lab[0]):
-            if place == 0 or self.colours[vertex] != self.colours[self.lab[0][place - 1]]:
-                starts |= 1 << place
-        self._refine(0, starts, starts)
-
-    def _child(self, level: int, vertex: int) -> None:
-        """Make ``vertex`` a cell of its own and refine; the node appears at ``level + 1``."""
-        lab = self.lab[level].copy()
-        place = self.cell[level]
-        where = lab.index(vertex, place)
-        lab[place], lab[where] = lab[where], lab[place]
-        self.path[level] = vertex
-        self.lab[level + 1] = lab
-        self._refine(level + 1, self.starts[level] | 1 << place + 1, 1 << place)
 
     def _refine(self, level: int, starts: int, active: int) -> None:
         """Split cells by the number of edges of each colour into active cells, until nothing splits."""

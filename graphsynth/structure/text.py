@@ -23,6 +23,7 @@ LINKS_MAX = 255
 _HEADER = ">>graph6<<"
 #: Longer than the text of the complete graph on 255 links with every joint listed by name.
 _LENGTH_MAX = 400_000
+_FIELD = re.compile(r"f(?P<frame>[0-9]{1,3})|(?P<mobility>[2-5]):(?P<joints>.+)|pi(?P<space>[2-6])")
 _JOINT = re.compile(r"([0-9]{1,3})-([0-9]{1,3})")
 
 
@@ -168,42 +169,27 @@ def decode_text(text: str | bytes) -> tuple[int, list[tuple[int, int, int]], int
     last = (0, 0)  # (kind of field, mobility): must increase from field to field
     for index, field in enumerate(fields[1:], start=2):
         place = f"field {index}"
-        kind, value, rest = _read_field(field, place)
-        if (kind, value if kind == 2 else 0) <= last:
-            raise FormatError(f"{_shown(field)} is out of order; the order is f, mobilities ascending, pi", place)
-        last = (kind, value if kind == 2 else 0)
-        if kind == 1:
-            frame = value
-        elif kind == 2:
-            _colour(mobility, value, rest, place)
-        else:
-            space = value
-    return links, [(a, b, m) for (a, b), m in mobility.items()], frame, space
-
-
-def _read_field(field: str, place: str) -> tuple[int, int, str]:
-    """Return (kind, number, rest): kind 1 a frame, 2 joints of one mobility, 3 the space."""
-    if match := re.fullmatch(r"f([0-9]{1,3})", field):
-        return 1, int(match[1]), ""
-    if match := re.fullmatch(r"([2-5]):(.+)", field):
-        return 2, int(match[1]), match[2]
-    if match := re.fullmatch(r"pi([2-6])", field):
-        return 3, int(match[1]), ""
-    raise FormatError(f"{_shown(field)} is none of f<frame>, <mobility 2 to 5>:<a>-<b>,... and pi<space 2 to 6>", place)
-
-
-def _colour(mobility: dict[tuple[int, int], int], value: int, rest: str, place: str) -> None:
-    """Set the mobility of the joints listed in ``rest``."""
-    for item in rest.split(","):
-        match = _JOINT.fullmatch(item)
+        match = _FIELD.fullmatch(field)
         if not match:
-            raise FormatError(f"{_shown(item)} is not a joint; write <link>-<link>", place)
-        pair = (min(int(match[1]), int(match[2])), max(int(match[1]), int(match[2])))
-        if pair not in mobility:
-            raise FormatError(f"{_shown(item)} is not a joint of the graph6 part", place)
-        if mobility[pair] != 1:
-            raise FormatError(f"the mobility of joint {_shown(item)} is given twice", place)
-        mobility[pair] = value
+            known = "f<frame>, <mobility 2 to 5>:<a>-<b>,... and pi<space 2 to 6>"
+            raise FormatError(f"{_shown(field)} is none of {known}", place)
+        kind = (1, 0) if match["frame"] else (2, int(match["mobility"])) if match["mobility"] else (3, 0)
+        if kind <= last:
+            raise FormatError(f"{_shown(field)} is out of order; the order is f, mobilities ascending, pi", place)
+        last = kind
+        frame = int(match["frame"]) if match["frame"] else frame
+        space = int(match["space"]) if match["space"] else space
+        for item in match["joints"].split(",") if match["joints"] else ():
+            ends = _JOINT.fullmatch(item)
+            if not ends:
+                raise FormatError(f"{_shown(item)} is not a joint; write <link>-<link>", place)
+            pair = (min(int(ends[1]), int(ends[2])), max(int(ends[1]), int(ends[2])))
+            if pair not in mobility:
+                raise FormatError(f"{_shown(item)} is not a joint of the graph6 part", place)
+            if mobility[pair] != 1:
+                raise FormatError(f"the mobility of joint {_shown(item)} is given twice", place)
+            mobility[pair] = kind[1]
+    return links, [(a, b, m) for (a, b), m in mobility.items()], frame, space
 
 
 def _shown(text: str) -> str:

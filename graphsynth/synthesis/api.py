@@ -152,10 +152,8 @@ def count_chains(
 
     Raises
     ------
-    SpecError
-        For a value out of its bounds.
     TooLargeError
-        For more loops than the shipped contracted graphs have (8), or more than 2**62 chains of one of them.
+        As for `enumerate_chains`, and for more than 2**62 chains of one contracted graph.
 
     Examples
     --------
@@ -215,11 +213,6 @@ def count_mechanisms(
     -------
     int
 
-    Raises
-    ------
-    InfeasibleSpecError, SpecError, TooLargeError
-        As for `enumerate_mechanisms`.
-
     Examples
     --------
     >>> from graphsynth import StructuralSpec
@@ -248,8 +241,8 @@ def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) 
 
     Raises
     ------
-    InfeasibleSpecError, SpecError, TooLargeError
-        As for `enumerate_mechanisms`; also for a number of draws or a seed that is none.
+    SpecError
+        For a number of draws or a seed that is none; else as for `enumerate_mechanisms`.
 
     Examples
     --------
@@ -278,11 +271,6 @@ def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | N
     -------
     iterator of MechanismGraph
 
-    Raises
-    ------
-    SpecError, TooLargeError
-        As for `enumerate_chains`.
-
     Examples
     --------
     >>> [group.to_text() for group in enumerate_assur_groups(2)]
@@ -302,11 +290,6 @@ def count_assur_groups(links: int, *, space: int = 3, executor: Executor | None 
     Returns
     -------
     int
-
-    Raises
-    ------
-    SpecError, TooLargeError
-        As for `enumerate_assur_groups`.
 
     Examples
     --------
@@ -330,11 +313,6 @@ def enumerate_baranov_trusses(links: int, *, space: int = 3, executor: Executor 
     -------
     iterator of MechanismGraph
 
-    Raises
-    ------
-    SpecError, TooLargeError
-        As for `enumerate_chains`.
-
     Examples
     --------
     >>> sum(1 for _ in enumerate_baranov_trusses(9))
@@ -354,11 +332,6 @@ def count_baranov_trusses(links: int, *, space: int = 3, executor: Executor | No
     Returns
     -------
     int
-
-    Raises
-    ------
-    SpecError, TooLargeError
-        As for `enumerate_baranov_trusses`.
 
     Examples
     --------

@@ -46,27 +46,29 @@ def decode(data: bytes) -> Layers:
 
     Raises `FormatError` if the data are not a list of contracted graphs.
     """
+    at, layers = 5, Layers()
     try:
-        return _unpacked(lzma.decompress(data))
+        raw = lzma.decompress(data)
+        if raw[:4] != _MAGIC:
+            raise FormatError(f"starts with {raw[:4]!r}, expected {_MAGIC!r}")
+        for _ in range(raw[4]):
+            k, count = raw[at], int.from_bytes(raw[at + 1 : at + 5], "little")
+            size = k * (k - 1) // 2 * count
+            upper = np.frombuffer(raw, np.uint8, size, at + 5).reshape(-1, count).T
+            at += 5 + size
+            layers[k] = _from_upper(upper, k)
     except (lzma.LZMAError, IndexError, ValueError) as error:  # ValueError: FormatError, or fewer bytes than said
         raise FormatError(f"not a list of contracted graphs ({error}): make it anew", "contracted graphs") from None
-
-
-def _unpacked(raw: bytes) -> Layers:
-    if raw[:4] != _MAGIC:
-        raise FormatError(f"starts with {raw[:4]!r}, expected {_MAGIC!r}")
-    at, layers = 5, Layers()
-    for _ in range(raw[4]):
-        k, count = raw[at], int.from_bytes(raw[at + 1 : at + 5], "little")
-        size = k * (k - 1) // 2 * count
-        upper = np.frombuffer(raw, np.uint8, size, at + 5).reshape(-1, count).T
-        at += 5 + size
-        mults = np.zeros((count, k, k), np.uint8)
-        rows, columns = np.triu_indices(k, 1)
-        mults[:, rows, columns] = upper
-        mults[:, columns, rows] = upper
-        layers[k] = mults
     return layers
+
+
+def _from_upper(upper: NDArray[np.uint8], k: int) -> NDArray[np.uint8]:
+    """Return multiplicity matrices by their upper triangles, a row each."""
+    mults = np.zeros((len(upper), k, k), np.uint8)
+    rows, columns = np.triu_indices(k, 1)
+    mults[:, rows, columns] = upper
+    mults[:, columns, rows] = upper
+    return mults
 
 
 @lru_cache(maxsize=4)
@@ -99,13 +101,6 @@ def _known() -> dict[int, Layers]:
     return {loops: dict(_layers(loops)) for loops in range(2, SHIPPED_LOOPS + 1)}
 
 
-def _made(loops: int, vertices: int) -> NDArray[np.uint8]:
-    """Graphs of few vertices with one loop more than shipped, made once in a process."""
-    found = generate(loops, vertices, _known())[loops][vertices]
-    found.setflags(write=False)
-    return found
-
-
 def contracted_graphs(loops: int, vertices: int) -> NDArray[np.uint8]:
     """Return all contracted graphs with the given numbers of loops (at least 2) and vertices.
 
@@ -120,8 +115,10 @@ def contracted_graphs(loops: int, vertices: int) -> NDArray[np.uint8]:
             f"there is no list of contracted graphs with {loops} loops (2..{SHIPPED_LOOPS} are shipped): make it with "
             f"'python -m graphsynth.synthesis.contracted {loops} FOLDER' and set {FOLDER_VARIABLE}=FOLDER"
         )
-    if not has_contracted_graphs(loops):
-        return _made(loops, vertices)
+    if not has_contracted_graphs(loops):  # few vertices with one loop more than shipped: made once in a process
+        found = generate(loops, vertices, _known())[loops][vertices]
+        found.setflags(write=False)
+        return found
     return _layers(loops).get(vertices, np.zeros((0, vertices, vertices), np.uint8))
 
 
@@ -130,14 +127,6 @@ def _unique_rows(rows: NDArray[np.uint8]) -> NDArray[np.uint8]:
     rows = np.ascontiguousarray(rows)
     keys = rows.view(np.dtype((np.void, rows.shape[1]))).ravel()
     return np.unique(keys).view(np.uint8).reshape(-1, rows.shape[1])
-
-
-def _from_codes(codes: NDArray[np.uint8], k: int) -> NDArray[np.uint8]:
-    mults = np.zeros((len(codes), k, k), np.uint8)
-    rows, columns = np.triu_indices(k, 1)
-    mults[:, rows, columns] = codes
-    mults[:, columns, rows] = codes
-    return mults
 
 
 def generate(loops: int, vertices: int | None = None, smaller: dict[int, Layers] | None = None) -> dict[int, Layers]:
@@ -169,7 +158,7 @@ def generate(loops: int, vertices: int | None = None, smaller: dict[int, Layers]
                 while parents is not None and at < len(parents):
                     at, count = split_all(k - 1, parents, at, joined, v + 1, buffer)
                     codes = _unique_rows(np.concatenate([codes, _unique_rows(buffer[:count])]))
-            layers[k] = _from_codes(codes, k)
+            layers[k] = _from_upper(codes, k)
     return found
 
 

@@ -95,20 +95,17 @@ class EdgeLabels:
         if count == 0:
             yield ()
             return
+        heaviest = self.space if self.mobility == 0 and self.whole else self.space - 1
         for i in range(first, len(self.path_types)):
             path = self.path_types[i]
             if len(path) == 1 and direct:
                 continue
             total = tuple(a + b for a, b in zip(cost, self._cost(path)))
             heavier = weight + max(0, self.space - sum(path))
-            if heavier > self._heaviest or not self._fits(total):
+            if heavier > heaviest or not self._fits(total):
                 continue
             for rest in self._multisets(count - 1, i, total, heavier, direct or len(path) == 1):
                 yield (path, *rest)
-
-    @property
-    def _heaviest(self) -> int:
-        return self.space if self.mobility == 0 and self.whole else self.space - 1
 
     def labels(self, multiplicity: int, marked: bool) -> list[EdgeLabel]:
         """List the labels of a class of the given multiplicity.
@@ -175,23 +172,9 @@ class EdgeLabels:
         }
 
     @cached_property
-    def radix(self) -> tuple[int, ...]:
-        """Step of each resource in the mixed-radix index."""
-        steps = [1]
-        for limit in self.limits[:-1]:
-            steps.append(steps[-1] * (limit + 1))
-        return tuple(steps)
-
-    @cached_property
     def resources(self) -> int:
         """Number of resource states."""
         return int(np.prod([limit + 1 for limit in self.limits]))
-
-    def _index(self, cost: tuple[int, ...]) -> int:
-        return sum(c * step for c, step in zip(cost, self.radix))
-
-    def _pack(self, cost: tuple[int, ...]) -> int:
-        return sum(c << (_DIGIT * i) for i, c in enumerate(cost))
 
     @cached_property
     def by_kind(self) -> list[list[EdgeLabel]]:
@@ -216,7 +199,16 @@ class EdgeLabels:
         """
         if any(limit > 100 for limit in self.limits) or self.resources > 50_000:
             raise TooLargeError(f"{self.resources} resource states (bound 50000): ask for fewer links or higher pairs")
-        alike = [(self.weight(own), self._index(self.cost(own)), self._pack(self.cost(own))) for own in self.flat]
+        # resources as an index (of mixed radix) and packed (eight bits a digit)
+        steps = [1]
+        for limit in self.limits[:-1]:
+            steps.append(steps[-1] * (limit + 1))
+        shifts = range(0, _DIGIT * len(steps), _DIGIT)
+        alike = []
+        for label in self.flat:
+            cost = self.cost(label)
+            packed = sum(c << shift for c, shift in zip(cost, shifts))
+            alike.append((self.weight(label), sum(c * step for c, step in zip(cost, steps)), packed))
         reverse: list[int] = []
         kinds, group_kinds = [], []
         groups: list[tuple[int, ...]] = []
@@ -232,7 +224,10 @@ class EdgeLabels:
                 found = Counter(alike[i] for i in number.values() if not own_reverse or reverse[i] == i)
                 group_kinds.append((len(groups), len(groups) + len(found)))
                 groups += [(*own, count) for own, count in sorted(found.items())]
-        packed_of, final = self._resource_states()
+        exact = len(self.limits) - (self.mobility > 1)  # freedom to lend may be left over
+        states = np.arange(self.resources)
+        digits = [states // step % (limit + 1) for step, limit in zip(steps, self.limits)]
+        packed_of = sum(digit << shift for digit, shift in zip(digits, shifts))
         labels_of = [(*own, back, label.fold()) for own, back, label in zip(alike, reverse, self.flat)]
         return Tables(
             kinds=_columns(kinds, 2),
@@ -240,20 +235,11 @@ class EdgeLabels:
             group_kinds=_columns(group_kinds, 2),
             groups=_columns(groups, 4),
             heaviest=np.array(heaviest, np.int64),
-            resources=np.array([packed_of, final], np.int64),
+            resources=np.array([packed_of, ~np.any(digits[:exact], axis=0)], np.int64),
             space=np.int64(self.space),
-            target=np.int64(self._index(self.limits)),
-            guard=np.int64(self._pack((0x80,) * len(self.limits))),
+            target=np.int64(self.resources - 1),
+            guard=np.int64(sum(0x80 << shift for shift in shifts)),
         )
-
-    def _resource_states(self) -> tuple[list[int], list[int]]:
-        exact = len(self.limits) - (self.mobility > 1)  # freedom to lend may be left over
-        packed_of, final = [], []
-        for state in range(self.resources):
-            digits = [state // step % (limit + 1) for step, limit in zip(self.radix, self.limits)]
-            packed_of.append(self._pack(tuple(digits)))
-            final.append(int(not any(digits[:exact])))
-        return packed_of, final
 
 
 def _columns(rows: Sequence[tuple[int, ...]], width: int) -> NDArray[np.int64]:

@@ -170,13 +170,6 @@ def _sequences(content: dict[int, int]) -> Iterator[tuple[int, ...]]:
             content[value] += 1
 
 
-def _is_first(sequence: tuple[int, ...], framed: bool) -> bool:
-    """Tell whether no symmetry of the ring (only the reflection that keeps the frame, if framed) makes it smaller."""
-    shifts = range(1) if framed else range(len(sequence))
-    back = sequence[::-1]
-    return all(sequence <= turned[i:] + turned[:i] for turned in (sequence, back) for i in shifts)
-
-
 def rings(links: int, mobility: int, space: int, higher: Mapping[int, int], framed: bool) -> Iterator[MechanismGraph]:
     """Yield the chains (mechanisms, if ``framed``) that are one ring of links, each once.
 
@@ -188,19 +181,18 @@ def rings(links: int, mobility: int, space: int, higher: Mapping[int, int], fram
     ['Cl f0']
     """
     lower = chain_joints(links, mobility, space, higher)
-    if lower is None:
-        return
-    content = {1: lower} | {i: count for i, count in higher.items() if i > 1}
-    if links > 2 and sum(content.values()) != links:
+    content = {1: lower or 0} | {i: count for i, count in higher.items() if i > 1}
+    if lower is None or sum(content.values()) != (links if links > 2 else 1):
         return
     from graphsynth.structure.graph import MechanismGraph
 
-    if sum(content.values()) == 1 and links == 2:
+    if links == 2:
         mobility = next(i for i, count in content.items() if count)
         yield MechanismGraph(2, [(0, 1, mobility)], frame=0 if framed else None, space=space)
-    if links < 3 or sum(content.values()) != links:
         return
+    shifts = range(1 if framed else links)
     for sequence in _sequences(content):
-        if _is_first(sequence, framed):
+        # no symmetry of the ring (only the reflection that keeps the frame, if framed) makes it smaller
+        if all(sequence <= turned[i:] + turned[:i] for turned in (sequence, sequence[::-1]) for i in shifts):
             joints = [(i, (i + 1) % links, f) for i, f in enumerate(sequence)]
             yield MechanismGraph(links, joints, frame=0 if framed else None, space=space)

@@ -93,9 +93,12 @@ class OneByOne:
             yield from rings(self.links, self.mobility, self.space, dict(self.higher), self.framed)
             return
         for chain in fractionated_chains(self.links, self.mobility, self.space, self.higher):
-            if self.framed:
-                yield from (_by_levels(graph) for graph in chain.inversions())
-            else:
+            for graph in chain.inversions() if self.framed else ():
+                place = [0] * graph.links  # the links level by level
+                for position, link in enumerate(link for level in graph.levels for link in sorted(level)):
+                    place[link] = position
+                yield graph.relabelled(place)
+            if not self.framed:
                 yield chain
 
     def _fits(self, graph: MechanismGraph) -> bool:
@@ -112,14 +115,6 @@ class OneByOne:
             low <= (len(graph.levels[at]) if -len(graph.levels) <= at < len(graph.levels) else 0) <= high
             for at, low, high in self.levels
         )
-
-
-def _by_levels(graph: MechanismGraph) -> MechanismGraph:
-    order = [link for level in graph.levels for link in sorted(level)]
-    place = [0] * graph.links
-    for position, link in enumerate(order):
-        place[link] = position
-    return graph.relabelled(place)
 
 
 @lru_cache(maxsize=512)
@@ -148,36 +143,24 @@ def _shares(higher: Higher) -> Iterator[tuple[Higher, Higher]]:
             yield own + a, other + b
 
 
-def _glue(parent: MechanismGraph, at: int, block: MechanismGraph, link: int) -> tuple[MechanismGraph, frozenset[int]]:
-    """Identify a link of the block with a link of the parent; return the chain and the new links."""
-    names = {}
-    fresh = parent.links
-    for v in range(block.links):
-        if v == link:
-            names[v] = at
-        else:
-            names[v] = fresh
-            fresh += 1
+def _glued(parent: MechanismGraph, at: int, block: MechanismGraph, link: int) -> MechanismGraph | None:
+    """Identify a link of the block with a link of the parent; None unless the block is the chain's canonical leaf."""
+    fresh = iter(range(parent.links, parent.links + block.links))
+    names = [at if v == link else next(fresh) for v in range(block.links)]
     joints = [*parent.joints, *((names[a], names[b], f) for a, b, f in block.joints)]
-    return MechanismGraph(fresh, joints, space=parent.space), frozenset(range(parent.links, fresh))
-
-
-def _leaves(graph: MechanismGraph) -> list[frozenset[int]]:
-    """List the leaf blocks, each as its links other than the cut link.
-
-    A leaf block is what falls off at a cut link and holds no other cut link.
-    """
+    graph = MechanismGraph(parent.links + block.links - 1, joints, space=parent.space)
+    own = _marked_form(graph, {name for name in names if name != at})
     everything = (1 << graph.links) - 1
     cuts = sum(1 << v for v in graph.cut_links)
-    return [
-        frozenset(bits(part))
-        for cut_link in graph.cut_links
-        for part in components_of(graph.neighbours, everything & ~(1 << cut_link))
-        if not part & cuts
-    ]
+    for cut_link in graph.cut_links:
+        for part in components_of(graph.neighbours, everything & ~(1 << cut_link)):
+            # a leaf block is what falls off at a cut link and holds no other cut link
+            if not part & cuts and _marked_form(graph, set(bits(part))) < own:
+                return None
+    return graph
 
 
-def _marked_form(graph: MechanismGraph, marked: frozenset[int]) -> tuple[object, ...]:
+def _marked_form(graph: MechanismGraph, marked: set[int]) -> tuple[bool, int, tuple[tuple[int, ...], ...]]:
     """Return a form that is equal for two sets of links exactly when an automorphism maps one to the other."""
     colours = np.array([int(v in marked) for v in range(graph.links)], np.int64)
     order = canon_packed(graph.links, np.frombuffer(graph.packed, np.uint8), colours)[0]
@@ -185,15 +168,6 @@ def _marked_form(graph: MechanismGraph, marked: frozenset[int]) -> tuple[object,
     joints = sorted((*sorted((place[a], place[b])), f) for a, b, f in graph.joints)
     # single joints first: a chain without loose ends then has parents with few of them
     return len(marked) > 1, len(marked), tuple(joints)
-
-
-def _is_canonical(graph: MechanismGraph, glued: frozenset[int]) -> bool:
-    own = _marked_form(graph, glued)
-    return all(_marked_form(graph, leaf) >= own for leaf in _leaves(graph))
-
-
-def _representatives(graph: MechanismGraph) -> list[int]:
-    return sorted({min(orbit) for orbit in graph.orbits})
 
 
 @lru_cache(maxsize=512)
@@ -208,11 +182,9 @@ def _trees(links: int, mobility: int, space: int, higher: Higher) -> tuple[Mecha
                     continue
                 for parent in _trees(links - block_links + 1, mobility - block_mobility, space, other):
                     for block in blocks:
-                        for at in _representatives(parent):
-                            for link in _representatives(block):
-                                graph, glued = _glue(parent, at, block, link)
-                                if _is_canonical(graph, glued):
-                                    found.append(graph)
+                        pairs = product(parent.orbits, block.orbits)
+                        chains = (_glued(parent, at, block, link) for (at, *_), (link, *_) in pairs)
+                        found += [graph for graph in chains if graph is not None]
     return tuple(found)
 
 

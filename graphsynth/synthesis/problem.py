@@ -79,12 +79,8 @@ class Problem:
     ) -> Problem:
         """State the enumeration of chains (of mechanisms with every frame, if ``framed``).
 
-        Raises
-        ------
-        SpecError
-            A value out of its bounds, or no mobility.
-        TooLargeError
-            More loops than there are contracted graphs.
+        Raises `SpecError` for a value out of its bounds, `TooLargeError` for more loops than there are contracted
+        graphs.
         """
         links, mobility, space, higher = chain_numbers(links, mobility, space, joints_by_mobility)
         fractionated, order = _truth(fractionated, "fractionated"), check_symmetry(symmetry)
@@ -107,12 +103,8 @@ class Problem:
     def mechanisms(cls, question: StructuralSpec | LinkAssortment, symmetry: int | None) -> Problem:
         """State the enumeration of the mechanisms that answer a structural question.
 
-        Raises
-        ------
-        SpecError
-            Not a structural question; `InfeasibleSpecError` for one without an answer.
-        TooLargeError
-            More loops than there are contracted graphs.
+        Raises `SpecError` for what is none, `InfeasibleSpecError` for one without an answer, `TooLargeError` for more
+        loops than there are contracted graphs.
         """
         from graphsynth.structure.system.assortment import LinkAssortment
         from graphsynth.structure.system.spec import StructuralSpec
@@ -154,11 +146,7 @@ class Problem:
 
     @classmethod
     def groups(cls, moving: int, space: int) -> Problem:
-        """State the enumeration of Assur groups with a number of moving links.
-
-        Raises `SpecError` for a number of links out of its bounds, `TooLargeError` for more loops than there are
-        contracted graphs.
-        """
+        """State the enumeration of Assur groups with a number of moving links; see `trusses`."""
         return cls.trusses(whole(moving, "moving links", 1, MOST_LINKS - 1) + 1, space, True)
 
     @classmethod
@@ -227,8 +215,11 @@ def extrapolated(
     >>> 1e11 < extrapolated(9, 20, 1, 3, {}) < 2e11
     True
     """
-    first = [loops - _COUNTED_LOOPS, loops - _COUNTED_LOOPS + 1, loops - _COUNTED_LOOPS + 2]
-    known = [_smaller(links - (space - 1) * fewer, mobility, space, higher, framed) for fewer in reversed(first)]
+    known = []
+    for fewer in (loops - _COUNTED_LOOPS + 2, loops - _COUNTED_LOOPS + 1, loops - _COUNTED_LOOPS):
+        left = links - (space - 1) * fewer
+        families = chain_families(left, mobility, space, higher, framed) if left > 2 else []
+        known.append(sum(chunk.count() for chunk in cut(families, listing=False)))
     if not all(known):
         factor = links if framed else 1
         known, at = [factor * n for n in _KNOWN[-3:]], SHIPPED_LOOPS
@@ -240,11 +231,6 @@ def extrapolated(
         ratio += max(growth, 0.0)
         count = min(count * ratio, 1e300)
     return count
-
-
-def _smaller(links: int, mobility: int, space: int, higher: Mapping[int, int], framed: bool) -> int:
-    families = chain_families(links, mobility, space, higher, framed) if links > 2 else []
-    return sum(chunk.count() for chunk in cut(families, listing=False))
 
 
 def check_symmetry(symmetry: int | None) -> int:

@@ -9,7 +9,6 @@ again.
 from __future__ import annotations
 
 from bisect import bisect_right
-from functools import lru_cache
 from itertools import accumulate
 from random import Random
 
@@ -18,11 +17,11 @@ import numpy as np
 from graphsynth.core.errors import InfeasibleSpecError, SpecError, TooLargeError
 from graphsynth.core.wording import whole
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.synthesis.chunks import count_each, expansion_of
+from graphsynth.synthesis.chunks import count_each, expansion_of, workspace
 from graphsynth.synthesis.families import Family
 from graphsynth.synthesis.kernels.counting import decode_fixed, fixed_table, open_fixed
 from graphsynth.synthesis.kernels.expanding import expand_packed
-from graphsynth.synthesis.kernels.layout import HEADER, Work, make_work
+from graphsynth.synthesis.kernels.layout import HEADER
 from graphsynth.synthesis.problem import Problem
 
 _PAIRS = 1 << 16
@@ -57,14 +56,9 @@ def sample(problem: Problem, k: int, seed: int) -> list[MechanismGraph]:
     return drawn
 
 
-@lru_cache(maxsize=4)
-def _work(resources: int) -> Work:
-    return make_work(resources, key_words=1 << 20)
-
-
 def _draw(family: Family, h: int, random: Random) -> MechanismGraph:
     tables = family.edge_labels.tables
-    work = _work(family.edge_labels.resources)
+    work = workspace(family.edge_labels, 1 << 20)
     mult = family.graphs[h]
     table = np.empty((_PAIRS, 5), np.int64)
     count = fixed_table(family.vertices, mult, family.frames, family.frame_degree, tables, work, table)

@@ -42,11 +42,15 @@ def shard_of(items: Sequence[WorkItem], shard: Shard | None, *, listing: bool = 
     atoms = _atoms(tuple(items), LISTING if listing else COUNTING)
     ends = np.cumsum([0, *map(len, atoms)])
     first, last = _run(np.concatenate([*atoms, np.zeros(0)]), i, m)
-    return [
-        _trimmed(item, max(first - start, 0), min(last, stop) - start, costs)
-        for item, start, stop, costs in zip(items, ends[:-1].tolist(), ends[1:].tolist(), atoms)
-        if start < last and first < stop
-    ]
+    found: list[WorkItem] = []
+    for item, start, stop, costs in zip(items, ends[:-1].tolist(), ends[1:].tolist(), atoms):
+        low, high = max(first - start, 0), min(last, stop) - start
+        if isinstance(item, Chunk) and low < high < low + len(costs):
+            share = item.weight * float(costs[low:high].sum() / costs.sum())
+            found.append(replace(item, start=item.start + low, stop=item.start + high, weight=share))
+        elif low < high:
+            found.append(item)
+    return found
 
 
 def share_of(items: Sequence[WorkItem], shard: Shard | None) -> range:
@@ -70,13 +74,6 @@ def _checked(shard: Shard) -> Shard:
         text = f"{shard[0]}/{shard[1]}" if isinstance(shard, tuple) and len(shard) == 2 else shown(shard)
         raise SpecError(f"shard {text} must be i/m with 1 <= i <= m <= 1000000")
     return i, m
-
-
-def _trimmed(item: WorkItem, start: int, stop: int, costs: Costs) -> WorkItem:
-    if not isinstance(item, Chunk) or stop - start == len(costs):
-        return item
-    share = float(costs[start:stop].sum() / costs.sum())
-    return replace(item, start=item.start + start, stop=item.start + stop, weight=item.weight * share)
 
 
 def _run(costs: Costs, i: int, m: int) -> tuple[int, int]:
@@ -141,7 +138,12 @@ def works(family: Family, share: float, purpose: int) -> Costs:
     graphs = family.graphs
     if not len(graphs):
         return bounds
-    kinds = np.unique(_features(graphs, bounds), axis=0, return_inverse=True)[1].ravel()
+    # what graphs alike have in common: the bound, triangles, triangles with a double side, squares
+    joined, double = ((graphs > least).astype(np.float32) for least in (0, 1))
+    paths = joined @ joined
+    pairs = paths * (1 - np.eye(graphs.shape[1], dtype=np.float32))
+    figures = ((paths * joined).sum((1, 2)), (paths * double).sum((1, 2)), (pairs * (pairs - 1)).sum((1, 2)))
+    kinds = np.unique(np.stack([bounds, *figures], axis=1), axis=0, return_inverse=True)[1].ravel()
     sizes = np.bincount(kinds)
     order = np.argsort(kinds, kind="stable")
     rank = np.arange(len(kinds)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
@@ -155,14 +157,3 @@ def works(family: Family, share: float, purpose: int) -> Costs:
     costs: Costs = np.rint(per_kind[kinds])  # whole numbers: sums are exact, and the same on every machine
     costs[chosen] = found
     return costs * family.links if family.framed else costs
-
-
-def _features(graphs: NDArray[np.uint8], bounds: Costs) -> Costs:
-    """Return what graphs alike have in common: the bound, triangles, triangles with a double side, squares."""
-    joined = (graphs > 0).astype(np.float32)
-    double = (graphs > 1).astype(np.float32)
-    paths = joined @ joined
-    triangles = (paths * joined).sum((1, 2))
-    doubles = (paths * double).sum((1, 2))
-    pairs = paths * (1 - np.eye(graphs.shape[1], dtype=np.float32))
-    return np.stack([bounds, triangles, doubles, (pairs * (pairs - 1)).sum((1, 2))], axis=1)

@@ -123,19 +123,16 @@ def estimated_size(
     chunks = [item for item in shard_of(problem.work_items(listing=True), shard) if isinstance(item, Chunk)]
     weight = sum(chunk.weight for chunk in chunks)
     links = max((chunk.family.links for chunk in chunks), default=1)
-    line = links * links / 12 + 24 if _form(path) == "text" else 60.0 * links  # bytes at most
+    form = _form(path)
+    line = links * links / 12 + 24 if form == "text" else 60.0 * links  # bytes at most
     if weight * line <= enough or not chunks:
         return weight, weight * line
     chosen = chunks[:: max(1, len(chunks) // _SAMPLED)]
     made = [sum(lines for _, lines in chunk.texts()) for chunk in chosen]
     some = [next(graphs([chunk], None)) for chunk, lines in zip(chosen, made) if lines]
-    size = sum(map(len, map(_json_line if _form(path) == "jsonl" else _text_line, some))) / max(len(some), 1)
+    size = sum(len(_json_line(graph)) if form == "jsonl" else len(graph.to_text()) + 1 for graph in some)
     number = weight * sum(made) / sum(chunk.weight for chunk in chosen)
-    return number, number * size
-
-
-def _text_line(graph: MechanismGraph) -> str:
-    return f"{graph.to_text()}\n"
+    return number, number * size / max(len(some), 1)
 
 
 def _form(path: Path) -> str:

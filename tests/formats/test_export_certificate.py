@@ -62,7 +62,10 @@ def test_a_reference_too_weak_to_judge_says_no(start):
 
 @pytest.mark.parametrize("make", [MujocoSettings, ExudynSettings])
 def test_without_the_engine_nothing_is_filled_in(start, make, monkeypatch):
-    monkeypatch.setattr(export_certificate, "_version", lambda engine: "")
+    def missing(engine):
+        raise export_certificate.metadata.PackageNotFoundError(engine)
+
+    monkeypatch.setattr(export_certificate.metadata, "version", missing)
     result = certify_export(g1(), start, [0.0, 1.0], [make(h) for h in STEPS])
     assert result.verdict == "not run" and all(t.status == "not run" for t in result.trials)
     assert all(math.isnan(t.error) and math.isnan(t.gap) for t in result.trials)

@@ -331,7 +331,8 @@ def test_plain_and_compiled_labels_of_a_mechanism_agree():
             space=6,
         )
         colours = canonical.link_colours(graph)
-        assert canonical._label_python(graph, colours) == canonical._label_compiled(graph, colours)
+        python, compiled = (canonical._label(graph, colours, compiled=way) for way in (False, True))
+        assert python == compiled
 
 
 def test_keys_never_change():

@@ -177,21 +177,8 @@ class LinkAssortment:
 
 
 def solutions_table(solutions: Iterable[LinkAssortment]) -> tuple[list[str], list[list[int]]]:
-    """Lay solutions out as a table of plain data.
+    """Lay solutions out as a table of plain data: header and rows, one per solution in the given order.
 
-    Parameters
-    ----------
-    solutions : iterable of LinkAssortment
-
-    Returns
-    -------
-    header : list of str
-        ``#``, the symbols W ... G, then p1 ... and n2 ... up to the largest kind that occurs.
-    rows : list of list of int
-        One per solution, in the given order.
-
-    Examples
-    --------
     >>> from graphsynth import StructuralSpec
     >>> header, rows = solutions_table(StructuralSpec(W=1, n=3).solve())
     >>> dict(zip(header, rows[0]))

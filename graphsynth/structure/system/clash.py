@@ -7,20 +7,10 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 from graphsynth.core.errors import InfeasibleSpecError
-from graphsynth.structure.system.equations import (
-    EQUATIONS,
-    NATURAL,
-    Domains,
-    Problem,
-    Row,
-    domains_of,
-    propagate,
-    rows_of,
-)
+from graphsynth.structure.system.equations import EQUATIONS, NATURAL, Problem, domains_of, propagate, rows_of
 from graphsynth.structure.system.variables import SPACES, Range, show_range
 
 _BUDGET = 400  # search nodes of one feasibility test; a test that runs out counts as "feasible": sound, not minimal
-_TRIES = 40  # values tried of a variable without an upper bound
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +37,9 @@ def explain(problem: Problem, *, default_space: bool, default_mobilities: bool) 
     items.append(_Item(f"joints of mobility {_listed(map(str, problem.mobilities), 'or')} only", "mobilities", True))
     if problem.link_limit is not None:
         items.append(_Item(f"at most {problem.link_limit} joints on a moving link", "link_limit"))
-    equations = _fewest_equations(problem)
+    # of size 0: the natural bounds alone
+    subsets = (chosen for size in range(len(EQUATIONS)) for chosen in combinations(EQUATIONS, size))
+    equations = next((chosen for chosen in subsets if not _possible(problem, chosen, NATURAL)), EQUATIONS)
     needed = list(items)
     for item in items:
         fewer = [other for other in needed if other is not item]
@@ -57,14 +49,6 @@ def explain(problem: Problem, *, default_space: bool, default_mobilities: bool) 
     if not equations and not rules:  # only a joint mobility that the space does not have leaves this trace
         rules = ["i <= Pi - 1"]
     return _sentence(needed, [*equations, *rules], default_mobilities)
-
-
-def _fewest_equations(problem: Problem) -> tuple[str, ...]:
-    for size in range(len(EQUATIONS)):  # size 0: the natural bounds alone
-        for chosen in combinations(EQUATIONS, size):
-            if not _possible(problem, chosen, NATURAL):
-                return chosen
-    return EQUATIONS
 
 
 def _only(problem: Problem, items: Iterable[_Item]) -> Problem:
@@ -82,53 +66,34 @@ def _only(problem: Problem, items: Iterable[_Item]) -> Problem:
 
 
 def _possible(problem: Problem, equations: Sequence[str], natural: Iterable[str]) -> bool:
-    """Whether some integers satisfy these equations; True also when the search gives up."""
+    """Whether some integers satisfy these equations; True also when the search gives up.
+
+    Depth first for one integer point, with propagation and a budget of nodes; the narrowest domain is divided.
+    """
     lowest, highest = problem.range("Pi")
+    natural = tuple(natural)
     for space in SPACES:
         if not (lowest or 0) <= space <= (highest or SPACES[-1]):
             continue
         rows = rows_of(problem, space, equations)
-        if _Search(problem, rows, tuple(natural)).run(domains_of(problem, space, natural)):
-            return True
+        used = sorted({name for row in rows for name, _ in row.terms})
+        waiting, nodes = [domains_of(problem, space, natural)], 0
+        while waiting:
+            domains, nodes = waiting.pop(), nodes + 1
+            if nodes > _BUDGET:
+                return True
+            if not propagate(problem, domains, rows, natural):
+                continue
+            name, least, most = "", 0, 0
+            for candidate in used:
+                lo, hi = domains[candidate]
+                if lo is not None and hi is not None and lo < hi and (not name or hi - lo < most - least):
+                    name, least, most = candidate, lo, hi
+            if not name:  # everything is fixed, or nothing bounds what is left
+                return True
+            values = range(min(most, least + _BUDGET), least - 1, -1)  # the smallest comes first
+            waiting += [{**domains, name: (value, value)} for value in values]
     return False
-
-
-class _Search:
-    """Depth-first search for one integer point, with propagation and a node budget."""
-
-    def __init__(self, problem: Problem, rows: list[Row], natural: tuple[str, ...]) -> None:
-        self.problem, self.rows, self.natural, self.nodes = problem, rows, natural, 0
-
-    def run(self, domains: Domains) -> bool:
-        self.nodes += 1
-        if self.nodes > _BUDGET:
-            return True
-        if not propagate(self.problem, domains, self.rows, self.natural):
-            return False
-        used = {name for row in self.rows for name, _ in row.terms}
-        open_names = [name for name in sorted(used) if domains[name][0] is None or domains[name][0] != domains[name][1]]
-        if not open_names:
-            return True
-        name = min(open_names, key=lambda candidate: _width(domains[candidate]))
-        values, complete = _candidates(domains[name])
-        return any(self.run({**domains, name: (value, value)}) for value in values) or not complete
-
-
-def _width(domain: Range) -> tuple[bool, int]:
-    lo, hi = domain
-    return (True, 0) if lo is None or hi is None else (False, hi - lo)
-
-
-def _candidates(domain: Range) -> tuple[list[int], bool]:
-    """Values to try, and whether they are all there are."""
-    lo, hi = domain
-    if lo is not None and hi is not None:
-        return list(range(lo, hi + 1)), True
-    if lo is not None:
-        return list(range(lo, lo + _TRIES)), False
-    if hi is not None:
-        return list(range(hi, hi - _TRIES, -1)), False
-    return sorted(range(-_TRIES, _TRIES), key=abs), False
 
 
 def _text(symbol: str, own: Range) -> str:

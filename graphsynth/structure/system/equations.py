@@ -53,9 +53,14 @@ class Problem:
         return dict(self.ranges).get(symbol, (None, None))
 
     @property
+    def kinds(self) -> dict[int, Range]:
+        """What the question says about links with a joints, by a."""
+        return {int(symbol[1:]): own for symbol, own in self.ranges if symbol[0] == "n" and symbol != "n"}
+
+    @property
     def largest_kind(self) -> int:
         """A: the largest number of joints of a link that has a variable of its own."""
-        return max([3, *(int(symbol[1:]) for symbol, _ in self.ranges if symbol[0] == "n" and symbol != "n")])
+        return max([3, *self.kinds])
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +71,6 @@ class Row:
     terms: tuple[tuple[str, int], ...]
     lowest: int | None = 0
     highest: int | None = 0
-    parents: tuple[int, ...] = ()  # of a derived row: the equations it follows from
 
 
 def rows_of(problem: Problem, space: int, equations: Collection[str] = EQUATIONS) -> list[Row]:
@@ -77,33 +81,27 @@ def rows_of(problem: Problem, space: int, equations: Collection[str] = EQUATIONS
     """
     freedoms = [(f"p{i}", i) for i in range(1, space)]
     kinds = [(f"n{a}", a) for a in range(2, problem.largest_kind + 1)]
-    one = [(name, 1) for name, _ in freedoms]
     excess = ((name, a - 2) for name, a in kinds if a > 2)
     freedom = ((name, i - space) for name, i in freedoms)
-    rows = [
-        _equation(0, [("G", 1), ("v", -space), ("W", -1)]),
-        _equation(1, [("p", -1), *one]),
-        _equation(2, [("p", 1), ("n", -1), ("v", -1)]),
-        _equation(3, [("n", -1), *((name, 1) for name, _ in kinds), ("k", 1)]),
-        _equation(4, [("v_ct", 1), ("v_P", 1), ("v", -1)]),
-        _equation(5, [("v_ct", 1), ("c", 1), ("t0", -1)]),
-        _equation(6, [("p", -2), ("t0", 1), *kinds, ("e", 1)]),
-        _equation(7, [("G", -1), *freedoms]),
-        Row(_TAIL, (("e", 1), ("k", -problem.largest_kind - 1)), 0, None),
-    ]
+    terms: tuple[tuple[tuple[str, int], ...], ...] = (
+        (("G", 1), ("v", -space), ("W", -1)),
+        (("p", -1), *((name, 1) for name, _ in freedoms)),
+        (("p", 1), ("n", -1), ("v", -1)),
+        (("n", -1), *((name, 1) for name, _ in kinds), ("k", 1)),
+        (("v_ct", 1), ("v_P", 1), ("v", -1)),
+        (("v_ct", 1), ("c", 1), ("t0", -1)),
+        (("p", -2), ("t0", 1), *kinds, ("e", 1)),
+        (("G", -1), *freedoms),
+    )
+    rows = [Row(label, own) for label, own in zip(EQUATIONS, terms) if label in equations]
+    rows.append(Row(_TAIL, (("e", 1), ("k", -problem.largest_kind - 1)), 0, None))
     if problem.link_limit is not None:
         rows.append(Row(_TAIL, (("e", -1), ("k", problem.link_limit)), 0, None))
-    rows = [row for row in rows if row.label in equations or row.label == _TAIL]
     consequences = (
-        Row("", (("n", space), ("W", -1), *freedom), parents=(0, 1, 2, 7)),
-        Row("", (("v", -2), ("t0", 1), *excess, ("e", 1), ("k", -2)), parents=(2, 3, 6)),
+        ((0, 1, 2, 7), Row("", (("n", space), ("W", -1), *freedom))),
+        ((2, 3, 6), Row("", (("v", -2), ("t0", 1), *excess, ("e", 1), ("k", -2)))),
     )
-    rows += [row for row in consequences if all(EQUATIONS[parent] in equations for parent in row.parents)]
-    return rows
-
-
-def _equation(number: int, terms: Iterable[tuple[str, int]]) -> Row:
-    return Row(EQUATIONS[number], tuple(terms))
+    return rows + [row for parents, row in consequences if all(EQUATIONS[parent] in equations for parent in parents)]
 
 
 def domains_of(problem: Problem, space: int, natural: Iterable[str] = NATURAL) -> Domains:

@@ -14,7 +14,7 @@ from math import ceil, floor
 
 from graphsynth.core.errors import SpecError
 from graphsynth.structure.system.assortment import LinkAssortment
-from graphsynth.structure.system.equations import Domains, Problem, Row, domains_of, kind_limit, propagate, rows_of
+from graphsynth.structure.system.equations import Problem, Row, domains_of, kind_limit, propagate, rows_of
 from graphsynth.structure.system.variables import LARGEST, SPACES, Counts, Range
 
 _WORDS = {"n": "n (moving links)", "p": "p (joints)", "W": "W (mobility)"}
@@ -29,15 +29,29 @@ def solutions(problem: Problem) -> Iterator[LinkAssortment]:
     >>> next(solutions(Problem((("Pi", (3, 3)), ("W", (1, 1)), ("n", (3, 3)))))).frame_joints
     2
     """
-    boxes = {space: box for space in SPACES if (box := _box(problem, space)) is not None}
-    if not boxes:
-        return
-    for mobility in range(min(box["W"][0] for box in boxes.values()), max(box["W"][1] for box in boxes.values()) + 1):
-        for space, box in boxes.items():
-            if not box["W"][0] <= mobility <= box["W"][1]:
-                continue
-            for links, joints in _sizes(problem, space, mobility, box):
-                yield from _of_size(problem, space, mobility, links, joints)
+    for mobility, space, links, joints in _sizes(problem):
+        loops = joints - links
+        sub_edges = mobility + space * loops
+        ranges = _mobility_ranges(problem, space)
+        attachments = list(_attachments(problem, mobility, links, loops))
+        largest = kind_limit(problem, loops, mobility)
+        for freedoms in compositions(joints, sub_edges, 1, space - 1, ranges):
+            for frame_joints, parts in attachments:
+                for kinds in compositions(links, 2 * joints - frame_joints, 2, largest, problem.kinds):
+                    yield LinkAssortment(
+                        mobility=mobility,
+                        space=space,
+                        moving_links=links,
+                        joints=joints,
+                        p_i=tuple(freedoms.get(i, 0) for i in range(1, space)),
+                        n_a=Counts(kinds),
+                        loops=loops,
+                        frame_loops=frame_joints - parts,
+                        moving_loops=loops - frame_joints + parts,
+                        frame_joints=frame_joints,
+                        sub_edges=sub_edges,
+                        frame_parts=parts,
+                    )
 
 
 def _box(problem: Problem, space: int) -> dict[str, tuple[int, int]] | None:
@@ -50,75 +64,44 @@ def _box(problem: Problem, space: int) -> dict[str, tuple[int, int]] | None:
         return None
     box: dict[str, tuple[int, int]] = {}
     for symbol in ("n", "p", "W"):
-        if None in domains[symbol] and not _close(problem, symbol, domains, rows):
-            return None
         lo, hi = domains[symbol]
+        if lo is None or hi is None:  # propagation did not bound it: exact linear programming
+            try:
+                most = maximum({symbol: 1}, rows, domains) if hi is None else Fraction(hi)
+                least = maximum({symbol: -1}, rows, domains) if lo is None else Fraction(-lo)
+            except ValueError:
+                return None
+            domains[symbol] = (None if least is None else ceil(-least), None if most is None else floor(most))
+            if not propagate(problem, domains, rows):
+                return None
+            lo, hi = domains[symbol]
         if lo is None or hi is None:
-            raise _open_question(symbol, domains["W"])
+            wanted = _WORDS[symbol]
+            if symbol == "p" and None in domains["W"]:
+                wanted = f"{_WORDS['W']} or {wanted}"
+            raise SpecError(
+                f"the question leaves the size open, so there may be infinitely many solutions: bound {wanted}, "
+                f"for example {symbol} = (1, 15) or a fixed value"
+            )
         box[symbol] = lo, hi
     return box
 
 
-def _close(problem: Problem, symbol: str, domains: Domains, rows: list[Row]) -> bool:
-    """Bound one variable by exact linear programming where propagation did not; False if there is no solution."""
-    lo, hi = domains[symbol]
-    try:
-        highest = maximum({symbol: 1}, rows, domains) if hi is None else Fraction(hi)
-        lowest = maximum({symbol: -1}, rows, domains) if lo is None else Fraction(-lo)
-    except ValueError:
-        return False
-    domains[symbol] = (None if lowest is None else ceil(-lowest), None if highest is None else floor(highest))
-    return propagate(problem, domains, rows)
-
-
-def _open_question(symbol: str, mobility: Range) -> SpecError:
-    open_mobility = symbol == "p" and None in mobility
-    wanted = f"{_WORDS['W']} or {_WORDS['p']}" if open_mobility else _WORDS[symbol]
-    return SpecError(
-        f"the question leaves the size open, so there may be infinitely many solutions: bound {wanted}, "
-        f"for example {symbol} = (1, 15) or a fixed value"
-    )
-
-
-def _sizes(
-    problem: Problem, space: int, mobility: int, box: Mapping[str, tuple[int, int]]
-) -> Iterator[tuple[int, int]]:
-    """Yield (n, p): W = Pi*n - sum (Pi-i)*p_i bounds p on both sides once n is known."""
-    usable = [i for i in problem.mobilities if i < space] or [1]
-    for links in range(box["n"][0], box["n"][1] + 1):
-        constraint = space * links - mobility
-        least = -(-constraint // (space - min(usable)))
-        most = constraint // (space - max(usable))
-        for joints in range(max(least, box["p"][0]), min(most, box["p"][1]) + 1):
-            yield links, joints
-
-
-def _of_size(problem: Problem, space: int, mobility: int, links: int, joints: int) -> Iterator[LinkAssortment]:
-    """Yield the solutions with W, Pi, n and p known."""
-    loops = joints - links
-    sub_edges = mobility + space * loops
-    if not (_within(problem.range("v"), loops) and _within(problem.range("G"), sub_edges)):
-        return
-    ranges = _mobility_ranges(problem, space)
-    attachments = list(_attachments(problem, mobility, links, loops))
-    largest = kind_limit(problem, loops, mobility)
-    for freedoms in compositions(joints, sub_edges, 1, space - 1, ranges):
-        for frame_joints, parts in attachments:
-            for kinds in compositions(links, 2 * joints - frame_joints, 2, largest, _kind_ranges(problem)):
-                yield LinkAssortment(
-                    mobility=mobility,
-                    space=space,
-                    moving_links=links,
-                    joints=joints,
-                    p_i=tuple(freedoms.get(i, 0) for i in range(1, space)),
-                    n_a=Counts(kinds),
-                    loops=loops,
-                    frame_loops=frame_joints - parts,
-                    moving_loops=loops - frame_joints + parts,
-                    frame_joints=frame_joints,
-                    sub_edges=sub_edges,
-                    frame_parts=parts,
-                )
+def _sizes(problem: Problem) -> Iterator[tuple[int, int, int, int]]:
+    """Yield (W, Pi, n, p) in order: W = Pi*n - sum (Pi-i)*p_i bounds p on both sides once n is known."""
+    boxes = {space: box for space in SPACES if (box := _box(problem, space)) is not None}
+    reached = [mobility for box in boxes.values() for mobility in box["W"]]
+    for mobility in range(min(reached), max(reached) + 1) if reached else ():
+        for space, box in boxes.items():
+            usable = [i for i in problem.mobilities if i < space] or [1]
+            for links in range(box["n"][0], box["n"][1] + 1) if _within(box["W"], mobility) else ():
+                constraint = space * links - mobility
+                least = -(-constraint // (space - min(usable)))
+                most = constraint // (space - max(usable))
+                for joints in range(max(least, box["p"][0]), min(most, box["p"][1]) + 1):
+                    loops = joints - links
+                    if _within(problem.range("v"), loops) and _within(problem.range("G"), mobility + space * loops):
+                        yield mobility, space, links, joints
 
 
 def number_of_solutions(problem: Problem, enough: int) -> int:
@@ -130,30 +113,20 @@ def number_of_solutions(problem: Problem, enough: int) -> int:
     >>> number_of_solutions(question, 10**6)
     93339
     """
-    boxes = {space: box for space in SPACES if (box := _box(problem, space)) is not None}
     total = 0
     for largest in (5, LARGEST):  # with links of few joints there may be enough already
         total = 0
-        for space, box in boxes.items():
-            for mobility in range(box["W"][0], box["W"][1] + 1):
-                for links, joints in _sizes(problem, space, mobility, box):
-                    total += _number_of_size(problem, space, mobility, links, joints, largest)
-                    if total > enough:
-                        return total
+        for mobility, space, links, joints in _sizes(problem):
+            loops = joints - links
+            freedoms = _counts(joints, 1, space - 1, _mobility_ranges(problem, space)).get(mobility + space * loops, 0)
+            if freedoms:
+                most = min(largest, kind_limit(problem, loops, mobility))
+                kinds = _counts(links, 2, most, problem.kinds, 2 * joints)
+                attachments = _attachments(problem, mobility, links, loops)
+                total += freedoms * sum(kinds.get(2 * joints - frame_joints, 0) for frame_joints, _ in attachments)
+                if total > enough:
+                    return total
     return total
-
-
-def _number_of_size(problem: Problem, space: int, mobility: int, links: int, joints: int, largest: int) -> int:
-    loops = joints - links
-    sub_edges = mobility + space * loops
-    if not (_within(problem.range("v"), loops) and _within(problem.range("G"), sub_edges)):
-        return 0
-    freedoms = _counts(joints, 1, space - 1, _mobility_ranges(problem, space)).get(sub_edges, 0)
-    if not freedoms:
-        return 0
-    largest = min(largest, kind_limit(problem, loops, mobility))
-    kinds = _counts(links, 2, largest, _kind_ranges(problem), 2 * joints)
-    return freedoms * sum(kinds.get(2 * joints - t0, 0) for t0, _ in _attachments(problem, mobility, links, loops))
 
 
 def _counts(
@@ -213,10 +186,6 @@ def _mobility_ranges(problem: Problem, space: int) -> dict[int, Range]:
     return {i: (lo or 0, hi if i in problem.mobilities else 0) for i, (lo, hi) in ranges.items()}
 
 
-def _kind_ranges(problem: Problem) -> dict[int, Range]:
-    return {int(symbol[1:]): own for symbol, own in problem.ranges if symbol[0] == "n" and symbol != "n"}
-
-
 def compositions(
     number: int, total: int, smallest: int, largest: int, ranges: Mapping[int, Range]
 ) -> Iterator[dict[int, int]]:
@@ -262,122 +231,76 @@ def _free_compositions(
         )
 
 
-_Terms = dict[str, Fraction]
-
-
 def maximum(objective: Mapping[str, int], rows: Iterable[Row], domains: Mapping[str, Range]) -> Fraction | None:
     """Maximise ``sum coefficient * variable`` over the rows and domains, in rational numbers.
 
     Returns the exact maximum; None if it is infinite. Raises `ValueError` if no rational point satisfies the rows.
-    Two-phase tableau simplex with Bland's rule (R. G. Bland, Math. Oper. Res. 2 (1977) 103), which cannot cycle.
+    Two-phase simplex with Bland's rule (R. G. Bland, Math. Oper. Res. 2 (1977) 103), which cannot cycle.
 
     >>> maximum({"x": 1}, [Row("", (("x", 2), ("y", 1)), None, 7)], {"x": (0, None), "y": (1, None)})
     Fraction(3, 1)
     >>> maximum({"y": 1}, [Row("", (("x", 1), ("y", -1)), 0, None)], {"x": (0, None), "y": (1, None)}) is None
     True
     """
-    listed = list(rows)
-    used = {name for row in listed for name, _ in row.terms} | set(objective)
-    limits = [(_split(dict(row.terms), domains), side, sign) for row in listed for side, sign in _sides(row)]
-    for name in used:
-        hi = domains[name][1]
-        if hi is not None:
-            limits.append((_split({name: 1}, domains), hi, 1))
-    tableau = _Tableau([_shifted(terms, side, sign, domains) for (terms, side, sign) in limits])
-    tableau.make_feasible()
-    offset = sum(
-        (Fraction(coefficient * (domains[name][0] or 0)) for name, coefficient in objective.items()), Fraction(0)
-    )
-    best = tableau.maximise(_split(dict(objective), domains))
-    return None if best is None else best + offset
-
-
-def _sides(row: Row) -> list[tuple[int, int]]:
-    sides = [] if row.highest is None else [(row.highest, 1)]
-    return sides if row.lowest is None else [*sides, (row.lowest, -1)]
-
-
-def _split(terms: Mapping[str, int], domains: Mapping[str, Range]) -> _Terms:
-    """Write a variable without lower bound as a difference of two non-negative ones."""
-    split: _Terms = {}
-    for name, coefficient in terms.items():
-        split[name] = Fraction(coefficient)
-        if domains[name][0] is None:
-            split[name + "-"] = Fraction(-coefficient)
-    return split
-
-
-def _shifted(terms: _Terms, side: int, sign: int, domains: Mapping[str, Range]) -> tuple[_Terms, Fraction]:
-    """Return (terms, bound) of ``terms <= bound`` in variables measured from their lower bounds."""
-    shift = sum((own * (domains[name][0] or 0) for name, own in terms.items() if name in domains), Fraction(0))
-    return {name: sign * own for name, own in terms.items()}, sign * (side - shift)
-
-
-class _Tableau:
-    """Dictionary form: each basic variable = constant + sum coefficient * non-basic variable, all >= 0."""
-
-    def __init__(self, limits: list[tuple[_Terms, Fraction]]) -> None:
-        self.basic: dict[str, _Terms] = {}
-        self.constant: dict[str, Fraction] = {}
-        for number, (terms, bound) in enumerate(limits):
-            slack = f"~{number}"
-            self.basic[slack] = {name: -own for name, own in terms.items()}
-            self.constant[slack] = bound
-
-    def make_feasible(self) -> None:
-        """Phase one: minimise one artificial variable."""
-        if min(self.constant.values(), default=Fraction(0)) >= 0:
-            return
-        for terms in self.basic.values():
-            terms["!"] = Fraction(1)
-        self._pivot("!", min(self.constant, key=lambda name: (self.constant[name], name)))
-        best = self.maximise({"!": Fraction(-1)})
-        if best is None or best < 0:
+    limits = [
+        ({name: sign * own for name, own in row.terms}, sign * side)
+        for row in rows
+        for side, sign in ((row.highest, 1), (row.lowest, -1))
+        if side is not None
+    ]
+    used = sorted({name for terms, _ in limits for name in terms} | set(objective))
+    limits += [({name: 1}, hi) for name in used if (hi := domains[name][1]) is not None]
+    # a variable without lower bound is a difference of two, the others are measured from their lower bounds
+    columns = [(name, sign) for name in used for sign in ((1, -1) if domains[name][0] is None else (1,))]
+    table: list[list[Fraction]] = []  # basic variable + sum coefficient * free variable = last entry
+    for terms, side in [*limits, ({name: -own for name, own in objective.items()}, 0)]:
+        side -= sum(own * (domains[name][0] or 0) for name, own in terms.items())
+        table.append([Fraction(sign * terms.get(name, 0)) for name, sign in columns] + [Fraction(side)])
+    free = list(range(len(columns)))
+    basic = list(range(len(columns), len(columns) + len(limits)))
+    lowest = min(range(len(limits)), key=lambda row: table[row][-1], default=-1)
+    if limits and table[lowest][-1] < 0:  # phase one: minimise an artificial variable, number -1
+        free.append(-1)
+        for line in table:
+            line.insert(-1, Fraction(-1 if line is not table[-1] else 0))
+        table.append([Fraction(0)] * len(columns) + [Fraction(1), Fraction(0)])
+        _pivot(table, basic, free, lowest, len(columns))
+        _climb(table, basic, free)
+        if table.pop()[-1] < 0:
             raise ValueError("no rational point satisfies the rows")
-        if "!" in self.basic:
-            entering = next(name for name, own in sorted(self.basic["!"].items()) if own)
-            self._pivot(entering, "!")
-        for terms in self.basic.values():
-            terms.pop("!", None)
+        if -1 in basic:
+            row = basic.index(-1)
+            _pivot(table, basic, free, row, next(column for column, own in enumerate(table[row]) if own))
+        column = free.index(-1)
+        del free[column]
+        for line in table:
+            del line[column]
+    return table[-1][-1] if _climb(table, basic, free) else None
 
-    def maximise(self, objective: _Terms) -> Fraction | None:
-        while True:
-            cost, value = self._reduced(objective)
-            entering = min((name for name, own in cost.items() if own > 0), default=None)
-            if entering is None:
-                return value
-            ratios = [
-                (-self.constant[name] / terms[entering], name)
-                for name, terms in self.basic.items()
-                if terms.get(entering, 0) < 0
-            ]
-            if not ratios:
-                return None
-            self._pivot(entering, min(ratios)[1])
 
-    def _reduced(self, objective: _Terms) -> tuple[_Terms, Fraction]:
-        """Write the objective in terms of the non-basic variables."""
-        cost: _Terms = {}
-        value = Fraction(0)
-        for name, own in objective.items():
-            if name in self.basic:
-                value += own * self.constant[name]
-                for other, inner in self.basic[name].items():
-                    cost[other] = cost.get(other, Fraction(0)) + own * inner
-            else:
-                cost[name] = cost.get(name, Fraction(0)) + own
-        return cost, value
+def _climb(table: list[list[Fraction]], basic: list[int], free: list[int]) -> bool:
+    """Exchange variables until the last line, the objective, can grow no more; False if nothing bounds it."""
+    while rising := [(label, column) for column, label in enumerate(free) if table[-1][column] < 0]:
+        column = min(rising)[1]
+        ratios = [
+            (line[-1] / line[column], label, row)
+            for row, (label, line) in enumerate(zip(basic, table))
+            if line[column] > 0
+        ]
+        if not ratios:
+            return False
+        _pivot(table, basic, free, min(ratios)[2], column)
+    return True
 
-    def _pivot(self, entering: str, leaving: str) -> None:
-        terms, constant = self.basic.pop(leaving), self.constant.pop(leaving)
-        factor = terms.pop(entering)
-        solved = {name: -own / factor for name, own in terms.items() if own}
-        solved[leaving] = 1 / factor
-        constant = -constant / factor
-        for name, others in self.basic.items():
-            own = others.pop(entering, None)
-            if own:
-                self.constant[name] += own * constant
-                for other, inner in solved.items():
-                    others[other] = others.get(other, Fraction(0)) + own * inner
-        self.basic[entering], self.constant[entering] = solved, constant
+
+def _pivot(table: list[list[Fraction]], basic: list[int], free: list[int], row: int, column: int) -> None:
+    """Exchange a basic variable and a free one."""
+    basic[row], free[column] = free[column], basic[row]
+    pivot = table[row][column]
+    solved = [own / pivot for own in table[row]]
+    solved[column] = 1 / pivot
+    for line in table:
+        factor, line[column] = line[column], Fraction(0)
+        if factor:
+            line[:] = [own - factor * other for own, other in zip(line, solved)]
+    table[row][:] = solved

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from graphsynth.core.errors import FormatError, SpecError, TooLargeError
+from graphsynth.core.textfiles import read_bytes, text_of, toml_tables
 from graphsynth.core.wording import shown, whole
-from graphsynth.structure.system import reading
+from graphsynth.structure.system import variables
 from graphsynth.structure.system.assortment import LinkAssortment
 from graphsynth.structure.system.clash import explain
 from graphsynth.structure.system.equations import Problem
 from graphsynth.structure.system.solving import number_of_solutions, solutions
-from graphsynth.structure.system.variables import SPACES, Range, order_key, show_range
+from graphsynth.structure.system.variables import ALIASES, FAMILIES, SPACES, Range, show_range
 
 #: Kinds of moving links in a question of the source's form: its system reads n = n_2 + n_3 + n_4.
 SOURCE_LINK_JOINTS = 4
@@ -94,8 +96,10 @@ class StructuralSpec:
     _levels: tuple[tuple[int, Range], ...]
 
     def __init__(self, **question: Any) -> None:
-        ranges, options, levels = reading.read_question(question)
-        object.__setattr__(self, "_ranges", tuple(sorted(ranges.items(), key=lambda item: order_key(item[0]))))
+        ranges, options, levels = variables.read_question(question)
+        object.__setattr__(
+            self, "_ranges", tuple(sorted(ranges.items(), key=lambda item: variables.order_key(item[0])))
+        )
         object.__setattr__(self, "_options", tuple(sorted(options.items())))
         object.__setattr__(self, "_levels", tuple(sorted(levels.items())))
 
@@ -112,7 +116,7 @@ class StructuralSpec:
         FormatError
             For anything wrong, with ``place`` and the key.
         """
-        return cls(**reading.plain_question(mapping, place, cls))
+        return cls(**variables.plain_question(mapping, place, cls))
 
     @classmethod
     def from_toml(cls, path: str | Path) -> StructuralSpec:
@@ -125,7 +129,9 @@ class StructuralSpec:
         """
         if not isinstance(path, str | PathLike):
             raise FormatError(f"{shown(path)} is not the path of a file", "path")
-        return cls.from_mapping(reading.load_toml(Path(path)), str(path))
+        place = str(path)
+        text = text_of(read_bytes(Path(path), what="a structural question"), place)
+        return cls.from_mapping(toml_tables(text, place), place)
 
     @classmethod
     def from_assignments(cls, assignments: Iterable[str]) -> StructuralSpec:
@@ -136,11 +142,19 @@ class StructuralSpec:
         SpecError
             For an assignment that is not ``name=value``, and whatever the constructor refuses.
         """
-        return cls(**reading.assigned_question(assignments))
+        return cls(**variables.assigned_question(assignments))
 
     def replace(self, **changes: Any) -> StructuralSpec:
         """Return a new question with some variables or options replaced; None frees one."""
-        return StructuralSpec(**reading.changed_question(self.as_dict(), changes))
+        kept = self.as_dict()
+        for name in changes:
+            symbol = ALIASES.get(name, name)
+            if symbol in FAMILIES:
+                letter = FAMILIES[symbol]
+                kept = {key: own for key, own in kept.items() if not (key[0] == letter and key[1:].isdigit())}
+            else:
+                kept.pop("n" if symbol == "N" else symbol, None)
+        return StructuralSpec(**{**kept, **changes})
 
     # ---- reading it ------------------------------------------------------------------------------------------
 
@@ -152,7 +166,7 @@ class StructuralSpec:
         >>> StructuralSpec(links=8, n4=(0, 2)).bounds("moving_links"), StructuralSpec(W=1).bounds("Pi")
         ((7, 7), (3, 3))
         """
-        symbol = reading.symbol_of(name)
+        symbol = variables.symbol_of(name)
         lo, hi = dict(self._ranges).get("n" if symbol == "N" else symbol, (3, 3) if symbol == "Pi" else (None, None))
         if symbol == "N":
             return None if lo is None else lo + 1, None if hi is None else hi + 1
@@ -285,32 +299,29 @@ class StructuralSpec:
         if stated is not None or not self.is_source_form:
             return [None]
         mentioned = [int(s[1:]) for s, (_, hi) in self._ranges if s[0] == "n" and s != "n" and hi != 0]
-        return [*range(max([SOURCE_LINK_JOINTS, *mentioned]), self._widest_kind() + 1), None]
-
-    def _widest_kind(self) -> int:
-        """Return a bound on v + W for a question that fixes two of n, p, v."""
-        known = {symbol: self.fixed(symbol) for symbol in ("n", "p", "v", "W")}
-        n, p, v = known["n"], known["p"], known["v"]
+        n, p, v, mobility = map(self.fixed, ("n", "p", "v", "W"))
         loops = v if v is not None else (p or 0) - (n or 0)
-        return max(2, loops + max(1, known["W"] or 1))
+        widest = max(2, loops + max(1, mobility or 1))  # a bound on v + W, two of n, p, v being fixed
+        return [*range(max([SOURCE_LINK_JOINTS, *mentioned]), widest + 1), None]
 
     # ---- showing it ------------------------------------------------------------------------------------------
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data by symbol: integers, pairs, options; ``StructuralSpec(**spec.as_dict()) == spec``."""
-        plain: dict[str, Any] = {
-            symbol: lo if lo is not None and lo == hi else (lo, hi) for symbol, (lo, hi) in self._ranges
-        }
-        plain.update(self._options)
+        plain: dict[str, Any] = {symbol: _plain(own) for symbol, own in self._ranges} | dict(self._options)
         if self._levels:
-            plain["levels"] = {
-                level: lo if lo is not None and lo == hi else (lo, hi) for level, (lo, hi) in self._levels
-            }
+            plain["levels"] = {level: _plain(own) for level, own in self._levels}
         return plain
 
     def to_toml(self) -> str:
         """Write the question as TOML text that :meth:`from_toml` reads back to an equal question."""
-        return reading.toml_of(self._ranges, self._options, self._levels)
+        lines = [f"{symbol} = {_toml_range(own)}" for symbol, own in self._ranges]
+        for name, value in self._options:
+            text = {True: "true", "all": '"all"'}.get(value) if isinstance(value, (bool, str)) else str(value)
+            lines.append(f"{name} = {text}")
+        if self._levels:
+            lines += ["", "[levels]", *(f'"{level}" = {_toml_range(own)}' for level, own in self._levels)]
+        return "\n".join(lines) + "\n" if lines else ""
 
     def describe(self) -> str:
         """Say in one line per point what is asked, with the defaults that apply.
@@ -343,12 +354,10 @@ class StructuralSpec:
         raise AttributeError("StructuralSpec is frozen; use replace()")
 
     def __getattr__(self, name: str) -> int | tuple[int | None, int | None] | None:
-        if name.startswith("_") or not reading.is_single(name):
+        if name.startswith("_") or not variables.is_single(name):
             raise AttributeError(f"'StructuralSpec' object has no attribute {name!r}")
-        lo, hi = self.bounds(name)
-        if lo is None and hi is None:
-            return None
-        return lo if lo == hi else (lo, hi)
+        own = self.bounds(name)
+        return None if own == (None, None) else _plain(own)
 
     def _state(self) -> tuple[object, ...]:
         return self._ranges, self._options, self._levels
@@ -359,12 +368,19 @@ class StructuralSpec:
     def __hash__(self) -> int:
         return hash(self._state())
 
-    def __reduce__(self) -> tuple[Any, tuple[dict[str, Any]]]:
-        return _rebuild, (self.as_dict(),)
+    def __reduce__(self) -> tuple[Any, tuple[()]]:
+        return partial(StructuralSpec, **self.as_dict()), ()
 
     def __repr__(self) -> str:
         return f"StructuralSpec({', '.join(f'{name}={value!r}' for name, value in self.as_dict().items())})"
 
 
-def _rebuild(question: dict[str, Any]) -> StructuralSpec:
-    return StructuralSpec(**question)
+def _plain(own: Range) -> int | Range:
+    return own[0] if own[0] is not None and own[0] == own[1] else own
+
+
+def _toml_range(own: Range) -> str:
+    lo, hi = own
+    if lo is None or hi is None:
+        return f'"{show_range(own)}"'
+    return str(lo) if lo == hi else f"[{lo}, {hi}]"
