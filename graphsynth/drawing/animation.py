@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.bodies import bodies
-from graphsynth.drawing.canvas import figure_of
 from graphsynth.drawing.diagram import mechanism_sketch
+from graphsynth.drawing.export import figure_of
 from graphsynth.drawing.frames import Frames, frames_of, shown_coordinate
 from graphsynth.drawing.moving import Moving
 from graphsynth.drawing.pages import policy

@@ -1,7 +1,7 @@
 """A drawing under construction: symbols of kinematic diagrams put together from shapes, without third-party packages.
 
 A :class:`Sketch` collects shapes in the units of the mechanism (y upwards).  Symbols and line widths keep their size on
-the page whatever the units.  `Sketch.svg` writes one self-contained ``<svg>``; `graphsynth.drawing.canvas` draws the
+the page whatever the units.  `Sketch.svg` writes one self-contained ``<svg>``; `graphsynth.drawing.export` draws the
 same list of shapes through matplotlib.
 
 Symbols (ISO 3952): a turning pair is an open circle; a pair on the frame stands on a triangle with hatching; a link

@@ -280,16 +280,7 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
     """
     settings = MujocoSettings() if settings is None else settings
     check_settings(settings, MujocoSettings)
-    check_common(model, start, "MuJoCo")
-    for link, body in model.bodies.items():
-        if min(body.mass, body.inertia) <= _LEAST:
-            raise GeometryError(
-                f"mass = {body.mass:g} kg and inertia = {body.inertia:g} kg m^2 of link {link}: MuJoCo takes none "
-                f"below {_LEAST:g}; change the units, or leave out what hardly weighs"
-            )
-    if model.prescribed:
-        pair = model.prescribed[0].pair
-        raise GeometryError(f"prescribed motion of joint {pair[0]}-{pair[1]}: MuJoCo has none; use exudyn or a torque")
+    _check(model, start)
     work = Work(model, start, spanning_tree(model.mechanism))
     root = ET.Element("mujoco", model="graphsynth")
     add(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
@@ -326,6 +317,19 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
         start,
         settings,
     )
+
+
+def _check(model: DynamicModel, start: StartReport) -> None:
+    check_common(model, start, "MuJoCo")
+    for link, body in model.bodies.items():
+        if min(body.mass, body.inertia) <= _LEAST:
+            raise GeometryError(
+                f"mass = {body.mass:g} kg and inertia = {body.inertia:g} kg m^2 of link {link}: MuJoCo takes none "
+                f"below {_LEAST:g}; change the units, or leave out what hardly weighs"
+            )
+    if model.prescribed:
+        pair = model.prescribed[0].pair
+        raise GeometryError(f"prescribed motion of joint {pair[0]}-{pair[1]}: MuJoCo has none; use exudyn or a torque")
 
 
 def _options(root: ET.Element, model: DynamicModel, settings: MujocoSettings) -> None:

@@ -6,7 +6,6 @@ between neighbouring levels (docs/explanation/mechanism-graph.md, section *Level
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -132,7 +131,16 @@ def girth(graph: MechanismGraph) -> int | None:
     >>> girth(MechanismGraph(5, [(0, 1), (1, 2), (2, 3), (0, 3), (3, 4)]))
     4
     """
-    import networkx
-
-    shortest = networkx.girth(graph.to_networkx())
-    return None if shortest == math.inf else int(shortest)
+    shortest = graph.links + 1
+    for link in range(graph.links):  # breadth first: finds the shortest loop if the link lies on it
+        distance = {link: 0}
+        parent = {link: link}
+        queue = [link]
+        for near in queue:
+            for far in bits(graph.neighbours[near]):
+                if far not in distance:
+                    distance[far], parent[far] = distance[near] + 1, near
+                    queue.append(far)
+                elif far != parent[near]:
+                    shortest = min(shortest, distance[near] + distance[far] + 1)
+    return None if shortest > graph.links else shortest

@@ -10,8 +10,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from graphsynth.core.errors import FormatError, GraphError
 from graphsynth.core.shown import work
 from graphsynth.structure.connectivity import bits, breadth_first, component_of, components_of
-from graphsynth.structure.exchange import integer, packed_joints
-from graphsynth.structure.text import LINKS_MAX, decode_graph6, decode_text, encode_graph6, encode_text
+from graphsynth.structure.text import (
+    LINKS_MAX,
+    decode_graph6,
+    decode_text,
+    encode_graph6,
+    encode_text,
+    from_networkx,
+    integer,
+    packed_joints,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -435,8 +443,6 @@ class MechanismGraph:
         FormatError
             For anything else, with the node or edge.
         """
-        from graphsynth.structure.exchange import from_networkx
-
         links, joints, frame, space = from_networkx(graph)
         return cls(links, joints, frame=frame, space=space)
 

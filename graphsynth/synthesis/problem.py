@@ -252,9 +252,7 @@ def check_symmetry(symmetry: int | None) -> int:
 
 
 def _truth(value: object, name: str) -> bool:
-    if value is True or value is False:
-        return value
-    if type(value).__name__ in ("bool", "bool_"):  # of numpy
+    if type(value).__name__ in ("bool", "bool_"):  # of numpy too
         return bool(value)
     raise SpecError(f"{name} = {shown(value)} must be True or False")
 

@@ -15,8 +15,8 @@ from hypothesis import example, given, strategies as st
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.bodies import hull, outline, rounded, thickness
-from graphsynth.drawing.canvas import figure_of
 from graphsynth.drawing.diagram import draw_mechanism, mechanism_sketch, mechanism_svg
+from graphsynth.drawing.export import figure_of
 from graphsynth.drawing.palette import DARK, LIGHT
 from graphsynth.drawing.shapes import Circle, Path, Text, placement
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute

@@ -76,7 +76,7 @@ def test_svg_pictures_load_no_matplotlib() -> None:
     code = (
         "import sys, graphsynth.drawing.animation, graphsynth.drawing.graphs\n"
         "import graphsynth.systems.lambda_linkage.pictures\n"
-        "import graphsynth.drawing.motion_charts, graphsynth.drawing.animation, graphsynth.drawing.canvas\n"
+        "import graphsynth.drawing.motion_charts, graphsynth.drawing.animation, graphsynth.drawing.export\n"
         "import graphsynth.drawing.graphs\n"
         "heavy = {'matplotlib', 'PIL', 'pandas', 'networkx', 'sympy', 'scipy', 'mpmath', 'numba'} & set(sys.modules)\n"
         "assert not heavy, heavy"

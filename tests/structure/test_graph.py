@@ -7,8 +7,8 @@ import networkx as nx
 import pytest
 
 from graphsynth.core.errors import FormatError, GraphError
-from graphsynth.structure.exchange import integer
 from graphsynth.structure.graph import Joint, MechanismGraph
+from graphsynth.structure.text import integer
 
 FOUR_BAR = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (3, 0)], frame=0)
 WATT = MechanismGraph(6, [(0, 1), (1, 2), (2, 3), (3, 0), (3, 4), (4, 5), (5, 2)])

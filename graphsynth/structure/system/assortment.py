@@ -153,21 +153,9 @@ class LinkAssortment:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data by symbol, ready for JSON."""
-        return {
-            "W": self.mobility,
-            "Pi": self.space,
-            "n": self.moving_links,
-            "N": self.links,
-            "p": self.joints,
-            "p_i": list(self.p_i),
-            "n_a": {str(a): number for a, number in self.n_a.items()},
-            "v": self.loops,
-            "v_ct": self.frame_loops,
-            "v_P": self.moving_loops,
-            "t0": self.frame_joints,
-            "G": self.sub_edges,
-            "c": self.frame_parts,
-        }
+        symbols = ("W", "Pi", "n", "N", "p", "p_i", "n_a", "v", "v_ct", "v_P", "t0", "G")
+        families = {"p_i": list(self.p_i), "n_a": {str(a): number for a, number in self.n_a.items()}}
+        return {symbol: getattr(self, symbol) for symbol in symbols} | families | {"c": self.frame_parts}
 
     def __str__(self) -> str:
         links = " ".join(f"n{a}={number}" for a, number in self.n_a.items())

@@ -13,8 +13,7 @@ from graphsynth.core.textfiles import read_bytes, text_of, toml_tables
 from graphsynth.core.wording import shown, whole
 from graphsynth.structure.system import variables
 from graphsynth.structure.system.assortment import LinkAssortment
-from graphsynth.structure.system.clash import explain
-from graphsynth.structure.system.equations import Problem
+from graphsynth.structure.system.equations import Problem, explain
 from graphsynth.structure.system.solving import number_of_solutions, solutions
 from graphsynth.structure.system.variables import ALIASES, FAMILIES, SPACES, Range, show_range
 
