@@ -13,7 +13,7 @@ from graphsynth.atlas.tables import INDEXES
 from graphsynth.core.errors import GraphsynthError
 
 if TYPE_CHECKING:
-    from graphsynth.atlas.facts import GroupRow, Rows
+    from graphsynth.atlas.facts import Rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +54,8 @@ class Writer:
 
     def __init__(self, connection: sqlite3.Connection) -> None:
         self.connection = connection
-        self._contracted: dict[str, int] = {}
-        self._groups: dict[str, int] = {}
-        self._structures: dict[str, int] = {}
+        self._known: dict[tuple[str, str], int] = {}  # numbers by table and name
+        self._planar: dict[str, int] = {}  # by edges
 
     def write(self, family_id: int, mobility: int, piece: int, rows: Rows) -> None:
         """Write a piece, inside a transaction.
@@ -67,15 +66,14 @@ class Writer:
         if execute("SELECT 1 FROM pieces WHERE (family_id, piece) = (?, ?)", (family_id, piece)).fetchone():
             raise GraphsynthError("another process writes this catalogue: wait for it, or name another file")
         start = execute("SELECT COALESCE(MAX(chain_id), 0) + 1 FROM chains").fetchone()[0]
-        contracted = [self.of_contracted(*shape) for shape in rows.contracted]
+        shapes = [self._of_contracted(*shape) for shape in rows.contracted]
         structures = self._of_structures(rows)
         many = self.connection.executemany
         many(
             "INSERT INTO chains VALUES (?, ?, ?, NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
             (
-                (at, family_id, *own[:2], mobility, *own[2:9], planar, *own[9:11], shape)
+                (at, family_id, *own[:2], mobility, *own[2:9], shapes[own[11]][1], *own[9:11], shapes[own[11]][0])
                 for at, own in enumerate(rows.chains, start)
-                for shape, planar in (contracted[own[11]],)
             ),
         )
         many("INSERT INTO dyads VALUES (?, ?)", ((start + at, parent) for at, parent in rows.dyads))
@@ -86,56 +84,41 @@ class Writer:
         )
         execute("INSERT INTO pieces VALUES (?, ?, ?, ?)", (family_id, piece, start, len(rows.chains)))
 
-    def of_contracted(self, vertices: int, edges: str) -> tuple[int, int]:
-        """Return (number, whether it is planar) of a contracted graph; the chain is planar exactly when it is."""
-        planar = int(_planar(edges)) if edges not in self._contracted else 0
-        number = self._number(
-            "contracted",
-            "contracted_id",
-            self._contracted,
-            edges,
-            {"vertices": vertices, "edges": edges, "planar": planar},
-        )
-        row = self.connection.execute("SELECT planar FROM contracted WHERE contracted_id = ?", (number,)).fetchone()
-        return number, int(row[0])
+    def _of_contracted(self, vertices: int, edges: str) -> tuple[int, int]:
+        """Return (number, whether it is planar) of a contracted graph, of which the chain is a subdivision."""
+        import networkx
 
-    def of_group(self, group: GroupRow) -> int:
-        """Return the number of a group."""
-        values = {"key": group.key, "links": group.links, '"order"': group.order, "class": group.group_class}
-        return self._number("groups", "group_id", self._groups, group.key, values)
+        if edges not in self._planar:
+            pairs = [edge.partition("x")[0].split("-") for edge in edges.split()]
+            self._planar[edges] = int(networkx.check_planarity(networkx.Graph(pairs))[0])
+        values = {"edges": edges, "vertices": vertices, "planar": self._planar[edges]}
+        return self._number("contracted", "contracted_id", values), self._planar[edges]
 
     def _of_structures(self, rows: Rows) -> list[int]:
-        found = []
+        numbers, groups = [], list(rows.groups)
         for own in rows.structures:
-            groups = [rows.groups[at] for at in own]
-            text = " ".join(str(self.of_group(group)) for group in groups)
-            values = {
-                "groups": text,
-                "class": max((group.group_class for group in groups), default=1),
-                '"order"': max((group.order for group in groups), default=0),
-            }
-            found.append(self._number("structures", "structure_id", self._structures, text, values))
-        return found
+            members = [groups[at] for at in own]
+            names = []
+            for group in members:
+                values = {"key": group.key, "links": group.links, '"order"': group.order, "class": group.group_class}
+                names.append(str(self._number("groups", "group_id", values)))
+            highest = max((group.group_class for group in members), default=1)
+            order = max((group.order for group in members), default=0)
+            structure = {"groups": " ".join(names), "class": highest, '"order"': order}
+            numbers.append(self._number("structures", "structure_id", structure))
+        return numbers
 
-    def _number(self, table: str, column: str, known: dict[str, int], name: str, values: dict[str, Any]) -> int:
-        """Return the number of a row, written if it is new."""
-        if name not in known:
-            unique = {"contracted": "edges", "groups": "key", "structures": "groups"}[table]
+    def _number(self, table: str, column: str, values: dict[str, Any]) -> int:
+        """Return the number of a row, which is written if it is new; its first value names it."""
+        unique, name = next(iter(values.items()))
+        if (table, name) not in self._known:
             row = self.connection.execute(f"SELECT {column} FROM {table} WHERE {unique} = ?", (name,)).fetchone()
             if row is None:
                 marks = ", ".join("?" * len(values))
                 text = f"INSERT INTO {table} ({', '.join(values)}) VALUES ({marks}) RETURNING {column}"
                 row = self.connection.execute(text, tuple(values.values())).fetchone()
-            known[name] = int(row[0])
-        return known[name]
-
-
-def _planar(edges: str) -> bool:
-    """Whether a contracted graph is planar: a chain is a subdivision of it, which changes nothing."""
-    import networkx
-
-    pairs = [edge.partition("x")[0].split("-") for edge in edges.split()]
-    return bool(networkx.check_planarity(networkx.Graph(pairs))[0])
+            self._known[table, name] = int(row[0])
+        return self._known[table, name]
 
 
 def open_family(

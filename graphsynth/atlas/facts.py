@@ -37,19 +37,19 @@ class Rows:
     """Rows of some chains for the store, without the numbers that only the store can give."""
 
     #: ``(key, graph6, links, joints, loops, assortment, automorphisms, link_orbits, inversions, girth, fractionated,
-    #: contracted)``; ``contracted`` is an index into the next list
+    #: contracted)``; ``contracted`` is a place in the next
     chains: list[tuple[Any, ...]] = field(default_factory=list)
-    contracted: list[tuple[int, str]] = field(default_factory=list)  # list of (vertices, edges)
+    contracted: dict[tuple[int, str], int] = field(default_factory=dict)  # (vertices, edges) to their place
     #: list of (chain, key of the parent): chains as indices into ``chains``, here and below
     dyads: list[tuple[int, str]] = field(default_factory=list)
     #: list of (chain, frame, joints of the frame, levels)
     inversions: list[tuple[int, int, int, str]] = field(default_factory=list)
     #: list of (chain, frame, driver, structure): ``driver`` is a link, or text such as ``'1,3'`` for several;
-    #: ``structure`` an index into the next list
+    #: ``structure`` a place in the next
     mechanisms: list[tuple[int, int, int | str, int]] = field(default_factory=list)
-    #: groups in the order of assembly, as indices into ``groups``
-    structures: list[tuple[int, ...]] = field(default_factory=list)
-    groups: list[GroupRow] = field(default_factory=list)
+    #: groups in the order of assembly, as places in ``groups``
+    structures: dict[tuple[int, ...], int] = field(default_factory=dict)
+    groups: dict[GroupRow, int] = field(default_factory=dict)
 
 
 def _stream(links: int) -> int:
@@ -63,7 +63,7 @@ def analyse_block(links: int, mobility: int, packed: Bytes) -> Block:
     ``packed`` uint8, shape (chains, 3 joints): joints ``a, b, 1``, as the enumerator packs them. Raises
     `TooLargeError` for more links than the kernels are laid out for.
     """
-    from graphsynth.atlas.kernels.facts import MOST_LINKS, WORDS, Block, analyse
+    from graphsynth.atlas.kernels.facts import FORM, MOST_LINKS, Block, analyse
 
     if links > MOST_LINKS:
         raise TooLargeError(f"a catalogue holds chains of at most {MOST_LINKS} links, not {links}: count or list them")
@@ -85,7 +85,7 @@ def analyse_block(links: int, mobility: int, packed: Bytes) -> Block:
         drives=np.zeros((chains, room), np.uint64),
         sizes=np.zeros((chains, room, half), np.uint8),
         outers=np.zeros((chains, room, half), np.uint8),
-        forms=np.zeros((chains, room, half, WORDS), np.uint64),
+        forms=np.zeros((chains, room, half, FORM), np.uint8),
         parents=np.zeros((chains, half, _stream(links) + 1), np.uint8),
         contracted=np.zeros((chains, 1 + links * links), np.uint8),
     )
@@ -96,15 +96,16 @@ def analyse_block(links: int, mobility: int, packed: Bytes) -> Block:
 def rows_of(block: Block, rows: Rows) -> None:
     """Append the rows of a block; what is in ``rows`` already keeps its place."""
     start = len(rows.chains)
-    contracted = _contracted(block, rows)
-    rows.chains += [(*fact, shape) for fact, shape in zip(zip(*_columns(block)), contracted)]
+    rows.chains += zip(*_columns(block), _contracted(block, rows))
     for c, orbit in enumerate(block.orbit.tolist()):
-        own = sorted(set(orbit))
         levels = block.levels[c].tolist()
-        rows.inversions += [
-            (start + c, frame, levels[frame][1], "-".join(str(size) for size in levels[frame] if size)) for frame in own
-        ]
-    _dyads(block, start, rows)
+        for frame in sorted(set(orbit)):
+            sizes = "-".join(str(size) for size in levels[frame] if size)
+            rows.inversions.append((start + c, frame, levels[frame][1], sizes))
+    n = block.orbit.shape[1]
+    chains, places = np.nonzero(block.parents[:, :, 0])
+    streams = _lines(block.parents[chains, places, 1 : 1 + _stream(n - 2)]) if len(chains) else []
+    rows.dyads += sorted({(start + c, _key(n - 2, stream)) for c, stream in zip(chains.tolist(), streams)})
     _mechanisms(block, start, rows)
 
 
@@ -156,19 +157,13 @@ def _orbits(orbit: list[int]) -> str:
 
 
 def _contracted(block: Block, rows: Rows) -> list[int]:
-    """Index of the contracted graph of every chain, in the order of first appearance."""
-    place = {shape: at for at, shape in enumerate(rows.contracted)}
+    """Place of the contracted graph of every chain, in the order of first appearance."""
     known: dict[bytes, int] = {}
-    found = []
-    for line in _lines(block.contracted):
-        if line not in known:
-            vertices = line[0]
-            shape = vertices, edges_text(vertices, line[1 : 1 + vertices * vertices])
-            known[line] = place.setdefault(shape, len(place))
-            if known[line] == len(rows.contracted):
-                rows.contracted.append(shape)
-        found.append(known[line])
-    return found
+    lines = _lines(block.contracted)
+    for line in dict.fromkeys(lines):
+        shape = line[0], edges_text(line[0], line[1:])
+        known[line] = rows.contracted.setdefault(shape, len(rows.contracted))
+    return [known[line] for line in lines]
 
 
 def edges_text(vertices: int, matrix: bytes) -> str:
@@ -177,108 +172,52 @@ def edges_text(vertices: int, matrix: bytes) -> str:
     >>> edges_text(2, bytes([0, 3, 3, 0]))
     '0-1x3'
     """
-    found = []
-    for p in range(vertices):
-        for q in range(p, vertices):
-            times = matrix[p * vertices + q]
-            if times:
-                found.append(f"{p}-{q}" + (f"x{times}" if times > 1 else ""))
-    return " ".join(found)
-
-
-def _dyads(block: Block, start: int, rows: Rows) -> None:
-    n = block.orbit.shape[1]
-    own = _stream(n - 2)
-    chains, places = np.nonzero(block.parents[:, :, 0])
-    streams = _lines(block.parents[chains, places, 1 : 1 + own]) if len(chains) else []
-    rows.dyads += sorted({(start + c, _key(n - 2, stream)) for c, stream in zip(chains.tolist(), streams)})
+    places = [(p, q, matrix[p * vertices + q]) for p in range(vertices) for q in range(p, vertices)]
+    return " ".join(f"{p}-{q}" + (f"x{times}" if times > 1 else "") for p, q, times in places if times)
 
 
 def _mechanisms(block: Block, start: int, rows: Rows) -> None:
     """Append mechanisms, and the structures and groups they are the first to have."""
+    from graphsynth.structure.connectivity import bits
+
     filled = np.arange(block.frames.shape[1]) < block.mechanisms[:, None]
     chains = np.nonzero(filled)[0]
     if not len(chains):
         return
-    frames, drives = block.frames[filled].tolist(), block.drives[filled]
-    sizes, forms = block.sizes[filled], block.forms[filled]
     # a mechanism is described by the sizes and forms of its groups: distinct descriptions, numbered by appearance
-    whole = np.zeros((*sizes.shape, 1 + forms.shape[2]), np.uint64)
-    whole[:, :, 0] = sizes
-    whole[:, :, 1:] = np.where(sizes[:, :, None] > 0, forms, np.uint64(0))
-    _, first, which = np.unique(_as_words(whole.reshape(len(whole), -1)), return_index=True, return_inverse=True)
+    sizes, outers, forms = block.sizes[filled], block.outers[filled], block.forms[filled]
+    whole = np.concatenate([sizes[:, :, None], np.where(sizes[:, :, None] > 0, forms, np.uint8(0))], axis=2)
+    lines = np.frombuffer(whole.tobytes(), np.dtype((np.void, whole[0].size)))  # compared whole
+    _, first, which = np.unique(lines, return_index=True, return_inverse=True)
     order = np.argsort(first)
     place = np.empty(len(order), np.int64)
-    place[order] = _structures(block, rows, np.nonzero(filled), first[order])
-    rows.mechanisms += zip(
-        (start + chains).tolist(), frames, _drivers(drives), place[which.ravel()].tolist(), strict=True
-    )
-
-
-def _as_words(array: NDArray[np.uint64]) -> NDArray[np.void]:
-    """Rows of an array as one item each, so that they can be compared whole."""
-    return np.ascontiguousarray(array).view(np.dtype((np.void, array.shape[1] * array.itemsize))).ravel()
-
-
-def _drivers(drives: NDArray[np.uint64]) -> list[int | str]:
-    """Driven links of each mechanism: a number, or text for several."""
-    from graphsynth.structure.connectivity import bits
-
-    names: dict[int, int | str] = {}
-    for mask in np.unique(drives).tolist():
+    place[order] = _structures(sizes[first[order]], outers[first[order]], forms[first[order]], rows)
+    names: dict[int, int | str] = {}  # of driven links: a number, or text for several
+    drives = block.drives[filled].tolist()
+    for mask in set(drives):
         links = bits(mask)
         names[mask] = links[0] if len(links) == 1 else ",".join(map(str, links))
-    return [names[mask] for mask in drives.tolist()]
+    drivers, structures = (names[mask] for mask in drives), place[which.ravel()].tolist()
+    frames = block.frames[filled].tolist()
+    rows.mechanisms += zip((start + chains).tolist(), frames, drivers, structures, strict=True)
 
 
-def _structures(block: Block, rows: Rows, where: tuple[NDArray[Any], ...], wanted: NDArray[np.int64]) -> list[int]:
-    """Index in ``rows.structures`` of the mechanisms ``wanted``, appended where they are new."""
-    at = where[0][wanted], where[1][wanted]
-    sizes, outers, forms = block.sizes[at], block.outers[at], block.forms[at]
-    lists = []
-    for size, outer, form in zip(sizes.tolist(), outers.tolist(), forms.tolist()):
-        lists.append(
-            [
-                (links, sum(word << 64 * at for at, word in enumerate(words)), order)
-                for links, order, words in zip(size, outer, form)
-                if links
-            ]
-        )
-    known = _groups(rows, dict.fromkeys(group for groups in lists for group in groups))
-    place = {groups: number for number, groups in enumerate(rows.structures)}
-    found = []
-    for groups in lists:
-        own = tuple(known[group] for group in groups)
-        number = place.setdefault(own, len(place))
-        if number == len(rows.structures):
-            rows.structures.append(own)
-        found.append(number)
-    return found
+def _structures(sizes: Bytes, outers: Bytes, forms: Bytes, rows: Rows) -> list[int]:
+    """Place in ``rows.structures`` of each list of groups, added where it is new, as its groups are."""
+    from graphsynth.atlas.kernels.facts import classes_of
 
-
-def _groups(rows: Rows, forms: Iterable[tuple[int, int, int]]) -> dict[tuple[int, int, int], int]:
-    """Index in ``rows.groups`` of groups ``(links, form, order)``, appended where they are new."""
-    from graphsynth.atlas.kernels.facts import WORDS, classes_of
-
-    forms = list(forms)
-    words = np.array(
-        [[bits >> 64 * at & (1 << 64) - 1 for at in range(WORDS)] for _, bits, _ in forms], np.uint64
-    ).reshape(-1, WORDS)
-    classes = np.zeros(len(forms), np.int64)
-    classes_of(np.array([links + 1 for links, _, _ in forms], np.int64), words, classes)
-    place = {group.key: number for number, group in enumerate(rows.groups)}
-    found = {}
-    for (links, bits, order), own in zip(forms, classes.tolist()):
-        row = GroupRow(_group_key(links, bits), links, order, own)
-        number = found[links, bits, order] = place.setdefault(row.key, len(place))
-        if number == len(rows.groups):
-            rows.groups.append(row)
-    return found
-
-
-def _group_key(links: int, form: int) -> str:
-    """Key of a group from its canonical form: the same bits, the first in the highest place of a byte."""
-    size = (links + 1) * links // 2
-    width = -(-size // 8) * 8
-    stream = int(f"{form:0{size}b}"[::-1].ljust(width, "0"), 2).to_bytes(width // 8, "big")
-    return _key(links + 1, stream, _FRAMED)
+    lists = [
+        [(links, order, bytes(form)) for links, order, form in zip(*groups) if links]
+        for groups in zip(sizes.tolist(), outers.tolist(), forms, strict=True)
+    ]
+    known = dict.fromkeys(group for groups in lists for group in groups)
+    classes = np.zeros(len(known), np.int64)
+    vertices = np.array([links + 1 for links, _, _ in known], np.int64)
+    streams = np.frombuffer(b"".join(form for _, _, form in known), np.uint8).reshape(-1, forms.shape[2])
+    classes_of(vertices, streams, classes)
+    numbers: dict[tuple[int, int, bytes], int] = {}
+    for (links, order, form), own in zip(known, classes.tolist(), strict=True):
+        row = GroupRow(_key(links + 1, form[: _stream(links + 1)], _FRAMED), links, order, own)
+        numbers[links, order, form] = rows.groups.setdefault(row, len(rows.groups))
+    places = (tuple(numbers[group] for group in groups) for groups in lists)
+    return [rows.structures.setdefault(own, len(rows.structures)) for own in places]

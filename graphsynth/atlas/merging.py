@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from graphsynth.atlas.building import build_family, finish_family, open_family, transaction
 from graphsynth.atlas.facts import GroupRow, Rows
@@ -197,9 +196,9 @@ def _read(shard: sqlite3.Connection, first: int, count: int) -> Rows:
         (first, last),
     ):
         if number not in contracted:
-            contracted[number] = len(contracted)
             select = "SELECT vertices, edges FROM contracted WHERE contracted_id = ?"
-            rows.contracted.append(shard.execute(select, (number,)).fetchone())
+            shape = shard.execute(select, (number,)).fetchone()
+            contracted[number] = rows.contracted.setdefault(shape, len(rows.contracted))
         rows.chains.append((*chain, contracted[number]))
     span = first, first, last
     rows.dyads = shard.execute(
@@ -208,27 +207,20 @@ def _read(shard: sqlite3.Connection, first: int, count: int) -> Rows:
     rows.inversions = shard.execute(
         "SELECT chain_id - ?, frame, frame_joints, levels FROM inversions WHERE chain_id BETWEEN ? AND ?", span
     ).fetchall()
-    structures: dict[int, int] = {}
-    groups: dict[int, int] = {}
-    for chain, frame, driver, number in shard.execute(
-        "SELECT chain_id - ?, frame, driver, structure_id FROM driven WHERE chain_id BETWEEN ? AND ?", span
+    structures: dict[str, int] = {}
+    groups: dict[str, int] = {}
+    for chain, frame, driver, text in shard.execute(
+        "SELECT chain_id - ?, frame, driver, groups FROM driven JOIN structures USING (structure_id) "
+        "WHERE chain_id BETWEEN ? AND ? ORDER BY chain_id, frame, driver",
+        span,
     ):
-        if number not in structures:
-            structures[number] = len(structures)
-            rows.structures.append(_structure(shard, number, groups, rows))
-        rows.mechanisms.append((chain, frame, driver, structures[number]))
+        if text not in structures:
+            for group in text.split():
+                if group not in groups:
+                    select = 'SELECT key, links, "order", class FROM groups WHERE group_id = ?'
+                    row = GroupRow(*shard.execute(select, (int(group),)).fetchone())
+                    groups[group] = rows.groups.setdefault(row, len(rows.groups))
+            structure = tuple(groups[group] for group in text.split())
+            structures[text] = rows.structures.setdefault(structure, len(rows.structures))
+        rows.mechanisms.append((chain, frame, driver, structures[text]))
     return rows
-
-
-def _structure(shard: sqlite3.Connection, number: int, known: dict[int, int], rows: Rows) -> tuple[int, ...]:
-    text: str = shard.execute("SELECT groups FROM structures WHERE structure_id = ?", (number,)).fetchone()[0]
-    found = []
-    for group in map(int, text.split()):
-        if group not in known:
-            known[group] = len(known)
-            values: tuple[Any, ...] = shard.execute(
-                'SELECT key, links, "order", class FROM groups WHERE group_id = ?', (group,)
-            ).fetchone()
-            rows.groups.append(GroupRow(*values))
-        found.append(known[group])
-    return tuple(found)

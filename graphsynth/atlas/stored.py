@@ -70,8 +70,6 @@ def fingerprint(mechanism: dict[str, Any]) -> str:
     mechanism : dict
         As :meth:`graphsynth.Mechanism.to_json` writes it.
 
-    Examples
-    --------
     >>> fingerprint({"a": 1.0, "b": 2}) == fingerprint({"b": 2, "a": 1.0}) != fingerprint({"a": 1.5, "b": 2})
     True
     """

@@ -35,8 +35,6 @@ TURN = tuple(range(0, 361, 45))
 def unit_in(label: str) -> Unit:
     """Return the unit in the brackets of a label; a plain number if there are none.
 
-    Examples
-    --------
     >>> unit_in("inertia [kg mm²]").from_si(2e-6)
     2.0
     """
@@ -47,8 +45,6 @@ def unit_in(label: str) -> Unit:
 def shown(value: object, column: str) -> str:
     """Return a cell as text: an SI number in the unit of its column, anything else as it is; nothing for None.
 
-    Examples
-    --------
     >>> shown(0.25, "height [mm]"), shown(-1e-17, "tilt [°] | 9 .3f"), shown(True, "agree"), shown(3, "sets")
     ('250', '0.000', 'yes', '3')
     """
@@ -73,8 +69,6 @@ def table(
 ) -> Table:
     """Lay out SI values under the columns.
 
-    Examples
-    --------
     >>> table("Poses", ("crank [°] | .4g", "pose"), [(0.5, "open")]).rows
     (('28.65', 'open'),)
     """
@@ -85,8 +79,6 @@ def table(
 def quantity_table(title: str, quantities: Iterable[Quantity], note: str = "", *findings: Finding) -> Table:
     """Lay out quantities, each with its guarantee and how far it may be off.
 
-    Examples
-    --------
     >>> quantity_table("Motion", [Quantity("speed", 2.0, "rad/s", "estimated", 1e-9)]).rows
     (('speed', '2 rad/s', 'estimated', '1e-09 rad/s'),)
     """
@@ -118,15 +110,8 @@ def chart(
     across, up = unit_in(x), unit_in(y)
     drawn = [replace(n, x=across.from_si(np.asarray(n.x)), y=up.from_si(np.asarray(n.y))) for n in lines]
     bands = [replace(band, start=across.from_si(band.start), stop=across.from_si(band.stop)) for band in bands]
-    svg = line_plot(
-        drawn,
-        x,
-        y,
-        levels=[replace(level, y=up.from_si(level.y)) for level in levels],
-        bands=bands,
-        **options,
-    )
-    return Picture(title, svg, caption, place)
+    levels = [replace(level, y=up.from_si(level.y)) for level in levels]
+    return Picture(title, line_plot(drawn, x, y, levels=levels, bands=bands, **options), caption, place)
 
 
 def balance_rows(run: DriveRun) -> tuple[tuple[str, str], ...]:
@@ -134,13 +119,14 @@ def balance_rows(run: DriveRun) -> tuple[tuple[str, str], ...]:
     names = ("angle", "speed", *(f"current {k}" for k in range(1, run.currents.shape[1] + 1)))
     units = ("rad", "rad/s", *("A",) * run.currents.shape[1])
     errors = ", ".join(f"{name} {value:.1e} {unit}" for name, value, unit in zip(names, run.error, units))
-    warned = run.complete and not (run.energy_error <= 1e-9 and run.electric_error <= 1e-9)
+    balanced = run.energy_error <= 1e-9 and run.electric_error <= 1e-9
+    warning = "" if balanced or not run.complete else " (WARNING)"
     return (
         ("status", run.reason or "reached the last output time"),
         ("model", run.model),
         ("estimated error", f"{errors} (second run at a hundred times the tolerance)"),
-        ("energy balance, mechanical", f"{run.energy_error:.1e} of the energy moved{' (WARNING)' if warned else ''}"),
-        ("energy balance, electrical", f"{run.electric_error:.1e} of the energy moved{' (WARNING)' if warned else ''}"),
+        ("energy balance, mechanical", f"{run.energy_error:.1e} of the energy moved{warning}"),
+        ("energy balance, electrical", f"{run.electric_error:.1e} of the energy moved{warning}"),
         ("steps, rejected", f"{run.steps}, {run.rejected} at tolerance {run.rtol:g}"),
         ("time of the run", f"{run.seconds * 1e3:.1f} ms, measured once"),
         *(("note", note) for note in run.notes),
@@ -150,10 +136,8 @@ def balance_rows(run: DriveRun) -> tuple[tuple[str, str], ...]:
 def work_table(found: Problem) -> Table:
     """Error against run time where the settings are tolerances."""
     columns = ("method", "tolerance | .0e", "error | .1e", "time [ms] | .2f", "steps or calls | .0f", "status")
-    rows = []
-    for row in found.rows:
-        error = None if math.isnan(row.error) else row.error
-        rows.append((row.method, row.value, error, row.seconds, row.more["steps or calls"], row.reason or "done"))
+    costs = ((None if math.isnan(r.error) else r.error, r.seconds, r.more["steps or calls"]) for r in found.rows)
+    rows = ((row.method, row.value, *cost, row.reason or "done") for row, cost in zip(found.rows, costs))
     return table("Error against run time", columns, rows, found.note)
 
 
@@ -174,10 +158,8 @@ def shown_motion(mechanism: Any, inputs: Any, poses: Any, *, closed: bool) -> Mo
 
     from graphsynth.kinematics.engine.result import Closure, Motion
 
-    missing = np.full_like(poses, np.nan)
-    count = len(inputs)
-    closure = Closure(closed, closed, 0.0 if closed else math.nan, 1 if closed else 0, (), "closed form")
-    branches, margins = np.zeros((count, 0), np.int8), np.zeros((count, 0))
+    missing, none = np.full_like(poses, np.nan), np.zeros((len(inputs), 0))
+    closure = Closure(closed, closed, 0.0 if closed else math.nan, int(closed), (), "closed form")
     known = np.isfinite(poses).all(axis=(1, 2))
-    motion = partial(Motion, mechanism, inputs, poses, missing, missing, branches, margins, known)
+    motion = partial(Motion, mechanism, inputs, poses, missing, missing, none.astype(np.int8), none, known)
     return motion((), (), True, "", math.nan, closure, math.nan, 0.0)

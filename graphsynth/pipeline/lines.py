@@ -24,8 +24,6 @@ def key_lines(text: str) -> dict[_Path, int]:
 
     Items of lists are keyed by their index as a string.  On a text that is not TOML, what was found up to the error.
 
-    Examples
-    --------
     >>> key_lines('[a]\nb = [\n  1, {c = 2}]\n')
     {('a',): 1, ('a', 'b'): 2, ('a', 'b', '0'): 3, ('a', 'b', '1'): 3, ('a', 'b', '1', 'c'): 3}
     """

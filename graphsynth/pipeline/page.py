@@ -125,18 +125,19 @@ def report_html(report: Report) -> str:
     scene, products = report.scene, report.products
     found = sentences(report)
     first = next((k for k, item in enumerate(found) if item.good is None), 0) or len(found)
-    galleries = {name: value for name, value in products.items() if name != "graph_pictures" and _are_pictures(value)}
-    order = [*_HEADINGS, *sorted(galleries)]
+    galleries = {name: own for name, own in products.items() if isinstance(own, tuple) and own}
+    names = [name for name, own in galleries.items() if all(isinstance(item, Picture) for item in own)]
+    order = [*_HEADINGS, *sorted(set(names) - {*_HEADINGS, "graph_pictures"})]
     records = products.get("records", ())
     candidates = [(str(r.number), r.solution, r.status, r.verdict or r.reason, r.key) for r in records]
-    body = template(_PAGE, tone=_tone, numeric=_is_number).render(
+    body = template(_PAGE, tone={None: "", True: "good", False: "bad"}.get, numeric=_is_number).render(
         scene=scene,
         notes=report.notes,
         first=found[:first],
         then=found[first:],
         facts=facts(report),
         description=scene.scene.description.strip().split("\n\n"),
-        galleries=[(_heading(name), galleries[name]) for name in sorted(galleries, key=order.index)],
+        galleries=[(_HEADINGS.get(n, n.replace("_", " ").capitalize()), galleries[n]) for n in order if n in names],
         tables=summary_tables(report),
         graphs=products.get("graph_pictures", ()),
         candidates=candidates if any(r.key for r in records) else (),
@@ -145,17 +146,5 @@ def report_html(report: Report) -> str:
     return whole_page(scene.scene.title, _CSS + _PICTURES, body)
 
 
-def _tone(good: bool | None) -> str:
-    return "" if good is None else "good" if good else "bad"
-
-
 def _is_number(text: str) -> bool:
     return len(text) < 40 and text[:1] in tuple("0123456789-+")
-
-
-def _heading(name: str) -> str:
-    return _HEADINGS.get(name, name.replace("_", " ").capitalize())
-
-
-def _are_pictures(value: object) -> bool:
-    return isinstance(value, tuple) and bool(value) and all(isinstance(item, Picture) for item in value)

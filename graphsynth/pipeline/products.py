@@ -4,33 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.pipeline.units import Unit
 
-T = TypeVar("T")
-R = TypeVar("R")
 Guarantee = Literal["exact", "certified", "estimated"]
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A mechanism graph that answers the structural question.
+    """A mechanism graph that answers the structural question."""
 
-    Attributes
-    ----------
-    number : int
-        From 1, in the order of generation.
-    graph : MechanismGraph
-        With its frame.
-    solution : str
-        The integer solution it belongs to, for example ``n2=6 n3=7 n4=1``.
-    """
-
-    number: int
-    graph: Any
-    solution: str = ""
+    number: int  # from 1, in the order of generation
+    graph: Any  # `MechanismGraph` with its frame
+    solution: str = ""  # the integer solution it belongs to, for example ``n2=6 n3=7 n4=1``
 
     @property
     def key(self) -> str:
@@ -41,12 +29,8 @@ class Candidate:
 class Rejected(Exception):  # noqa: N818  # not an error: a candidate that does not meet a goal
     """Raised by a stage for each candidate: this one does not meet a goal, and later stages need not look at it.
 
-    Parameters
-    ----------
-    cause : str
-        The reason in words that are the same for all candidates it holds for; causes are counted.
-    detail : str, optional
-        What holds for this candidate only, as in ``"transmission angle 12.3 deg, at least 30 deg is asked"``.
+    ``cause`` is the reason in words that are the same for all candidates it holds for, since causes are counted;
+    ``detail`` holds for this candidate only, as in ``"transmission angle 12.3 deg, at least 30 deg is asked"``.
     """
 
     def __init__(self, cause: str, detail: str = "") -> None:
@@ -56,30 +40,19 @@ class Rejected(Exception):  # noqa: N818  # not an error: a candidate that does 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of one candidate in the stages for each candidate.
+    """What became of one candidate in the stages for each candidate: through all, stopped by a goal, or failed.
 
-    Attributes
-    ----------
-    number : int
-        From 1, in the order of the stream.
-    key, solution : str
-        Of the candidate, if it has them.
-    status : {"assessed", "rejected", "failed"}
-        Through all stages; or stopped by a goal; or by an exception.
-    stage, cause, reason : str
-        Where it was stopped, why in countable words, and why in full.
-    products : Mapping
-        What later stages and the report need of it: text, numbers, booleans, None, tuples, dictionaries with text
-        keys, and the frozen dataclasses of this module.
+    ``products`` is what later stages and the report need of it: text, numbers, booleans, None, tuples, dictionaries
+    with text keys, and the frozen dataclasses of this module.
     """
 
-    number: int
+    number: int  # from 1, in the order of the stream
     key: str = ""
     solution: str = ""
     status: Literal["assessed", "rejected", "failed"] = "assessed"
-    stage: str = ""
-    cause: str = ""
-    reason: str = ""
+    stage: str = ""  # where it was stopped
+    cause: str = ""  # why, in countable words
+    reason: str = ""  # why, in full
     products: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -96,19 +69,14 @@ class Recognised:
 class Quantity:
     """A number with its unit, its guarantee and how far it may be off.
 
-    Attributes
-    ----------
-    guarantee : {"exact", "certified", "estimated"}
-        ``exact``: no rounding, or a closed form evaluated in floating point with the rounding error in `error`.
-    error : float or None
-        Bound (exact, certified) or estimate (estimated) of the absolute error, in `unit`; None if unknown.
+    ``exact``: no rounding, or a closed form evaluated in floating point with the rounding error in ``error``.
     """
 
     name: str
     value: float
     unit: str = ""
     guarantee: Guarantee = "estimated"
-    error: float | None = None
+    error: float | None = None  # in ``unit``: bound (exact, certified) or estimate of the absolute error; None: unknown
 
     @classmethod
     def of_si(
@@ -116,8 +84,6 @@ class Quantity:
     ) -> Quantity:
         """Return the quantity of an SI value and its SI error, shown in `unit`.
 
-        Examples
-        --------
         >>> Quantity.of_si("tilt", 0.5, "mrad").text
         '500 mrad'
         """
@@ -134,16 +100,8 @@ class Quantity:
 class Record:
     """One row of ``results.csv``: a candidate and what became of it.
 
-    Attributes
-    ----------
-    number, key, solution
-        Of the candidate; a scene without candidates has one record and leaves them out.
-    status : {"assessed", "not recognised", "rejected", "failed"}
-        A candidate that no module recognises or that a goal rejects is not a failure; all but the first carry a reason.
-    good : bool or None
-        Whether the verdict is favourable; None if there is none.
-    cause : str
-        The reason in words that can be counted; empty if the reason is that already.
+    A scene without candidates has one record, without key and solution. A candidate that no module recognises or that
+    a goal rejects is not a failure; every status but the first carries a reason.
     """
 
     number: int = 1
@@ -152,88 +110,51 @@ class Record:
     status: Literal["assessed", "not recognised", "rejected", "failed"] = "assessed"
     recognised_as: str = ""
     verdict: str = ""
-    good: bool | None = None
+    good: bool | None = None  # whether the verdict is favourable; None if there is none
     margins: tuple[Quantity, ...] = ()
     reason: str = ""
-    cause: str = ""
+    cause: str = ""  # the reason in words that can be counted; empty if the reason is that already
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something the first screen of the page and of the terminal says: a sentence, or a number and what it counts.
+    """Something the first screen of the page and of the terminal says: a sentence, or a number and what it counts."""
 
-    Attributes
-    ----------
-    text : str
-        The sentence; with a value its caption.
-    good : bool or None
-        Whether it is favourable; None if it is neither.
-    value : str
-        Printed large, over the caption; empty for a sentence.
-    """
-
-    text: str
-    good: bool | None = None
-    value: str = ""
+    text: str  # the sentence; with a value its caption
+    good: bool | None = None  # whether it is favourable; None if it is neither
+    value: str = ""  # printed large, over the caption; empty for a sentence
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table of the report: strings, ready to print.
-
-    Attributes
-    ----------
-    title, note : str
-    columns : tuple of str
-    rows : tuple of tuple of str
-    findings : tuple of Finding
-        What the first screen says about it.
-    """
+    """A table of the report: strings, ready to print."""
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()  # what the first screen says about it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
     """Numbers by the column, for files rather than for the page: curves, a survey of many dimension sets.
 
-    Attributes
-    ----------
-    name : str
-        Of the files: ``<name>.csv``, ``<name>.parquet``.
-    columns : Mapping
-        Header, with its unit as in ``"crank [deg]"``, to a sequence or array; all of the same length.
-
-    Notes
-    -----
     What a stage for each candidate gives as `Columns` is written at once, as ``<name>/part-<number>.csv``, and a `Part`
     stands for it from then on: memory does not grow with the number of rows.
     """
 
-    name: str
-    columns: Mapping[str, Any]
+    name: str  # of the files: ``<name>.csv``, ``<name>.parquet``
+    columns: Mapping[str, Any]  # header with its unit, as in ``"crank [deg]"``, to a sequence; all of one length
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Columns of one candidate that are in files.
+    """Columns of one candidate that are in files."""
 
-    Attributes
-    ----------
-    name : str
-        Of the columns, and of the folder beside the report.
-    rows : int
-    files : tuple of (str, str)
-        Path below the report folder, and SHA-256 of the content.
-    """
-
-    name: str
+    name: str  # of the columns, and of the folder beside the report
     rows: int
-    files: tuple[tuple[str, str], ...]
+    files: tuple[tuple[str, str], ...]  # path below the report folder, and SHA-256 of the content
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,7 +174,6 @@ class Attempt:
     candidate: Candidate
     value: Any = None
     reason: str = ""
-    notes: Mapping[str, object] = field(default_factory=dict)
 
     @property
     def failed(self) -> bool:
@@ -266,8 +186,6 @@ def each(attempts: Iterable[Attempt], step: Callable[[Any], Any]) -> tuple[Attem
 
     Any exception counts: whatever goes wrong with one candidate is recorded under its name and shown in the report.
 
-    Examples
-    --------
     >>> ok, bad = each([Attempt(None, 2.0), Attempt(None, 0.0)], lambda x: 1 / x)
     >>> ok.value, bad.reason
     (0.5, 'ZeroDivisionError: float division by zero')
@@ -300,33 +218,14 @@ class Objective:
 
 @dataclass(frozen=True, slots=True)
 class Ranking:
-    """Records in the order of preference.
-
-    Attributes
-    ----------
-    objectives : tuple of Objective
-    numbers : tuple of int
-        Candidates with all objectives, the best first.
-    scores : tuple of float
-        In that order: weighted mean of the objectives, each scaled to 0 (worst of all) .. 1 (best of all).
-    front : tuple of int
-        The candidates that no other one beats in every objective (Pareto front), in the order of `numbers`.
-    values : tuple of tuple of float
-        In the order of `numbers`: the value of each objective.
-    unranked : tuple of (int, str)
-        Assessed candidates without some objective, and which.
-    places : tuple of tuple of int
-        In the order of `numbers`: by objective, how many of all ranked ones are better.
-    ranked, front_size : int
-        How many were ranked, and how many of them are on the Pareto front; `numbers` may be the first of them only.
-    """
+    """Records in the order of preference; all but `objectives` and `unranked` in that order, the best first."""
 
     objectives: tuple[Objective, ...]
-    numbers: tuple[int, ...]
-    scores: tuple[float, ...]
-    front: tuple[int, ...]
-    values: tuple[tuple[float, ...], ...]
-    unranked: tuple[tuple[int, str], ...] = ()
-    places: tuple[tuple[int, ...], ...] = ()
-    ranked: int = 0
+    numbers: tuple[int, ...]  # candidates with all objectives
+    scores: tuple[float, ...]  # weighted mean of the objectives, each scaled to 0 (worst of all) .. 1 (best of all)
+    front: tuple[int, ...]  # candidates that no other one beats in every objective (Pareto front)
+    values: tuple[tuple[float, ...], ...]  # of each objective
+    unranked: tuple[tuple[int, str], ...] = ()  # assessed candidates without some objective, and which
+    places: tuple[tuple[int, ...], ...] = ()  # by objective, how many of all ranked ones are better
+    ranked: int = 0  # how many were ranked: `numbers` may be the first of them only
     front_size: int = 0

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 import platform
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import SceneError
 from graphsynth.core.journal import writing
+from graphsynth.pipeline.measure import costs
 from graphsynth.pipeline.page import report_html
 from graphsynth.pipeline.store import JOURNAL, REMEDY, data_files, mark_reported, write_whole
 from graphsynth.pipeline.summary import facts, sentences, summary_tables
@@ -23,17 +22,6 @@ if TYPE_CHECKING:
     from graphsynth.pipeline.stages import Report
 
 _KINDS = {".html", ".csv", ".parquet", ".json", ".jsonl"}
-_PACKAGES = ("numpy", "numba", "scipy", "networkx", "sympy", "pandas", "matplotlib", "rich", "distributed")
-
-
-def loaded_versions() -> dict[str, str]:
-    """Return the versions of Python, graphsynth and the third-party packages this process has loaded."""
-    from importlib.metadata import version
-
-    from graphsynth import __version__
-
-    versions = {"python": platform.python_version(), "graphsynth": __version__}
-    return versions | {name: version(name) for name in _PACKAGES if name in sys.modules}
 
 
 def write_report(report: Report, folder: Path) -> Path:
@@ -62,17 +50,7 @@ def scene_json(report: Report) -> str:
         "versions": dict(report.versions),
         "platform": f"{platform.system()} {platform.machine()}",
         "seconds": round(report.seconds, 6),
-        "stages": [
-            {
-                "stage": t.stage,
-                "runs": t.runs,
-                "import_seconds": round(t.import_seconds, 6),
-                "seconds": round(t.seconds, 6),
-                "peak_MB": round(t.peak_mb, 1) if math.isfinite(t.peak_mb) else None,
-                "imports": list(t.modules),
-            }
-            for t in report.times
-        ],
+        "stages": [{"stage": time.stage, **costs(time)} for time in report.times],
         "notes": list(report.notes),
     }
     return json.dumps(content, indent=2, ensure_ascii=False, default=str) + "\n"
@@ -85,30 +63,22 @@ def print_summary(report: Report, console: Console) -> None:
     """
     from rich.markup import escape
 
-    answer = _answer(report)
-    lines = [f"[bold]{escape(report.scene.scene.title)}[/bold]", *answer]
-    for line in lines:
+    tones = {True: "green", False: "red", None: "default"}
+    answer = [f"[yellow]{escape(text)}[/yellow]" for text in report.notes]
+    answer += [f"[{tones[told.good]}]{escape(told.text)}[/]" for told in sentences(report)]
+    answer.append(" · ".join(f"[bold]{escape(fact.value)}[/bold] {escape(fact.text)}" for fact in facts(report)))
+    for line in (f"[bold]{escape(report.scene.scene.title)}[/bold]", *answer):
         console.print(line, highlight=False)
     shown = [_fitted(table, console.width) for table in summary_tables(report)]
     for table in shown:
         console.print(table)
-    if console.is_terminal and sum(len(console.render_lines(table)) for table in shown) > console.height - len(lines):
+    room = console.height - 1 - len(answer)
+    if console.is_terminal and sum(len(console.render_lines(table)) for table in shown) > room:
         for line in ("", *answer):
             console.print(line, highlight=False)
     if report.folder is not None:
         names = sorted(path.name for path in report.folder.iterdir() if path.suffix in _KINDS)
         console.print(f"Report: {escape(str(report.folder))} ({', '.join(names)})")
-
-
-def _answer(report: Report) -> list[str]:
-    """Lay out what the first screen says, as rich markup."""
-    from rich.markup import escape
-
-    tones = {True: "green", False: "red", None: "default"}
-    lines = [f"[yellow]{escape(text)}[/yellow]" for text in report.notes]
-    lines += [f"[{tones[told.good]}]{escape(told.text)}[/]" for told in sentences(report)]
-    numbers = [f"[bold]{escape(fact.value)}[/bold] {escape(fact.text)}" for fact in facts(report)]
-    return [*lines, " · ".join(numbers)]
 
 
 #: Words up to this length are not broken on the terminal; longer ones are keys and digests.
@@ -134,16 +104,13 @@ def _fitted(table: Table, width: int) -> Group | Text:
     for row in table.rows:
         shown.add_row(*map(escape, row))
     note = (Text(table.note, "dim"),) if table.note else ()
-    return Group(
-        Text(table.title, "italic"), shown, *note
-    )  # not as title and caption: these are as narrow as the table
+    # not as title and caption: these are as narrow as the table
+    return Group(Text(table.title, "italic"), shown, *note)
 
 
 def column_widths(table: Table, room: int) -> list[int] | None:
     """Share the room of a line among the columns of a table so that no word is broken; None if it does not suffice.
 
-    Examples
-    --------
     >>> from graphsynth.pipeline.products import Table
     >>> table = Table("", ("name", "what it means"), (("12345678", "ten words or so"),))
     >>> column_widths(table, 40), column_widths(table, 20), column_widths(table, 12)
@@ -158,10 +125,8 @@ def column_widths(table: Table, room: int) -> list[int] | None:
     spare = room - sum(least)
     if spare < 0:
         return None
-    widths = list(least)
-    order = sorted(range(len(wanted)), key=wanted.__getitem__)
-    for done, k in enumerate(order):  # who wants little gets it all, the rest share alike
-        share = min(wanted[k], spare // (len(order) - done))
-        widths[k] += share
+    for left, k in zip(range(len(least), 0, -1), sorted(range(len(least)), key=wanted.__getitem__)):
+        share = min(wanted[k], spare // left)  # who wants little gets it all, the rest share alike
+        least[k] += share
         spare -= share
-    return widths
+    return least

@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+import platform
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import graphsynth
 from graphsynth.core.errors import SceneError
 from graphsynth.core.ordered import check_executor
-from graphsynth.pipeline.measure import measured, memory_in_use, new_modules, peak_memory, reset_peak, rooms
-from graphsynth.pipeline.report import loaded_versions, write_report
+from graphsynth.pipeline.measure import measured, memory_in_use, new_modules, reset_peak, rooms
+from graphsynth.pipeline.report import write_report
 from graphsynth.pipeline.scene import Scene, load_scene
 from graphsynth.pipeline.stages import Context, Progress, Report, StageTime, resolve
 from graphsynth.pipeline.store import JOURNAL, Candidates, check_files, check_folder, signature
-from graphsynth.pipeline.streaming import Plan, Spent, Streamed, given_by, plan_stream, stream
+from graphsynth.pipeline.streaming import Plan, Spent, given_by, plan_stream, stream
 from graphsynth.pipeline.system import Stage
-from graphsynth.pipeline.tables import Place
+
+#: Packages whose versions the report names, where they were loaded.
+_PACKAGES = ("numpy", "numba", "scipy", "networkx", "sympy", "pandas", "matplotlib", "rich", "distributed")
 
 
 def run(
@@ -69,11 +74,11 @@ def run(
 
 def has_stream(scene: Scene) -> bool:
     """Whether what the scene asks for takes candidates one by one, which several processes can share."""
-    return any(stage.each for stage in resolve(scene.stages(), scene.outputs.products, _place_of_products(scene)))
+    return any(stage.each for stage in _resolved(scene))
 
 
-def _place_of_products(scene: Scene) -> Place:
-    return scene.place / "outputs" / "products"
+def _resolved(scene: Scene) -> tuple[Stage, ...]:
+    return resolve(scene.stages(), scene.outputs.products, scene.place / "outputs" / "products")
 
 
 def execute(
@@ -88,15 +93,15 @@ def execute(
         scene = load_scene(scene)
     check_executor(executor)
     check_files(scene)
-    wanted = scene.outputs.products
-    stages = resolve(scene.stages(), wanted, _place_of_products(scene))
-    done = Running(stages, wanted, Context(scene, executor), progress, journal, fresh)
+    done = Running(_resolved(scene), scene.outputs.products, Context(scene, executor), progress, journal, fresh)
     products = done.run()
+    versions = {"python": platform.python_version(), "graphsynth": graphsynth.__version__}
+    versions |= {name: version(name) for name in _PACKAGES if name in sys.modules}
     return Report(
         scene,
         MappingProxyType(products),
         tuple(done.times),
-        MappingProxyType(loaded_versions()),
+        MappingProxyType(versions),
         stages=done.stages,
         notes=tuple(done.notes),
         seconds=done.seconds,
@@ -144,7 +149,12 @@ class Running:
             if stage.each and streamed:
                 continue
             self._tell(stage.name, done)
-            self._refuse_if_used_up(stage)
+            # behind the stream a run is finished, with what there is
+            if not any(other.each for other in self.stages[:done]) and (why := self._used_up()):
+                raise SceneError(
+                    f"{self._context.scene.place / 'budget'} stops the run before stage {stage.name!r}: {why}; raise "
+                    "it, or ask for fewer outputs"
+                )
             self._start_aside(self.stages[done:])
             if stage.each and self._plan is not None:
                 self._run_stream(self._plan, done)
@@ -155,7 +165,11 @@ class Running:
                 self._run_stage(stage, self.stages[done + 1 :])
             needed = {need for later in self.stages[done + 1 :] for need in later.needs} | set(self._wanted)
             self._products = {name: value for name, value in self._products.items() if name in needed}
-        self._gather_aside()
+        by_name = {stage.name: stage for stage in self.stages}
+        for place, spent in enumerate(self.times):
+            if spent.stage in self._aside:
+                result, self.times[place] = self._aside[spent.stage].result()
+                self._products.update(given_by(by_name[spent.stage], result))
         self.seconds = time.perf_counter() - self._started
         self._tell("done", len(self.stages))
         return {name: self._products[name] for name in self._wanted}
@@ -188,25 +202,14 @@ class Running:
                 alone = replace(self._context, executor=None)
                 self._aside[stage.name] = executor.submit(measured, stage, alone, needs)
 
-    def _gather_aside(self) -> None:
-        given = {stage.name: stage for stage in self.stages}
-        for place, spent in enumerate(self.times):
-            if spent.stage in self._aside:
-                result, self.times[place] = self._aside[spent.stage].result()
-                self._products.update(given_by(given[spent.stage], result))
-
     def _timed(self, items: Iterable[Any]) -> Iterator[Any]:
         """Pass candidates on, adding up the time it takes to make them."""
-        source = iter(items)
-        while True:
-            start = time.perf_counter()
-            try:
-                item = next(source)
-            except StopIteration:
-                return
-            finally:
-                self._source_seconds += time.perf_counter() - start
+        start = time.perf_counter()
+        for item in items:
+            self._source_seconds += time.perf_counter() - start
             yield item
+            start = time.perf_counter()
+        self._source_seconds += time.perf_counter() - start
 
     def _run_stream(self, plan: Plan, done: int) -> None:
         """Run the stages for each candidate."""
@@ -228,11 +231,6 @@ class Running:
                 self._used_up,
                 lambda count: self._tell(f"candidates: {count} done", done),
             )
-        self._note_stream(found)
-        self._products.update({name: tuple(found.outcomes) for name in plan.kept})
-        self._record_times(plan, found, loads)
-
-    def _note_stream(self, found: Streamed) -> None:
         if found.resumed:
             self.notes.append(f"{found.resumed} candidates were taken over from an interrupted run.")
         if found.stopped:
@@ -240,20 +238,16 @@ class Running:
                 f"Stopped after {len(found.outcomes)} candidates: {found.stopped}. What is stored stays; run again "
                 "with a larger [budget] to go on."
             )
-
-    def _record_times(self, plan: Plan, found: Streamed, loads: dict[str, StageTime]) -> None:
-        peak = peak_memory()
-        source = next((i for i, t in enumerate(self.times) if t.stage == self._giver(plan.source)), None)
-        if source is not None:
-            made = self.times[source]
-            self.times[source] = replace(made, seconds=made.seconds + self._source_seconds)
+        self._products.update({name: tuple(found.outcomes) for name in plan.kept})
+        peak = memory_in_use("VmHWM")
+        sources = [stage.name for stage in self.stages if plan.source in stage.gives]
+        for place, made in enumerate(self.times):
+            if made.stage in sources:
+                self.times[place] = replace(made, seconds=made.seconds + self._source_seconds)
         for stage in plan.stages:
             loaded, spent = loads[stage.name], found.spent.get(stage.name, Spent())
             modules = tuple(sorted({*loaded.modules, *rooms(spent.modules)}))
             self.times.append(replace(loaded, seconds=spent.seconds, peak_mb=peak, modules=modules, runs=spent.runs))
-
-    def _giver(self, product: str) -> str:
-        return next(stage.name for stage in self.stages if product in stage.gives)
 
     def _used_up(self) -> str:
         """Say which budget is used up, or nothing."""
@@ -265,30 +259,16 @@ class Running:
             return f"{used / 1e6:.0f} MB of memory are in use, [budget] allows {budget.memory / 1e6:g} MB"
         return ""
 
-    def _refuse_if_used_up(self, stage: Stage) -> None:
-        """Stop before a stage when a budget is used up; behind the stream a run is finished, with what there is."""
-        behind = any(other.each for other in self.stages[: self.stages.index(stage)])
-        why = "" if behind else self._used_up()
-        if why:
-            raise SceneError(
-                f"{self._context.scene.place / 'budget'} stops the run before stage {stage.name!r}: {why}; raise it, "
-                "or ask for fewer outputs"
-            )
-
 
 def _around_stream(stages: Sequence[Stage], plan: Plan | None) -> tuple[Stage, ...]:
     """Order stages: those the stream does not wait for, the stages for each candidate, those that need the stream."""
     if plan is None:
         return tuple(stages)
-    after: set[str] = {product for stage in plan.stages for product in stage.gives}
-    first: list[Stage] = []
-    last: list[Stage] = []
-    for stage in stages:
-        if stage.each:
-            continue
+    after = {product for stage in plan.stages for product in stage.gives}
+    last = []
+    over_all = [stage for stage in stages if not stage.each]
+    for stage in over_all:
         if after & set(stage.needs):
             after |= set(stage.gives)
             last.append(stage)
-        else:
-            first.append(stage)
-    return (*first, *plan.stages, *last)
+    return (*(stage for stage in over_all if stage not in last), *plan.stages, *last)

@@ -13,11 +13,12 @@ from typing import Annotated, Any, Literal
 from graphsynth.core.errors import SceneError
 from graphsynth.core.textfiles import read_bytes, text_of, toml_tables
 from graphsynth.core.wording import nearest
-from graphsynth.pipeline.system import RANK, STRUCTURE, Stage, System, system, system_names
+from graphsynth.pipeline.system import RANK, STRUCTURE, Stage, system, system_names
 from graphsynth.pipeline.tables import In, Place, read_table, require, suggest
 
 _PACKAGE = Path(__file__).resolve().parent
-
+#: Folders with shipped scenes: inside a wheel, then beside an editable checkout.
+_FOLDERS = (_PACKAGE / "shipped", _PACKAGE.parent.parent / "catalog" / "scenes")
 
 _LONGEST_NAME = 100
 
@@ -45,27 +46,13 @@ class SceneTable:
 
 @dataclass(frozen=True, slots=True)
 class GenerateTable:
-    """``[structure.generate]``: which mechanisms of the question become candidates.
+    """``[structure.generate]``: which mechanisms of the question become candidates."""
 
-    Attributes
-    ----------
-    symmetry : int or None
-        Keep mechanisms that have an automorphism of this order that fixes the frame.
-    fixed_moving_links : int or None
-        Of such an automorphism, the number of moving links that stay in place.
-    planar : bool
-        Leave out graphs that cannot be drawn without crossings.
-    sample : int or None
-        Draw this many mechanisms uniformly, with the seed of the scene, instead of listing all; repeats are dropped.
-    limit : int
-        Stop with an error when there are more candidates than this.
-    """
-
-    symmetry: int | None = None
-    fixed_moving_links: int | None = None
-    planar: bool = False
-    sample: int | None = None
-    limit: int = 10_000
+    symmetry: int | None = None  # keep mechanisms with an automorphism of this order that fixes the frame
+    fixed_moving_links: int | None = None  # of such an automorphism, the number of moving links that stay in place
+    planar: bool = False  # leave out graphs that cannot be drawn without crossings
+    sample: int | None = None  # draw so many uniformly, with the seed of the scene, not all; repeats are dropped
+    limit: int = 10_000  # stop with an error when there are more candidates than this
 
     def __post_init__(self) -> None:
         require(self.symmetry in (None, 3), f"has symmetry {self.symmetry}; only 3 is known, or leave it out")
@@ -90,10 +77,7 @@ class StructureTable:
     generate: GenerateTable = field(default_factory=GenerateTable)
 
     def __post_init__(self) -> None:
-        require(
-            (self.question is None) != (not self.graphs),
-            "must have either a table question or a list graphs",
-        )
+        require((self.question is None) != (not self.graphs), "must have either a table question or a list graphs")
         if self.graphs:
             only = "of graphs that are given; it is for a question"
             require(self.generate.symmetry is None, f"has generate.symmetry {only}")
@@ -109,28 +93,17 @@ class OutputsTable:
 
     def __post_init__(self) -> None:
         require(bool(self.products), "has products = []; name at least one output")
-        require(
-            len(set(self.products)) == len(self.products), f"has products = {list(self.products)}, one of them twice"
-        )
+        twice = len(set(self.products)) < len(self.products)
+        require(not twice, f"has products = {list(self.products)}, one of them twice")
 
 
 @dataclass(frozen=True, slots=True)
 class BudgetTable:
-    """``[budget]``: where a run stops.  What is stored by then stays, and a run with more goes on from it.
+    """``[budget]``: where a run stops.  What is stored by then stays, and a run with more goes on from it."""
 
-    Attributes
-    ----------
-    time : float or None
-        Wall time, seconds; looked at after each candidate and between stages.
-    memory : float or None
-        Resident memory, bytes, of the process that runs the scene; looked at at the same places.
-    boxes : int or None
-        For stages that pave or prove: the most boxes they may look at.
-    """
-
-    time: Annotated[float | None, In("s", above=0)] = None
-    memory: Annotated[float | None, In("MB", above=0)] = None
-    boxes: Annotated[int | None, In(above=0)] = None
+    time: Annotated[float | None, In("s", above=0)] = None  # wall time; looked at after candidates, between stages
+    memory: Annotated[float | None, In("MB", above=0)] = None  # resident, bytes, of the process that runs the scene
+    boxes: Annotated[int | None, In(above=0)] = None  # the most that stages which pave or prove may look at
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,35 +160,19 @@ TABLES: dict[str, type] = {
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A scene as read: checked, frozen, and with its raw text for the record.
-
-    Attributes
-    ----------
-    scene, mechanism, outputs, structure, ranking, budget
-        The tables of the file; `mechanism` has the type its system says, the last three may be missing.
-    source : str
-        File name, or ``<mapping>``.
-    raw : Mapping
-        The tables as TOML gave them.
-    digest : str
-        SHA-256 of the file's bytes, empty for a mapping.
-    text : str
-        The file, for the line numbers of messages; empty for a mapping.
-    folder : Path
-        Of the file: where paths in it begin; the working directory for a mapping.
-    """
+    """The tables of a scene as read, checked and frozen, and where they come from."""
 
     scene: SceneTable
-    mechanism: Any
+    mechanism: Any  # of the type its system says
     outputs: OutputsTable
     structure: StructureTable | None = None
     ranking: RankingTable | None = None
     budget: BudgetTable = field(default_factory=BudgetTable)
-    source: str = "<mapping>"
-    raw: Mapping[str, object] = field(default_factory=dict, compare=False, repr=False)
-    digest: str = ""
-    text: str = field(default="", compare=False, repr=False)
-    folder: Path = field(default=Path(), compare=False, repr=False)
+    source: str = "<mapping>"  # or the name of the file
+    raw: Mapping[str, object] = field(default_factory=dict, compare=False, repr=False)  # as TOML gave it
+    digest: str = ""  # SHA-256 of the bytes of the file
+    text: str = field(default="", compare=False, repr=False)  # of the file, for the line numbers of messages
+    folder: Path = field(default=Path(), compare=False, repr=False)  # of the file: where paths in it begin
 
     @property
     def name(self) -> str:
@@ -243,7 +200,12 @@ class Scene:
         for key in ("scene", "mechanism", "outputs"):
             if key not in tables:
                 raise place.error(f"lacks the table [{key}]")
-        chosen = _system(tables["mechanism"], place / "mechanism")
+        mechanism, at = tables["mechanism"], place / "mechanism"
+        if not isinstance(mechanism, Mapping):
+            raise at.error("must be a table")
+        if not isinstance(mechanism.get("module"), str):
+            raise at.error(f"lacks the key 'module'{suggest('', system_names())}")
+        chosen = system(mechanism["module"], at)
         if chosen.structure == "required" and "structure" not in tables:
             raise place.error("lacks the table [structure]")
         if chosen.structure == "none" and "structure" in tables:
@@ -256,37 +218,21 @@ class Scene:
 
     def stages(self) -> tuple[Stage, ...]:
         """Return every stage this scene can use; most are not needed for its outputs."""
-        own = system(self.mechanism.module).stages_for(self)
+        chosen = system(self.mechanism.module)
+        own = (*chosen.stages, *(chosen.more(self) if chosen.more else ()))
         given = {product for stage in (*STRUCTURE, *own) for product in stage.gives}
         common = tuple(stage for stage in STRUCTURE if given.issuperset(stage.needs)) if self.structure else ()
         ranking = (RANK,) if self.ranking is not None and "ranking" not in given else ()
         return (*common, *ranking, *own)
 
 
-def _system(table: object, place: Place) -> System:
-    """Choose the system by the key ``module`` of ``[mechanism]``."""
-    if not isinstance(table, Mapping):
-        raise place.error("must be a table")
-    module = table.get("module")
-    if not isinstance(module, str):
-        raise place.error(f"lacks the key 'module'{suggest('', system_names())}")
-    return system(module, place)
-
-
-def _folders() -> tuple[Path, ...]:
-    """Folders with shipped scenes: inside a wheel, then beside an editable checkout."""
-    return (_PACKAGE / "shipped", _PACKAGE.parent.parent / "catalog" / "scenes")
-
-
 def available_scenes() -> tuple[str, ...]:
     """Return the names of the scenes shipped with the package, sorted.
 
-    Examples
-    --------
     >>> "lambda" in available_scenes()
     True
     """
-    return tuple(sorted({path.stem for folder in _folders() for path in folder.glob("*.toml")}))
+    return tuple(sorted({path.stem for folder in _FOLDERS for path in folder.glob("*.toml")}))
 
 
 def find_scene(name_or_path: str | Path) -> Path:
@@ -294,15 +240,13 @@ def find_scene(name_or_path: str | Path) -> Path:
 
     A path wins if it exists as a file; a bare word is looked up among the shipped scenes.
 
-    Examples
-    --------
     >>> find_scene("lambda").name
     'lambda.toml'
     """
     path = Path(name_or_path)
     if path.suffix == ".toml" and path.is_file():
         return path
-    for folder in _folders():
+    for folder in _FOLDERS:
         shipped = folder / f"{name_or_path}.toml"
         if path.name == str(name_or_path) and shipped.is_file():
             return shipped
@@ -315,15 +259,9 @@ def find_scene(name_or_path: str | Path) -> Path:
 def load_scene(name_or_path: str | Path) -> Scene:
     """Read a scene by name or path.
 
-    Raises
-    ------
-    SceneError
-        On a missing scene, an unknown key, a wrong type or a missing table.
-    FormatError
-        If the file is not TOML; the place carries line and column.
+    A `SceneError` tells of a missing scene, an unknown key, a wrong type or a missing table, a `FormatError` with line
+    and column of a file that is not TOML.
 
-    Examples
-    --------
     >>> load_scene("lambda").mechanism.tilt.alpha == 1 / 30
     True
     """

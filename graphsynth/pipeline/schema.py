@@ -25,8 +25,6 @@ def schema_text() -> str:
 def scene_schema() -> dict[str, Any]:
     """Return the schema of scene files (JSON Schema, draft 2020-12) for the families of graphsynth.
 
-    Examples
-    --------
     >>> scene_schema()["required"]
     ['scene', 'mechanism', 'outputs']
     """
@@ -62,8 +60,6 @@ def scene_schema() -> dict[str, Any]:
 def table_schema(schema: type) -> dict[str, Any]:
     """Return the schema of one table from its frozen dataclass.
 
-    Examples
-    --------
     >>> @dataclasses.dataclass(frozen=True)
     ... class Bearing:
     ...     '''A bearing.'''

@@ -32,8 +32,6 @@ def build(scene: Scene) -> Any:
 
     A `SceneError` says that the numbers of the scene cannot be built, or that the scene has many mechanisms.
 
-    Examples
-    --------
     >>> from graphsynth.pipeline.scene import load_scene
     >>> build(load_scene("antenna")).lengths
     (0.1, 0.15, 0.0592, 0.15, 0.0592)
@@ -49,70 +47,31 @@ def build(scene: Scene) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class StageTime:
-    """What a stage took (estimated, one measurement).
-
-    Attributes
-    ----------
-    import_seconds, seconds : float
-        Wall clock; for a stage for each candidate the sum over candidates, wherever they were computed.
-    peak_mb : float
-        Largest resident memory of the process where it ran, while it ran, in MB; of all stages for each candidate
-        together.
-    modules : tuple of str
-        Rooms of graphsynth and third-party packages it was the first to import, in the process where it ran.
-    runs : int
-        How many candidates it looked at; 1 for a stage over all.
-    """
+    """What a stage took in the process where it ran (estimated, one measurement)."""
 
     stage: str
-    import_seconds: float
+    import_seconds: float  # wall clock, as the next; of a stage for each candidate the sum over candidates
     seconds: float
-    peak_mb: float = math.nan
-    modules: tuple[str, ...] = ()
-    runs: int = 1
+    peak_mb: float = math.nan  # largest resident memory meanwhile, MB; of all stages for each candidate together
+    modules: tuple[str, ...] = ()  # rooms of graphsynth and third-party packages it was the first to import
+    runs: int = 1  # how many candidates it looked at; 1 for a stage over all
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What a run gave.
-
-    Attributes
-    ----------
-    scene : Scene
-        The scene that was run.
-    products : Mapping
-        The outputs asked for, and the records and tables that say what became of the candidates; name to value.
-    times : tuple of StageTime
-        In the order of running.
-    versions : Mapping
-        Of Python, graphsynth and the third-party packages that were loaded.
-    folder : Path or None
-        Where the report was written.
-    stages : tuple of Stage
-        That ran, in order.
-    notes : tuple of str
-        What a reader must know: a budget that was used up, candidates taken over from an interrupted run.
-    seconds : float
-        Wall clock of the run; the stages of candidates that several processes share take longer together.
-    """
+    """What a run gave."""
 
     scene: Scene
-    products: Mapping[str, Any]
-    times: tuple[StageTime, ...]
-    versions: Mapping[str, str] = field(default_factory=dict)
-    folder: Path | None = None
-    stages: tuple[Stage, ...] = ()
-    notes: tuple[str, ...] = ()
-    seconds: float = 0.0
+    products: Mapping[str, Any]  # the outputs asked for, and what says what became of the candidates, by name
+    times: tuple[StageTime, ...]  # in the order of running
+    versions: Mapping[str, str] = field(default_factory=dict)  # of Python and of the packages that were loaded
+    folder: Path | None = None  # where the report was written
+    stages: tuple[Stage, ...] = ()  # that ran, in order
+    notes: tuple[str, ...] = ()  # a budget that was used up, candidates taken over from an interrupted run
+    seconds: float = 0.0  # wall clock; stages of candidates that several processes share take longer together
 
     def __getitem__(self, product: str) -> Any:
-        """Return one output.
-
-        Raises
-        ------
-        SceneError
-            If the scene did not ask for it.
-        """
+        """Return one output; a `SceneError` if the scene did not ask for it."""
         if product not in self.products:
             raise SceneError(
                 f"this run did not keep {product!r}; add it to [outputs] products (kept: {', '.join(self.products)})"
@@ -135,37 +94,24 @@ def _installed(product: str) -> Stage | None:
     return None
 
 
-def _givers(stages: Iterable[Stage]) -> dict[str, Stage]:
-    """Map each product to the one stage that gives it."""
-    givers: dict[str, Stage] = {}
-    for stage in stages:
-        for product in stage.gives:
-            if product in givers:
-                raise SceneError(
-                    f"product {product!r} is given by two stages, {givers[product].name!r} and {stage.name!r}"
-                )
-            givers[product] = stage
-    return givers
-
-
-def resolve(
-    stages: Iterable[Stage],
-    outputs: Sequence[str],
-    place: Place | None = None,
-) -> tuple[Stage, ...]:
+def resolve(stages: Iterable[Stage], outputs: Sequence[str], place: Place | None = None) -> tuple[Stage, ...]:
     """Return the smallest set of stages that yields `outputs`, in an order in which each finds what it needs.
 
     Backward from the outputs; the order depends on `outputs` and `stages` alone. A product that none of `stages` gives
     may come from a stage that another package announces. `place` is where the outputs were named. A `SceneError` names
     an unknown output, a need that no stage gives, or the stages of a cycle.
 
-    Examples
-    --------
     >>> a, b, c = Stage("a", "m:a", (), ("x",)), Stage("b", "m:b", ("x",), ("y",)), Stage("c", "m:c", (), ("z",))
     >>> [stage.name for stage in resolve([c, b, a], ["y"])]
     ['a', 'b']
     """
-    givers = _givers(stages)
+    givers: dict[str, Stage] = {}
+    for stage in stages:
+        for product in stage.gives:
+            if product in givers:
+                first = givers[product].name
+                raise SceneError(f"product {product!r} is given by two stages, {first!r} and {stage.name!r}")
+            givers[product] = stage
     at = f"{place} " if place else ""
     order: list[Stage] = []
     path: list[str] = []
@@ -180,9 +126,8 @@ def resolve(
         if giver in order:
             return
         if giver.name in path:
-            raise SceneError(
-                f"{at}stages need each other: {' -> '.join([*path[path.index(giver.name) :], giver.name])}"
-            )
+            circle = [*path[path.index(giver.name) :], giver.name]
+            raise SceneError(f"{at}stages need each other: {' -> '.join(circle)}")
         path.append(giver.name)
         for need in giver.needs:
             visit(need)

@@ -160,8 +160,6 @@ def _read(context: Context, place: int, text: str) -> MechanismGraph:
 def assortment_text(graph: MechanismGraph) -> str:
     """Return the assortment of moving links as text.
 
-    Examples
-    --------
     >>> from graphsynth.structure.graph import MechanismGraph
     >>> assortment_text(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0))
     'n2=3'
@@ -176,8 +174,6 @@ def has_threefold_symmetry(graph: MechanismGraph, fixed_moving_links: int) -> bo
     both of its ends are placed. Exact whatever the automorphism group is, which link orbits alone are not: when 9
     divides the group's order, different three-fold symmetries may fix different numbers of links.
 
-    Examples
-    --------
     >>> from graphsynth.structure.graph import MechanismGraph
     >>> star = MechanismGraph(5, [(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)], frame=0)
     >>> has_threefold_symmetry(star, 1), has_threefold_symmetry(star, 0)
@@ -257,8 +253,6 @@ def _record(item: Recognised, outcome: Attempt | None, verdict: Verdict) -> Reco
 def records(context: Context, outcomes: tuple[Outcome, ...]) -> tuple[Record, ...]:
     """Return one record per candidate, in their order.
 
-    Examples
-    --------
     >>> records(None, (Outcome(2, "k", status="rejected", stage="goals", cause="too long", reason="too long: 3 m"),))[0]
     ... # doctest: +ELLIPSIS
     Record(number=2, key='k', ..., status='rejected', ..., reason='too long: 3 m', cause='goals: too long')
@@ -337,8 +331,6 @@ def ranking_of(objectives: tuple[Objective, ...], records: Sequence[Record]) -> 
     the weighted mean of the objectives, each scaled linearly to 0 (worst of all ranked) .. 1 (best of all ranked), to
     12 decimals.
 
-    Examples
-    --------
     >>> records = [Record(n, margins=(Quantity("mass", m), Quantity("stroke", s)))
     ...            for n, m, s in ((1, 2.0, 5.0), (2, 1.0, 5.0), (3, 3.0, 9.0))]
     >>> found = ranking_of((Objective("mass", "min"), Objective("stroke", "max", 3.0)), records)

@@ -41,8 +41,6 @@ def encode(value: object) -> str:
     Text, numbers, booleans, None, lists, tuples, dictionaries with text keys, numpy scalars, and the frozen dataclasses
     of `graphsynth.pipeline.products`, nested; a `SceneError` names the type of anything else.
 
-    Examples
-    --------
     >>> encode({"b": (1, 2.5), "a": float("inf")})
     '{"a": {"is": "inf", "~": "number"}, "b": [1, 2.5]}'
     """
@@ -72,8 +70,6 @@ def _plain(value: Any) -> Any:
 def decode(line: str) -> Any:
     """Return the value of a line; lists come back as tuples. A `FormatError` refuses what `encode` does not write.
 
-    Examples
-    --------
     >>> decode(encode({"b": [1, float("-inf")]}))
     {'b': (1, -inf)}
     """

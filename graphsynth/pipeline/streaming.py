@@ -26,24 +26,12 @@ _MOST = 32
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Stages for each candidate in the order of running, the product they start from, and what is kept of each.
+    """Stages for each candidate in the order of running, and their products."""
 
-    Attributes
-    ----------
-    stages : tuple of Stage
-        Cheap ones first, as far as their needs allow.
-    source : str
-        Product of the stream.
-    shared : tuple of str
-        Whole products they need besides.
-    kept : tuple of str
-        Products of a candidate that other stages or the report need.
-    """
-
-    stages: tuple[Stage, ...]
-    source: str
-    shared: tuple[str, ...]
-    kept: tuple[str, ...]
+    stages: tuple[Stage, ...]  # cheap ones first, as far as their needs allow
+    source: str  # product of the stream
+    shared: tuple[str, ...]  # whole products they need besides
+    kept: tuple[str, ...]  # products of a candidate that other stages or the report need
 
 
 def plan_stream(stages: Sequence[Stage], wanted: Sequence[str]) -> Plan | None:

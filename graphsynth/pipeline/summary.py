@@ -8,7 +8,7 @@ from collections.abc import Hashable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.pipeline.display import table
-from graphsynth.pipeline.products import Finding, Quantity, Ranking, Record, Table
+from graphsynth.pipeline.products import Finding, Ranking, Record, Table
 
 if TYPE_CHECKING:
     from graphsynth.pipeline.stages import Report
@@ -28,61 +28,44 @@ def sentences(report: Report) -> tuple[Finding, ...]:
     Without the products ``records``, ``ranking`` or ``tables`` there is nothing to say.
     """
     records: tuple[Record, ...] = report.products.get("records", ())
-    found = [told for ranking in _rankings(report) for told in _best(ranking, records)]
-    given = [finding for finding in _given(report) if not finding.value]
+    rankings = [value for value in report.products.values() if isinstance(value, Ranking)]
+    found = [told for ranking in rankings for told in _best(ranking, records)]
+    given = [finding for table in _given(report) for finding in table.findings if not finding.value]
     few = sum(record.status == "assessed" for record in records) <= _VERDICTS
     found += (_verdicts(records) if few or not given else []) + given
     found += _nothing_left(records) + (_rejected(records) if len(records) > 1 else [])
-    found += [told for ranking in _rankings(report) for told in _how_sure(ranking, records)]
+    found += [told for ranking in rankings for told in _how_sure(ranking, records)]
     return tuple(found)
 
 
 def facts(report: Report) -> tuple[Finding, ...]:
     """Return the numbers of the first screen: `Finding` with a value, what it counts, and its tone."""
     products = report.products
-    found = [finding for finding in _given(report) if finding.value]
+    found = [finding for table in _given(report) for finding in table.findings if finding.value]
     records: tuple[Record, ...] = products.get("records", ())
-    assessed = [record for record in records if record.status == "assessed"]
-    others = [record for record in records if record.status not in ("assessed", "not recognised")]
-    if len(assessed) == 1 and not others:
-        found += [_margin(margin) for margin in assessed[0].margins[:_MARGINS]]
-    plain = len(records) == len(assessed) == 1  # one answer: nothing was chosen from
+    counts = Counter(record.status for record in records)
+    if counts["assessed"] == 1 and not counts["rejected"] + counts["failed"]:
+        for margin in next(record for record in records if record.status == "assessed").margins[:_MARGINS]:
+            unit = margin.unit if margin.unit in ("", "°", "′", "″") else f" {margin.unit}"
+            found.append(Finding(f"{margin.name} ({margin.guarantee})", value=f"{margin.value:.4g}{unit}"))
+    plain = len(records) == counts["assessed"] == 1  # one answer: nothing was chosen from
     if "solutions" in products and not (plain and len(products["solutions"]) == 1):
         count = len(products["solutions"])
         found.append(Finding("integer solutions" if count != 1 else "integer solution", value=str(count)))
     if any(record.key for record in records) and not plain:
-        found += _counts(records)
-    found += [
-        Finding("on the Pareto front", value=str(ranking.front_size)) for ranking in _rankings(report) if ranking.front
-    ]
+        found.append(Finding(f"candidate mechanism{'s' * (len(records) > 1)}", value=str(len(records))))
+        for status, good in (("assessed", None), ("not recognised", None), ("rejected", None), ("failed", False)):
+            if counts[status] or status == "assessed":
+                found.append(Finding(status, good, str(counts[status])))
+    fronts = [value.front_size for value in products.values() if isinstance(value, Ranking) and value.front]
+    found += [Finding("on the Pareto front", value=str(size)) for size in fronts]
     return (*found, Finding("run time", value=f"{report.seconds:.1f} s"))
 
 
-def _given(report: Report) -> Iterable[Finding]:
-    """Yield what stages say themselves."""
-    for value in report.products.values():
-        for item in value if isinstance(value, tuple) else ():
-            if isinstance(item, Table):
-                yield from item.findings
-
-
-def _rankings(report: Report) -> list[Ranking]:
-    return [value for value in report.products.values() if isinstance(value, Ranking)]
-
-
-def _counts(records: Sequence[Record]) -> list[Finding]:
-    found = [Finding("candidate mechanisms" if len(records) > 1 else "candidate mechanism", value=str(len(records)))]
-    words = (("assessed", None), ("not recognised", None), ("rejected", None), ("failed", False))
-    for status, good in words:
-        count = sum(record.status == status for record in records)
-        if count or status == "assessed":
-            found.append(Finding(status, good, str(count)))
-    return found
-
-
-def _margin(margin: Quantity) -> Finding:
-    unit = margin.unit if margin.unit in ("", "°", "′", "″") else f" {margin.unit}"
-    return Finding(f"{margin.name} ({margin.guarantee})", value=f"{margin.value:.4g}{unit}")
+def _given(report: Report) -> list[Table]:
+    """Return the tables of stages, which may have something to say."""
+    tuples = [value for value in report.products.values() if isinstance(value, tuple)]
+    return [item for value in tuples for item in value if isinstance(item, Table)]
 
 
 def _best(ranking: Ranking, records: Sequence[Record]) -> list[Finding]:
@@ -93,11 +76,8 @@ def _best(ranking: Ranking, records: Sequence[Record]) -> list[Finding]:
     order = [by_number[number] for number in ranking.numbers if number in by_number]
     if not order:
         return []
-    first = _one(ranking, order[0])
-    count = ranking.ranked
-    found = [
-        Finding(f"Best of {count} ranked: {first}." if count > 1 else f"The only one left: {first}.", order[0].good)
-    ]
+    which = f"Best of {ranking.ranked} ranked" if ranking.ranked > 1 else "The only one left"
+    found = [Finding(f"{which}: {_one(ranking, order[0])}.", order[0].good)]
     if order[0].good is not True:
         better = next((record for record in order if record.good), None)
         if better is not None:
@@ -108,34 +88,28 @@ def _best(ranking: Ranking, records: Sequence[Record]) -> list[Finding]:
 
 
 def _one(ranking: Ranking, record: Record) -> str:
-    """Describe a candidate: what it is, the values of the objectives with their places, its score, its verdict."""
+    """Describe a candidate: what it is, the values of the objectives with their places, its score, its verdict.
+
+    A place is how a value stands among all ranked ones: ``"least"``, ``"3rd greatest"``, ``"2nd nearest to 5"``.
+    """
     place = ranking.numbers.index(record.number)
-    units = {margin.name: margin.unit for margin in record.margins}
-    values = [
-        f"{objective.quantity} {value:.4g}{' ' + units[objective.quantity] if units.get(objective.quantity) else ''}"
-        f" ({_rank_word(ranking, k, place)})"
-        for k, (objective, value) in enumerate(zip(ranking.objectives, ranking.values[place], strict=True))
-    ]
+    units = {margin.name: f" {margin.unit}" for margin in record.margins if margin.unit}
+    words: dict[object, str] = {"min": "least", "max": "greatest"}
+    told = []
+    for objective, value, better in zip(ranking.objectives, ranking.values[place], ranking.places[place], strict=True):
+        word = words.get(objective.goal) or f"nearest to {objective.goal:g}"
+        rank = f"{_ordinal(better + 1)} " if better else ""
+        told.append(f"{objective.quantity} {value:.4g}{units.get(objective.quantity, '')} ({rank}{word})")
     known = f", {record.solution}" if record.solution else ""
     weights = ":".join(f"{objective.weight:g}" for objective in ranking.objectives)
     weighed = f" with weights {weights}" if len(ranking.objectives) > 1 else ""
     verdict = f"; {record.verdict}" if record.verdict else ""
-    return f"no. {record.number}{known}: {', '.join(values)}; score {ranking.scores[place]:.2f} of 1{weighed}{verdict}"
-
-
-def _rank_word(ranking: Ranking, which: int, place: int) -> str:
-    """Say how a value stands among all ranked ones: ``"least"``, ``"3rd greatest"``, ``"2nd nearest to 5"``."""
-    objective, better = ranking.objectives[which], ranking.places[place][which]
-    words = {"min": "least", "max": "greatest"}
-    word = words[objective.goal] if isinstance(objective.goal, str) else f"nearest to {objective.goal:g}"
-    return word if not better else f"{_ordinal(better + 1)} {word}"
+    return f"no. {record.number}{known}: {', '.join(told)}; score {ranking.scores[place]:.2f} of 1{weighed}{verdict}"
 
 
 def _ordinal(number: int) -> str:
     """Return a number as an ordinal.
 
-    Examples
-    --------
     >>> [_ordinal(n) for n in (1, 2, 3, 4, 11, 12, 13, 21, 112)]
     ['1st', '2nd', '3rd', '4th', '11th', '12th', '13th', '21st', '112th']
     """
@@ -147,18 +121,12 @@ def _verdicts(records: Sequence[Record]) -> list[Finding]:
     """Tell each verdict once, with the number of candidates it holds for if there are several."""
     assessed = [record for record in records if record.status == "assessed" and record.verdict]
     counts = Counter((record.verdict, record.good) for record in assessed)
-    several = len(assessed) > len(counts)
-    found = [
-        Finding(
-            f"{count} of the {len(records)} candidates have the verdict: {verdict}."
-            if several
-            else f"{verdict[:1].upper()}{verdict[1:]}.",
-            good,
-        )
-        for (verdict, good), count in counts.most_common(_VERDICTS)
-    ]
+    found, rest = [], len(assessed)
+    for (verdict, good), count in counts.most_common(_VERDICTS):
+        several = f"{count} of the {len(records)} candidates have the verdict: {verdict}."
+        found.append(Finding(several if len(assessed) > len(counts) else f"{verdict[:1].upper()}{verdict[1:]}.", good))
+        rest -= count
     if len(counts) > _VERDICTS:
-        rest = sum(counts.values()) - sum(count for _, count in counts.most_common(_VERDICTS))
         found.append(Finding(f"{rest} more with {len(counts) - _VERDICTS} other verdicts: see results.csv."))
     return found
 
@@ -170,12 +138,8 @@ def _nothing_left(records: Sequence[Record]) -> list[Finding]:
         return []
     if len(records) > 1:
         return [Finding(f"None of the {len(records)} candidates came through all stages.", False)]
-    words = "was rejected" if stopped[0].status == "rejected" else "failed"
-    return [Finding(f"The only candidate {words}: {_ended(stopped[0].reason or stopped[0].cause)}", False)]
-
-
-def _ended(text: str) -> str:
-    return text if text.endswith(".") else f"{text}."
+    words, why = "was rejected" if stopped[0].status == "rejected" else "failed", stopped[0].reason or stopped[0].cause
+    return [Finding(f"The only candidate {words}: {why.removesuffix('.')}.", False)]
 
 
 def _rejected(records: Sequence[Record]) -> list[Finding]:
@@ -185,7 +149,8 @@ def _rejected(records: Sequence[Record]) -> list[Finding]:
     if not causes:
         return []
     if len(causes) == 1 and total > 1:
-        return [Finding(f"Rejected: {total} of {len(records)}, all for the same reason: {_ended(causes[0][0])}")]
+        why = causes[0][0].removesuffix(".")
+        return [Finding(f"Rejected: {total} of {len(records)}, all for the same reason: {why}.")]
     listed = "; ".join(f"{count} because {cause}" for cause, count in causes[:_REASONS])
     more = f"; {len(causes) - _REASONS} more reasons" if len(causes) > _REASONS else ""
     return [Finding(f"Rejected: {total} of {len(records)}: {listed}{more}.")]
@@ -200,30 +165,23 @@ def _how_sure(ranking: Ranking, records: Sequence[Record]) -> list[Finding]:
         if found:
             weakest = next(kind for kind in ("estimated", "certified", "exact") if kind in found)
             kinds.setdefault(weakest, []).append(objective.quantity)
-    words = {
-        "exact": "exact",
-        "certified": "certified (proved bounds)",
-        "estimated": "estimated in floating point, not proved",
-    }
-    told = [f"{', '.join(names)}: {words[kind]}" for kind, names in kinds.items()]
+    words = {"certified": "certified (proved bounds)", "estimated": "estimated in floating point, not proved"}
+    told = [f"{', '.join(names)}: {words.get(kind, kind)}" for kind, names in kinds.items()]
     return [Finding(f"Guarantee of the objectives: {'; '.join(told)}.")] if told else []
 
 
 def summary_tables(report: Report) -> tuple[Table, ...]:
     """Return what the terminal and the top of the page show: solutions, candidates, results, times."""
-    tables = []
-    products = report.products
-    if "solutions" in products:
-        tables.append(_solutions_table(products["solutions"]))
-    if any(record.key for record in products.get("records", ())):
-        tables.append(_verdict_table(products["records"]))
-    if any(record.status in ("rejected", "failed") for record in products.get("records", ())):
-        tables.append(_reasons_table(products["records"]))
+    products, records = report.products, report.products.get("records", ())
+    tables = [_solutions_table(products["solutions"])] if "solutions" in products else []
+    if any(record.key for record in records):
+        tables.append(_verdict_table(records))
+    stopped = _counted((r.status, r.cause or r.reason) for r in records if r.status in ("rejected", "failed"))
+    if stopped:
+        rows = ((count, *key) for key, count in stopped)
+        tables.append(table("Rejected and failed candidates, by reason", ("count", "status", "reason"), rows))
     tables += [_ranking_table(value, report) for value in products.values() if isinstance(value, Ranking)]
-    for value in products.values():
-        tables += [item for item in value if isinstance(item, Table)] if isinstance(value, tuple) else []
-    tables.append(_times_table(report))
-    return tuple(tables)
+    return (*tables, *_given(report), _times_table(report))
 
 
 def _times_table(report: Report) -> Table:
@@ -244,13 +202,6 @@ def _times_table(report: Report) -> Table:
 def _counted(found: Iterable[Hashable]) -> list[tuple[Any, int]]:
     """Count, the most frequent first; those as frequent in their own order."""
     return sorted(Counter(found).items(), key=lambda item: (-item[1], item[0]))
-
-
-def _reasons_table(records: tuple[Record, ...]) -> Table:
-    """Count why candidates were rejected or failed, the most frequent reason first."""
-    counts = _counted((r.status, r.cause or r.reason) for r in records if r.status in ("rejected", "failed"))
-    rows = ((count, *key) for key, count in counts)
-    return table("Rejected and failed candidates, by reason", ("count", "status", "reason"), rows)
 
 
 def _ranking_table(ranking: Ranking, report: Report) -> Table:

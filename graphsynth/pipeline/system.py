@@ -26,35 +26,21 @@ if TYPE_CHECKING:
 class Stage:
     """One arrow of the pipeline.
 
-    Attributes
-    ----------
-    name : str
-        Short name for tables and messages.
-    function : str
-        ``"package.module:function"``; called as ``function(context, *needs)`` in the order of `needs`.
-    needs, gives : tuple of str
-        Names of products. A stage that gives several returns a tuple in the order of `gives`.
-    stream : bool
-        It gives one product, an iterable of candidates, and may make them one by one.
-    each : bool
-        It works on one candidate at a time: of what the stream or another such stage gives it gets the candidate's
-        own value, of everything else the whole product.  Candidates go through all such stages one after the other,
-        in parallel if there is an executor; one that raises is recorded and stops nobody else
-        (:class:`~graphsynth.pipeline.products.Rejected`: it does not meet a goal; anything else: it failed).
-    cost : float
-        Of stages for each candidate that could come next, the cheapest comes first.
-    aside : bool
-        Nothing but outputs comes of it, of products that can be sent to another process: with an executor it may run
-        there while later stages run here.
+    A stage for `each` candidate gets, of what the stream or another such stage gives, the candidate's own value, and of
+    everything else the whole product.  Candidates go through all such stages one after the other, in parallel if there
+    is an executor; one that raises is recorded and stops nobody else
+    (:class:`~graphsynth.pipeline.products.Rejected`: it does not meet a goal; anything else: it failed).
     """
 
-    name: str
-    function: str
-    needs: tuple[str, ...] = ()
-    gives: tuple[str, ...] = ()
-    stream: bool = False
-    each: bool = False
-    cost: float = 1.0
+    name: str  # short, for tables and messages
+    function: str  # ``"package.module:function"``; called as ``function(context, *needs)`` in the order of `needs`
+    needs: tuple[str, ...] = ()  # names of products
+    gives: tuple[str, ...] = ()  # names of products; with several, the function returns a tuple in this order
+    stream: bool = False  # it gives one product, an iterable of candidates, and may make them one by one
+    each: bool = False  # it works on one candidate at a time
+    cost: float = 1.0  # of stages for each candidate that could come next, the cheapest comes first
+    #: nothing but outputs comes of it, of products that can be sent to another process: with an executor it may run
+    #: there while later stages run here
     aside: bool = False
 
     def load(self) -> Callable[..., Any]:
@@ -79,48 +65,24 @@ ENUMERATION = Plan("enumeration", "graphsynth.evidence.enumeration:of_scene", st
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """A kind of mechanism that scenes can be about.
+    """A kind of mechanism that scenes can be about."""
 
-    Attributes
-    ----------
-    table : type
-        Frozen dataclass: the schema of ``[mechanism]``.  Its first field is ``module: Literal["name"]``.
-    stages : tuple of Stage
-        What can be computed, besides the stages of ``[structure]``: tables, charts and pictures among it.
-    structure : {"required", "optional", "none"}
-        Whether a scene must, may or must not have a table ``[structure]``.
-    more : callable, optional
-        Further stages for a scene as read: those of parts that only some scenes have.
-    build : str
-        ``"package.module:function"`` that makes the mechanism of a scene, called with a
-        `graphsynth.pipeline.stages.Context`; empty if a scene has many.
-    evidence : tuple of Plan
-        Problems on which error against run time is measured.
-    cases : tuple of str
-        Its stress cases, by name or section, as ``graphsynth stress`` takes them.
-    """
-
-    table: type
-    stages: tuple[Stage, ...]
-    structure: Literal["required", "optional", "none"] = "optional"
-    more: Callable[[Any], tuple[Stage, ...]] | None = None
+    table: type  # the schema of ``[mechanism]``, a frozen dataclass; its first field is ``module: Literal["name"]``
+    stages: tuple[Stage, ...]  # what can be computed besides ``[structure]``: tables, charts and pictures among it
+    structure: Literal["required", "optional", "none"] = "optional"  # whether a scene has a table ``[structure]``
+    more: Callable[[Any], tuple[Stage, ...]] | None = None  # stages of parts that only some scenes have, by scene
+    #: ``"package.module:function"`` that makes the mechanism of a scene, called with a
+    #: `graphsynth.pipeline.stages.Context`; empty if a scene has many
     build: str = ""
-    evidence: tuple[Plan, ...] = ()
-    cases: tuple[str, ...] = ()
-
-    def stages_for(self, scene: object) -> tuple[Stage, ...]:
-        """Return all stages that a scene of this system can use."""
-        return (*self.stages, *(self.more(scene) if self.more else ()))
+    evidence: tuple[Plan, ...] = ()  # problems on which error against run time is measured
+    cases: tuple[str, ...] = ()  # its stress cases, by name or section, as ``graphsynth stress`` takes them
 
 
 def announced(kind: str) -> EntryPoints:
     """Return the entry points of a group, of graphsynth and of other packages: what a name stands for.
 
-    Parameters
-    ----------
-    kind : {"systems", "stages", "evidence"}
-        ``name = "package.module"`` or ``"package.module:SYSTEM"``; ``product = "package.module:STAGE"``; ``system =
-        "package.module:PLANS"``, a sequence of further `Plan`.
+    Of ``systems``: ``name = "package.module"`` or ``"package.module:SYSTEM"``; of ``stages``: ``product =
+    "package.module:STAGE"``; of ``evidence``: ``system = "package.module:PLANS"``, a sequence of further `Plan`.
     """
     from importlib.metadata import entry_points
 
@@ -130,8 +92,6 @@ def announced(kind: str) -> EntryPoints:
 def system_names() -> tuple[str, ...]:
     """Return the names of all installed systems.
 
-    Examples
-    --------
     >>> "planar" in system_names()
     True
     """
@@ -143,17 +103,14 @@ def system(name: str, place: Place | None = None) -> System:
 
     A `SceneError` with the place where it was named says that the name is unknown, or the module missing or no system.
 
-    Examples
-    --------
     >>> system("planar").structure
     'optional'
     """
     at = place or Place("scene")
     values = {point.name: point.value for point in announced("systems")}
-    value = values.get(name)
-    if value is None:
+    if name not in values:
         raise at.error(f"has module = {name!r}, which is no system of mechanisms{suggest(name, values)}", "module")
-    module, _, attribute = value.partition(":")
+    module, _, attribute = (value := values[name]).partition(":")
     try:
         found = getattr(import_module(module), attribute or "SYSTEM")
     except (ImportError, AttributeError) as error:
@@ -167,8 +124,5 @@ def system(name: str, place: Place | None = None) -> System:
 
 def plans_of(name: str, *, structure: bool = False) -> tuple[Plan, ...]:
     """Return the problems of a system, those that other packages announce included; more with a structural question."""
-    found = list(system(name).evidence)
-    for point in announced("evidence").select(name=name):
-        found += point.load()
-    found += [ENUMERATION] if structure else []
-    return tuple(plan for plan in found if structure or not plan.structure)
+    others = (plan for point in announced("evidence").select(name=name) for plan in point.load())
+    return tuple(plan for plan in (*system(name).evidence, *others, ENUMERATION) if structure or not plan.structure)

@@ -43,30 +43,18 @@ ANY_LENGTH = Unit("mm", Fraction(1, 1000), 0, (1, 0, 0, 0, 0, 0))
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class In:
-    """Annotation of a number: the unit of a bare number in the file, and its bounds in that unit.
+    """Annotation of a number: the unit of a bare number in the file, and its bounds in that unit."""
 
-    Parameters
-    ----------
-    unit : str
-        As `SUFFIXES` lists them, or any other unit; empty for a plain number.
-    above, least, below, most : float
-        Bounds, the first and third excluded.
-    why : str
-        Ends the message; without it the bounds do.
-    """
-
-    unit: str = ""
-    above: float = -math.inf
+    unit: str = ""  # as `SUFFIXES` lists them, or any other unit; empty for a plain number
+    above: float = -math.inf  # bound that is excluded
     least: float = -math.inf
-    below: float = math.inf
+    below: float = math.inf  # bound that is excluded
     most: float = math.inf
-    why: str = ""
+    why: str = ""  # ends the message; without it the bounds do
 
     def refusal(self, number: float) -> str:
         """Return what to do if a number is out of bounds, and nothing if it is within.
 
-        Examples
-        --------
         >>> In("mm", above=0).refusal(-1.0), In(least=2, most=9).refusal(1), In(above=0).refusal(3.0)
         ('it must be positive', 'use 2 to 9', '')
         """
@@ -88,8 +76,6 @@ Positions = Annotated[int, In(least=8, most=1_000_000, why="use 8 to 1000000 cra
 class Place:
     r"""Where a value stands: the file, the dotted key and, if the text is there, the line.
 
-    Examples
-    --------
     >>> str(Place("lambda.toml") / "mechanism" / "tilt")
     'lambda.toml: [mechanism.tilt]'
     >>> str(Place("lambda.toml", text="[mechanism]\ntilt = 1") / "mechanism" / "tilt")
@@ -122,8 +108,6 @@ _LONG = re.compile(r"\S{81,}")
 def shortened(sentence: str) -> str:
     """Return a sentence in which no word is longer than a line: some files hold keys of megabytes.
 
-    Examples
-    --------
     >>> len(shortened("has an unknown key " + 5000 * "k"))
     99
     """
@@ -133,8 +117,6 @@ def shortened(sentence: str) -> str:
 def require(condition: bool, sentence: str) -> None:
     """Raise a `SceneError` unless the condition holds: for ``__post_init__`` of a schema; the reader adds the place.
 
-    Examples
-    --------
     >>> require(1 > 0, "has length 0; a length must be positive")
     """
     if not condition:
@@ -144,8 +126,6 @@ def require(condition: bool, sentence: str) -> None:
 def suggest(word: str, choices: Iterable[str]) -> str:
     """Return ``"; did you mean 'x'?"`` for the nearest choice, or the list of choices if none is near.
 
-    Examples
-    --------
     >>> suggest("lenghts", ["lengths", "tilt"])
     "; did you mean 'lengths'?"
     >>> suggest("colour", ["lengths", "tilt"])
@@ -169,8 +149,6 @@ def read_table(schema: type[T], table: object, place: Place) -> T:
 
     A `SceneError` with the place says what is wrong: an unknown or missing key, a value of a wrong type or unit.
 
-    Examples
-    --------
     >>> @dataclasses.dataclass(frozen=True)
     ... class Bearing:
     ...     tilt: Annotated[float, In("rad")]
@@ -202,34 +180,16 @@ def read_table(schema: type[T], table: object, place: Place) -> T:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Field:
-    """One key of a table.
+    """One key of a table."""
 
-    Attributes
-    ----------
-    name, key : str
-        Of the field of the dataclass, and in the file.
-    alias : str
-        The key for a value with a written unit; empty if there is none.
-    kind : type
-        The annotation without `In` and unit.
-    unit : Unit
-        Of a bare number.
-    bounds : In or None
-    si : bool
-        The field holds SI; otherwise a number in `unit`.
-    default : object
-        `dataclasses.MISSING` if the key must be given, or if each table has its own.
-    required : bool
-    """
-
-    name: str
-    key: str
-    alias: str
-    kind: Any
-    unit: Unit
+    name: str  # of the field of the dataclass
+    key: str  # in the file
+    alias: str  # the key for a value with a written unit; empty if there is none
+    kind: Any  # the annotation without `In` and unit
+    unit: Unit  # of a bare number
     bounds: In | None
-    si: bool
-    default: Any
+    si: bool  # the field holds SI; otherwise a number in `unit`
+    default: Any  # `dataclasses.MISSING` if the key must be given, or if each table has its own
     required: bool
 
 
@@ -240,8 +200,6 @@ _SUFFIX_OF = {unit: suffix for suffix, unit in reversed(SUFFIXES.items())}
 def fields_of(schema: type) -> tuple[Field, ...]:
     """Return the keys of a table from its frozen dataclass.
 
-    Examples
-    --------
     >>> @dataclasses.dataclass(frozen=True)
     ... class Gear:
     ...     radius: Annotated[float, In("mm")]
@@ -309,8 +267,6 @@ def written(table: object, field: str) -> Fraction | None:
 
     None if the field is not given, is no number, or needs pi to be converted.
 
-    Examples
-    --------
     >>> written({"radius": "1.75 cm"}, "radius_mm"), written({"radius_mm": 17.5}, "radius_mm")
     (Fraction(35, 2), Fraction(35, 2))
     """

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -16,6 +17,7 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 Dimensions = tuple[int, int, int, int, int, int]
+_Meaning = tuple[Fraction, int, Dimensions]
 _PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
 #: One degree, radians.
 DEGREE = math.pi / 180.0
@@ -26,8 +28,6 @@ _NONE: Dimensions = (0, 0, 0, 0, 0, 0)
 class Unit:
     """A unit of measurement; ``dimensions`` are exponents of (m, kg, s, A, rad, byte).
 
-    Examples
-    --------
     >>> Unit.parse("N m/rad").dimensions
     (2, 1, -2, 0, -1, 0)
     """
@@ -48,8 +48,6 @@ class Unit:
     def to_si(self, number: float) -> float:
         """Return a number in this unit in SI, radians for angles.
 
-        Examples
-        --------
         >>> Unit.parse("mm").to_si(17.5), Unit.parse("deg").to_si(180.0)
         (0.0175, 3.141592653589793)
         """
@@ -60,8 +58,6 @@ class Unit:
     def from_si(self, value: T) -> T:
         """Return an SI value, or an array of them, in this unit.
 
-        Examples
-        --------
         >>> Unit.parse("°").from_si(math.pi), Unit.parse("mm").from_si(0.002)
         (180.0, 2.0)
         """
@@ -81,41 +77,12 @@ class Unit:
         return _QUANTITIES.get(self.dimensions, f"a quantity in {self.text}")
 
 
-def _table() -> dict[str, tuple[Fraction, int, Dimensions]]:
-    base = {
-        "m": (1, 0, 0, 0, 0, 0), "g": (0, 1, 0, 0, 0, 0), "s": (0, 0, 1, 0, 0, 0), "A": (0, 0, 0, 1, 0, 0),
-        "rad": (0, 0, 0, 0, 1, 0), "B": (0, 0, 0, 0, 0, 1), "N": (1, 1, -2, 0, 0, 0), "J": (2, 1, -2, 0, 0, 0),
-        "W": (2, 1, -3, 0, 0, 0), "Pa": (-1, 1, -2, 0, 0, 0), "V": (2, 1, -3, -1, 0, 0), "H": (2, 1, -2, -2, 0, 0),
-        "ohm": (2, 1, -3, -2, 0, 0), "Wb": (2, 1, -2, -1, 0, 0),
-    }  # fmt: skip
-    prefixes = {"": 0, "n": -9, "u": -6, "µ": -6, "m": -3, "k": 3, "M": 6, "G": 9}
-    units: dict[str, tuple[Fraction, int, Dimensions]] = {}
-    for symbol, dimensions in base.items():
-        for prefix, power in prefixes.items():
-            units[prefix + symbol] = (Fraction(10) ** (power - (3 if symbol == "g" else 0)), 0, dimensions)
-    length, time, angle = base["m"], base["s"], base["rad"]
-    units |= {
-        "": (Fraction(1), 0, _NONE), "1": (Fraction(1), 0, _NONE), "%": (Fraction(1, 100), 0, _NONE),
-        "‰": (Fraction(1, 1000), 0, _NONE), "ppm": (Fraction(1, 10**6), 0, _NONE),
-        "cm": (Fraction(1, 100), 0, length), "in": (Fraction(254, 10000), 0, length),
-        "min": (Fraction(60), 0, time), "h": (Fraction(3600), 0, time), "t": (Fraction(1000), 0, base["g"]),
-        "deg": (Fraction(1, 180), 1, angle), "°": (Fraction(1, 180), 1, angle), "turn": (Fraction(2), 1, angle),
-        "arcmin": (Fraction(1, 10800), 1, angle), "arcsec": (Fraction(1, 648000), 1, angle),
-        "′": (Fraction(1, 10800), 1, angle), "″": (Fraction(1, 648000), 1, angle),
-        "rpm": (Fraction(1, 30), 1, (0, 0, -1, 0, 1, 0)), "Nm": (Fraction(1), 0, base["J"]),
-        "mNm": (Fraction(1, 1000), 0, base["J"]), "Nmm": (Fraction(1, 1000), 0, base["J"]),
-        "Ω": (Fraction(1), 0, base["ohm"]),
-    }  # fmt: skip
-    return units
-
-
-_UNITS = _table()
 _SYMBOL = re.compile(r"([^\W\d²³]+|[%‰°′″Ω]|1)(?:\^?(-?[1-9])|([²³]))?")
 
 
-@cache
-def _parse(text: str) -> Unit:
-    factor, pi, dimensions, sign = Fraction(1), 0, [0] * 6, 1
+def _meaning(text: str, units: Mapping[str, _Meaning]) -> _Meaning:
+    """Return the factor to SI, the power of pi and the dimensions of a product of symbols."""
+    factor, pi, dimensions, sign = Fraction(1), 0, _NONE, 1
     for part in re.findall(r"/|[^\s*·/]+", text):
         if part == "/":
             if sign < 0:
@@ -123,49 +90,45 @@ def _parse(text: str) -> Unit:
             sign = -1
             continue
         match = _SYMBOL.fullmatch(part)
-        known = _UNITS.get(match[1]) if match else None
+        known = units.get(match[1]) if match else None
         if known is None or match is None:
             raise ValueError(part)
         power = sign * (int(match[2]) if match[2] else {"²": 2, "³": 3}.get(match[3], 1))
         factor *= known[0] ** power
         pi += known[1] * power
-        dimensions = [have + power * more for have, more in zip(dimensions, known[2], strict=True)]
-        sign = 1
+        a, b, c, d, e, f = (have + power * more for have, more in zip(dimensions, known[2], strict=True))
+        dimensions, sign = (a, b, c, d, e, f), 1
     if sign < 0:  # a stroke with nothing behind it
         raise ValueError(text)
-    a, b, c, d, e, f = dimensions
-    return Unit(text, factor, pi, (a, b, c, d, e, f))
+    return factor, pi, dimensions
 
 
-_QUANTITIES: dict[Dimensions, str] = {
-    _parse(text).dimensions: words
-    for text, words in {
-        "": "a plain number", "m": "a length", "m^2": "an area", "rad": "an angle", "s": "a time", "kg": "a mass",
-        "N": "a force", "N m": "a torque", "rad/s": "an angular velocity", "rad/s^2": "an angular acceleration",
-        "m/s": "a velocity", "m/s^2": "an acceleration", "kg m^2": "a moment of inertia", "V": "a voltage",
-        "A": "a current", "ohm": "a resistance", "H": "an inductance", "W": "a power", "N/m": "a stiffness",
-        "N s/m": "a damping", "Pa": "a pressure", "B": "a size of memory",
-    }.items()
-}  # fmt: skip
+@cache
+def _parse(text: str) -> Unit:
+    return Unit(text, *_meaning(text, _UNITS))
+
+
+def _listed(text: str) -> list[tuple[str, str]]:
+    """Read ``"name = value; name = value"``; a name without a value stands for itself."""
+    pairs = [entry.partition(" = ") for entry in text.split("; ")]
+    return [(name, value or name) for name, _, value in pairs]
 
 
 #: Endings of keys that say the unit of a bare number: ``radius_mm = 17.5``.
-SUFFIXES: dict[str, str] = {
-    **{u: u for u in ("mm", "cm", "m", "um", "mm2", "mm4", "m2", "rad", "mrad", "deg", "arcmin", "arcsec", "s", "ms")},
-    **{u: u for u in ("us", "kg", "g", "N", "kN", "Nm", "Nmm", "J", "V", "A", "ohm", "H", "mH", "W", "rpm")},
-    **{u: u for u in ("Pa", "MPa", "GPa", "MB")},
-    "percent": "%", "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "mm_s": "mm/s", "mm_s2": "mm/s^2",
-    "rad_s2": "rad/s^2", "m_s2": "m/s^2", "kg_m2": "kg m^2", "g_mm2": "g mm^2", "kg_mm2": "kg mm^2", "V_s": "V s",
-    "N_per_m": "N/m", "N_per_mm": "N/mm", "Nm_per_rad": "N m/rad", "Nm_s": "N m s", "N_s_per_m": "N s/m",
-    "Nm_per_A": "N m/A", "V_per_rad_s": "V s/rad", "Nm_s_per_rad": "N m s/rad", "kg_m": "kg m", "Nms": "N m s",
-}  # fmt: skip
+SUFFIXES: dict[str, str] = dict(
+    _listed(
+        "mm; cm; m; um; mm2; mm4; m2; rad; mrad; deg; arcmin; arcsec; s; ms; us; kg; g; N; kN; Nm; Nmm; J; V; A; ohm; "
+        "H; mH; W; rpm; Pa; MPa; GPa; MB; percent = %; rad_s = rad/s; deg_s = deg/s; m_s = m/s; mm_s = mm/s; "
+        "mm_s2 = mm/s^2; rad_s2 = rad/s^2; m_s2 = m/s^2; kg_m2 = kg m^2; g_mm2 = g mm^2; kg_mm2 = kg mm^2; V_s = V s; "
+        "N_per_m = N/m; N_per_mm = N/mm; Nm_per_rad = N m/rad; Nm_s = N m s; N_s_per_m = N s/m; Nm_per_A = N m/A; "
+        "V_per_rad_s = V s/rad; Nm_s_per_rad = N m s/rad; kg_m = kg m; Nms = N m s"
+    )
+)
 
 
 def split_suffix(key: str) -> tuple[str, str]:
     """Split a key into its name and the unit its ending says, empty if it says none.
 
-    Examples
-    --------
     >>> split_suffix("clearance_mm"), split_suffix("speed_rad_s"), split_suffix("branch")
     (('clearance', 'mm'), ('speed', 'rad/s'), ('branch', ''))
     """
@@ -185,8 +148,6 @@ _NUMBER = re.compile(
 def split_value(text: str) -> tuple[Fraction, str]:
     """Split a written value into its exact number and the text of its unit; a `ValueError` if it begins with none.
 
-    Examples
-    --------
     >>> split_value("17.5 mm"), split_value("1/30")
     ((Fraction(35, 2), 'mm'), (Fraction(1, 30), ''))
     """
@@ -203,11 +164,49 @@ def split_value(text: str) -> tuple[Fraction, str]:
 def convert(number: Fraction, unit: Unit, to: Unit) -> tuple[Fraction, bool]:
     """Return a number in another unit of the same quantity, and whether it is exact (pi may not cancel).
 
-    Examples
-    --------
     >>> convert(Fraction(3), Unit.parse("cm"), Unit.parse("mm"))
     (Fraction(30, 1), True)
     """
     pi = unit.pi - to.pi
     value = number * unit.factor / to.factor
     return (value * _PI**pi, number == 0) if pi else (value, True)
+
+
+_PREFIXES = {"": 0, "n": -9, "u": -6, "µ": -6, "m": -3, "k": 3, "M": 6, "G": 9}
+#: Units that take a prefix, each by units before it, and units that take none; ``pi`` is the number.
+_PREFIXED = "N = 1 kg m/s^2; J = 1 N m; W = 1 J/s; Pa = 1 N/m^2; V = 1 W/A; H = 1 V s/A; ohm = 1 V/A; Wb = 1 V s"
+_OTHERS = (
+    "1 = 1; % = 1/100; ‰ = 1/1000; ppm = 1/1000000; cm = 1/100 m; in = 254/10000 m; min = 60 s; h = 3600 s; "
+    "t = 1000 kg; turn = 2 pi rad; deg = 1/180 pi rad; ° = 1 deg; arcmin = 1/60 deg; ′ = 1 arcmin; "
+    "arcsec = 1/60 arcmin; ″ = 1 arcsec; rpm = 1/30 pi rad/s; Nm = 1 N m; mNm = 1 mN m; Nmm = 1 N mm; Ω = 1 ohm"
+)
+
+
+def _table() -> dict[str, _Meaning]:
+    units: dict[str, _Meaning] = {"": (Fraction(1), 0, _NONE), "pi": (Fraction(1), 1, _NONE)}
+
+    def define(symbol: str, number: Fraction, meaning: _Meaning, prefixes: Mapping[str, int]) -> None:
+        for prefix, power in prefixes.items():
+            units[prefix + symbol] = number * meaning[0] * Fraction(10) ** power, meaning[1], meaning[2]
+
+    for place, symbol in enumerate(("m", "g", "s", "A", "rad", "B")):
+        a, b, c, d, e, f = (int(k == place) for k in range(6))
+        define(symbol, Fraction(1, 1000 if symbol == "g" else 1), (Fraction(1), 0, (a, b, c, d, e, f)), _PREFIXES)
+    for definitions, prefixes in ((_PREFIXED, _PREFIXES), (_OTHERS, {"": 0})):
+        for symbol, value in _listed(definitions):
+            number, unit = split_value(value)
+            define(symbol, number, _meaning(unit, units), prefixes)
+    del units["pi"]
+    return units
+
+
+_UNITS = _table()
+_QUANTITIES: dict[Dimensions, str] = {
+    _parse(unit).dimensions: words
+    for unit, words in _listed(
+        "1 = a plain number; m = a length; m^2 = an area; rad = an angle; s = a time; kg = a mass; N = a force; "
+        "N m = a torque; rad/s = an angular velocity; rad/s^2 = an angular acceleration; m/s = a velocity; "
+        "m/s^2 = an acceleration; kg m^2 = a moment of inertia; V = a voltage; A = a current; ohm = a resistance; "
+        "H = an inductance; W = a power; N/m = a stiffness; N s/m = a damping; Pa = a pressure; B = a size of memory"
+    )
+}

@@ -48,11 +48,12 @@ def test_facts_are_those_of_the_graph_class(links, mobility):
 def test_groups_are_those_of_the_decomposition(links, mobility):
     chains, rows = facts_of(links, mobility)
     listed = dict.fromkeys(range(len(chains)), 0)
+    every, structures = list(rows.groups), list(rows.structures)
     for at, frame, driver, structure in rows.mechanisms:
         graph = chains[at].canonical().with_frame(frame)
         drivers = [moved(int(link), frame) for link in str(driver).split(",")]
         expected = decompose(graph, drivers).groups
-        groups = [rows.groups[number] for number in rows.structures[structure]]
+        groups = [every[number] for number in structures[structure]]
         wanted = sorted((len(group.links), group.order, group.group_class) for group in expected)
         assert wanted == sorted((group.links, group.order, group.group_class) for group in groups)
         listed[at] += 1
@@ -130,8 +131,9 @@ def test_contracted_graphs_are_the_chains_without_their_binary_links():
 
     for links, mobility in ((8, 1), (9, 2), (9, 4)):
         chains, rows = facts_of(links, mobility)
+        shapes = list(rows.contracted)
         for chain, found in zip(chains, rows.chains, strict=True):
-            vertices, edges = rows.contracted[found[-1]]
+            vertices, edges = shapes[found[-1]]
             whole = nx.MultiGraph(chain.to_networkx())
             for link in [v for v in whole if whole.degree(v) == 2]:
                 if len(near := [w for _, w in whole.edges(link)]) == 2 and link not in near:

@@ -14,9 +14,9 @@ from graphsynth.core.compilation import kernel
 from graphsynth.core.intrinsics import lowest_bit, popcount
 from graphsynth.structure.kernels import ONE, ZERO, canon, canon_workspace
 
-#: A group with its base has at most 17 vertices, and 136 pairs of them: they fit into three words.
 MOST_LINKS = 18
-WORDS = 3
+#: Bytes of the canonical adjacency of a group: with its base at most 17 vertices, 136 pairs of them.
+FORM = 17
 #: 18 links make 8 loops at most, and so 9 parallel paths.
 MOST_PATHS = 9
 
@@ -39,7 +39,7 @@ class Block(NamedTuple):
     drives: NDArray[np.uint64]  # (chains, K) masks of the driven links
     sizes: NDArray[np.uint8]  # (chains, K, n // 2) links of each group
     outers: NDArray[np.uint8]  # (chains, K, n // 2) outer joints
-    forms: NDArray[np.uint64]  # (chains, K, n // 2, WORDS) canonical adjacency
+    forms: NDArray[np.uint8]  # (chains, K, n // 2, FORM) canonical adjacency, as `spell` writes it
     parents: NDArray[np.uint8]  # (chains, n // 2, bytes + 1) first byte 1 where there is one
     contracted: NDArray[np.uint8]  # (chains, 1 + n n) vertices, then multiplicities
 
@@ -196,18 +196,6 @@ def lay_out_group(group, known, masks, local, small, colours):
 
 
 @kernel
-def pack_bits(size, form, out):
-    """Write the upper triangle of a canonical adjacency into words, the first pair in the lowest bit of the first."""
-    out[:] = ZERO
-    bit = 0
-    for b in range(1, size):
-        for a in range(b):
-            if form[0, b] >> np.uint64(a) & ONE != ZERO:
-                out[bit >> 6] |= ONE << np.uint64(bit & 63)
-            bit += 1
-
-
-@kernel
 def without_dyad(n, masks, u, w, local, small):
     """Adjacency of the chain without the adjacent binary links u and w; False if a link would lose too much."""
     gone = ONE << np.uint64(u) | ONE << np.uint64(w)
@@ -304,7 +292,7 @@ def independent_loops(n, rows, edge_of, most, basis, distance, before, queue):
 def classes_of(vertices, forms, out):
     """Class of each group: most joints of a link, or links of the longest loop of a minimum basis, at least 2.
 
-    ``vertices`` int64[groups] with the base, ``forms`` uint64[groups, WORDS] as :func:`pack_bits` gives them.
+    ``vertices`` int64[groups] with the base, ``forms`` uint8[groups, FORM] as :func:`spell` writes them.
     """
     rows, edge_of = np.zeros(MOST_LINKS, np.uint64), np.zeros((MOST_LINKS, MOST_LINKS), np.int64)
     basis, distance = np.zeros(64, np.uint64), np.zeros(MOST_LINKS, np.int64)
@@ -314,7 +302,7 @@ def classes_of(vertices, forms, out):
         rows[:] = ZERO
         for b in range(1, n):
             for a in range(b):
-                if forms[g, bit >> 6] >> np.uint64(bit & 63) & ONE != ZERO:
+                if forms[g, bit >> 3] & (128 >> (bit & 7)):
                     rows[a] |= ONE << np.uint64(b)
                     rows[b] |= ONE << np.uint64(a)
                     if a > 0:
@@ -379,10 +367,10 @@ def grouped(n, joints, rows, placed, scratch, local, small, colours, space, out)
         sizes[g], outers[g] = size - 1, outer
         if size > 3:
             canon(size, np.int64(1), small, colours, lab, form, gens, index, orbits, wi, wu)
-            pack_bits(size, form, forms[g])
-        else:
-            forms[g, :] = ZERO
-            forms[g, 0] = np.uint64(7)
+            spell(size, form[0], forms[g])
+        else:  # a dyad: all three pairs
+            forms[g, :] = 0
+            forms[g, 0] = 224
     return found >= 0
 
 

@@ -149,8 +149,6 @@ def _crank(mechanism: Mechanism) -> float:
 def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
     """Return the mechanism with all lengths multiplied (turning and sliding pairs, pins in slots).
 
-    Examples
-    --------
     >>> from graphsynth.mechanism.model import Mechanism
     >>> scaled(Mechanism.four_bar(2.0, 1.0, 2.5, 2.5), 0.5).joint(2, 3).at_a
     (1.25, 0.0)
