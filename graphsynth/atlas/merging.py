@@ -34,8 +34,14 @@ def merge(path: Path, parts: list[Path]) -> None:
             for plan in plans:
                 _merge_family(target, plan, shards)
             for part in parts:
-                with readable(part):
-                    _copy_evaluations(shards.open(part), target)
+                with readable(part), transaction(target):
+                    select = (
+                        "SELECT frame, driver, kind, status, value, unit, guarantee, data, key FROM evaluations "
+                        "JOIN chains USING (chain_id)"
+                    )
+                    insert = "SELECT chain_id, ?, ?, ?, ?, ?, ?, ?, ? FROM chains WHERE key = ?"
+                    found = shards.open(part).execute(select)
+                    target.executemany(f"INSERT OR REPLACE INTO evaluations {insert}", found)
         finally:
             settle(target)
 
@@ -70,11 +76,6 @@ class _Plan:
     cuts: dict[tuple[int, str], Path] = field(default_factory=dict)
     where: dict[int, tuple[Path, int, int]] = field(default_factory=dict)
 
-    @property
-    def pieces(self) -> int:
-        """Pieces of the whole family."""
-        return next(iter(self.cuts))[0]
-
 
 def _plans(parts: list[Path]) -> list[_Plan]:
     """Find every piece of every family, one shard after the other.
@@ -85,30 +86,40 @@ def _plans(parts: list[Path]) -> list[_Plan]:
     for part in parts:
         with closing(connect(part, readonly=True)) as shard, readable(part, *GARBAGE):
             _trust(shard, part)
-            for number, *question, pieces, cut, name in shard.execute(
+            for number, mobility, links, fractionated, pieces, cut, name in shard.execute(
                 "SELECT family_id, mobility, links, fractionated, pieces, cut, shard FROM families"
             ).fetchall():
-                key = question[0], question[1], question[2]
+                key = mobility, links, fractionated
                 plan = plans.setdefault(key, _Plan(key))
                 plan.given.add(name)
                 plan.cuts.setdefault((pieces, cut), part)
-                _add_pieces(plan, part, shard, number)
-    for plan in plans.values():
+                select = "SELECT piece, first_chain, chains FROM pieces WHERE family_id = ?"
+                for piece, first, chains in shard.execute(select, (number,)):
+                    if piece in plan.where:
+                        raise GraphsynthError(
+                            f"{part} and {plan.where[piece][0]} both hold piece {piece} of mobility {mobility}, "
+                            f"{links} links: give every shard once"
+                        )
+                    plan.where[piece] = part, first, chains
+    for (mobility, links, _), plan in plans.items():
         if len(plan.cuts) > 1:
             raise GraphsynthError(
                 f"{' and '.join(map(str, plan.cuts.values()))} were built by different versions: build all shards with "
                 "one"
             )
-        _check_all_there(plan)
+        ((pieces, _),) = plan.cuts
+        missing = [piece for piece in range(pieces) if piece not in plan.where]
+        if missing:
+            raise GraphsynthError(
+                f"{len(missing)} of {pieces} pieces of mobility {mobility}, {links} links are in none of the files "
+                f"(given: {', '.join(sorted(plan.given))}; first missing piece {missing[0]}): finish or add the shard "
+                "that holds them"
+            )
     return [plans[key] for key in sorted(plans)]
 
 
 def _trust(shard: sqlite3.Connection, part: Path) -> None:
-    """Refuse a shard that was not copied whole, or changed: what is merged gets a new seal.
-
-    Raises `FormatError` if its bytes are not those of its seal, or it holds values of another form than its columns
-    have.
-    """
+    """Refuse a shard that was not copied whole, or changed: what is merged gets a new seal."""
     found = broken_seal(shard)
     if found:
         raise FormatError(f"{found}: copy the shard again, or give the command that built it again", str(part))
@@ -118,20 +129,6 @@ def _trust(shard: sqlite3.Connection, part: Path) -> None:
         raise FormatError(
             f"a row of its table {loose[0]} names one of {loose[2]} that is not there: build it anew", str(part)
         )
-
-
-def _add_pieces(plan: _Plan, part: Path, shard: sqlite3.Connection, number: int) -> None:
-    """Add the pieces that a shard holds of a family."""
-    mobility, links, _ = plan.question
-    for piece, first, chains in shard.execute(
-        "SELECT piece, first_chain, chains FROM pieces WHERE family_id = ?", (number,)
-    ):
-        if piece in plan.where:
-            raise GraphsynthError(
-                f"{part} and {plan.where[piece][0]} both hold piece {piece} of mobility {mobility}, {links} links: "
-                "give every shard once"
-            )
-        plan.where[piece] = part, first, chains
 
 
 def _merge_family(target: sqlite3.Connection, plan: _Plan, shards: _Shards) -> None:
@@ -161,29 +158,6 @@ def _merge_family(target: sqlite3.Connection, plan: _Plan, shards: _Shards) -> N
 
     build_family(target, family_id, mobility, [(piece, 1.0) for piece in range(pieces)], results)
     finish_family(target, family_id)
-
-
-def _copy_evaluations(shard: sqlite3.Connection, target: sqlite3.Connection) -> None:
-    """Take over what was evaluated of the mechanisms of a shard."""
-    with transaction(target):
-        target.executemany(
-            "INSERT OR REPLACE INTO evaluations SELECT chain_id, ?, ?, ?, ?, ?, ?, ?, ? FROM chains WHERE key = ?",
-            shard.execute(
-                "SELECT frame, driver, kind, status, value, unit, guarantee, data, key FROM evaluations "
-                "JOIN chains USING (chain_id)"
-            ),
-        )
-
-
-def _check_all_there(plan: _Plan) -> None:
-    missing = [piece for piece in range(plan.pieces) if piece not in plan.where]
-    if not missing:
-        return
-    raise GraphsynthError(
-        f"{len(missing)} of {plan.pieces} pieces of mobility {plan.question[0]}, {plan.question[1]} links are in none "
-        f"of the files (given: {', '.join(sorted(plan.given))}; first missing piece {missing[0]}): finish or add the "
-        "shard that holds them"
-    )
 
 
 def _read(shard: sqlite3.Connection, first: int, count: int) -> Rows:

@@ -6,7 +6,7 @@ import re
 import sqlite3
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from threading import RLock
@@ -29,67 +29,27 @@ _PRAGMAS = re.compile(r"table_x?info|(table|index)_list|index_info|(integrity|qu
 #: Tables and views that a user may ask for.
 _STRUCTURE = ("chains", "inversions", "mechanisms", "groups", "structures", "contracted", "dyads", "relatives")
 TABLES = (*_STRUCTURE, "evaluations", "families")
+_OF_THE_QUESTION = sqlite3.OperationalError, sqlite3.ProgrammingError, sqlite3.InterfaceError, sqlite3.DataError
 #: Errors that are of the file, though SQLite calls them errors of the question.
 _OF_THE_FILE = ("disk I/O", "malformed", "decode to UTF-8", "not a database", "locked")
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Rows of a question.
-
-    Parameters
-    ----------
-    columns : list of str
-    rows : list of tuple
-    more : bool
-        There are more rows than were asked for.
-    """
+    """Rows of a question."""
 
     columns: list[str]
     rows: list[tuple[Any, ...]]
-    more: bool
-
-
-def ask(
-    connection: sqlite3.Connection,
-    path: Path,
-    text: str,
-    parameters: Sequence[Any],
-    limit: int | None = None,
-    seconds: float | None = SECONDS,
-) -> Answer:
-    """Answer a question that only reads.
-
-    ``limit``: read so many rows at most, and whether there are more; ``seconds``: give up after this time; None:
-    never. Raises `SpecError` if SQLite refuses the question, it would do more than read (attach or write files), or
-    it takes too much. Raises `FormatError` if the file is damaged. Raises `GraphsynthError` if the catalogue is
-    closed.
-    """
-    if isinstance(parameters, str | bytes):
-        raise SpecError(f"parameters = {parameters!r} must be a list of values, one for each '?'")
-    try:
-        with _reading_only(connection, seconds):
-            cursor = connection.execute(text, tuple(parameters))
-            try:
-                return _read(cursor, limit)
-            finally:
-                cursor.close()
-    except GraphsynthError:
-        raise
-    except MemoryError:
-        raise SpecError(f"SQLite has too little memory for {text!r}: ask for less at a time") from None
-    except sqlite3.Error as error:
-        raise _told(error, path, text, seconds) from None
-    except (sqlite3.Warning, ValueError, OverflowError) as error:
-        raise SpecError(f"SQLite refuses {text!r}: {error}") from None
+    more: bool  # there are more rows than were asked for
 
 
 def _read(cursor: sqlite3.Cursor, limit: int | None) -> Answer:
     rows: list[tuple[Any, ...]] = []
-    size = 0
+    size, more = 0, False
     for row in cursor:
         if len(rows) == limit:
-            return Answer(_names(cursor), rows, True)
+            more = True
+            break
         size += 64 + sum(56 if value is None or isinstance(value, int | float) else 80 + len(value) for value in row)
         if size > _MOST_BYTES:
             raise SpecError(
@@ -97,71 +57,35 @@ def _read(cursor: sqlite3.Cursor, limit: int | None) -> Answer:
                 "rows or columns, or export the tables"
             )
         rows.append(row)
-    return Answer(_names(cursor), rows, False)
-
-
-def _names(cursor: sqlite3.Cursor) -> list[str]:
-    return [column[0] for column in cursor.description or ()]
-
-
-def _told(error: sqlite3.Error, path: Path, text: str, seconds: float | None) -> BaseException:
-    """Say whether the question, the file or the caller is at fault."""
-    words = str(error)
-    if words == "interrupted":
-        return KeyboardInterrupt()
-    if words == _LATE:
-        return SpecError(f"{text!r} takes more than {seconds:g} s: ask for less, or allow more seconds")
-    if "closed database" in words:
-        return GraphsynthError(f"the catalogue {path} is closed: open it again")
-    of_question = isinstance(
-        error, sqlite3.OperationalError | sqlite3.ProgrammingError | sqlite3.InterfaceError | sqlite3.DataError
-    )
-    denied = any(word in words for word in ("prohibited", "not authorized", "authorization denied"))
-    if (of_question or denied) and not any(own in words for own in _OF_THE_FILE):
-        return SpecError(f"SQLite refuses {text!r}: {error}")
-    return FormatError(f"the file is damaged or cannot be read ({error}): build it anew", str(path))
-
-
-_LATE = "late"
-
-
-class _Late(sqlite3.OperationalError):
-    """The time of a question is over."""
+    return Answer([column[0] for column in cursor.description or ()], rows, more)
 
 
 @contextmanager
-def _reading_only(connection: sqlite3.Connection, seconds: float | None) -> Iterator[None]:
-    """Refuse everything but reading, end what takes too long, and let Python see Ctrl-C during a long question."""
+def _reading_only(connection: sqlite3.Connection, seconds: float | None, late: list[bool]) -> Iterator[None]:
+    """Refuse everything but reading, end what takes too long, and let Python see Ctrl-C during a long question.
+
+    What ends it because of the time says so in ``late``.
+    """
     end = None if seconds is None else time.monotonic() + seconds
-    late = False
 
     def allowed(action: int, first: str | None, *_: str | None) -> int:
         good = action in _ALLOWED or (action == sqlite3.SQLITE_PRAGMA and bool(_PRAGMAS.fullmatch(first or "")))
         return sqlite3.SQLITE_OK if good else sqlite3.SQLITE_DENY
 
     def over() -> int:
-        nonlocal late
-        late = end is not None and time.monotonic() > end
-        return int(late)
+        if end is not None and time.monotonic() > end:
+            late.append(True)
+        return len(late)
 
     usual = connection.setlimit(sqlite3.SQLITE_LIMIT_COLUMN, _MOST_COLUMNS)
     connection.set_authorizer(allowed)
     connection.set_progress_handler(over, _STEPS)
     try:
         yield
-    except sqlite3.OperationalError as error:
-        if late and str(error) == "interrupted":
-            raise _Late(_LATE) from None
-        raise
     finally:
         connection.set_progress_handler(None, 0)
         connection.set_authorizer(None)
         connection.setlimit(sqlite3.SQLITE_LIMIT_COLUMN, usual)
-
-
-def columns(connection: sqlite3.Connection, table: str) -> list[str]:
-    """Names of the columns of a table."""
-    return [row[1] for row in connection.execute(f"PRAGMA table_info({table})")]
 
 
 class OpenCatalogue:
@@ -193,8 +117,39 @@ class OpenCatalogue:
     def _ask(
         self, text: str, parameters: Sequence[Any], limit: int | None = None, seconds: float | None = SECONDS
     ) -> Answer:
-        with self._turn:
-            return ask(self.connection, self.path, text, parameters, limit, seconds)
+        """Answer a question that only reads; see :meth:`sql`."""
+        if isinstance(parameters, str | bytes):
+            raise SpecError(f"parameters = {parameters!r} must be a list of values, one for each '?'")
+        late: list[bool] = []
+        try:
+            with (
+                self._turn,
+                _reading_only(self.connection, seconds, late),
+                closing(self.connection.execute(text, tuple(parameters))) as cursor,
+            ):
+                return _read(cursor, limit)
+        except MemoryError:
+            raise SpecError(f"SQLite has too little memory for {text!r}: ask for less at a time") from None
+        except sqlite3.Error as error:
+            words = str(error)
+            if words == "interrupted" and late:
+                raise SpecError(
+                    f"{text!r} takes more than {seconds:g} s: ask for less, or allow more seconds"
+                ) from None
+            if words == "interrupted":
+                raise KeyboardInterrupt from None
+            if "closed database" in words:
+                raise GraphsynthError(f"the catalogue {self.path} is closed: open it again") from None
+            denied = any(word in words for word in ("prohibited", "not authorized", "authorization denied"))
+            if (isinstance(error, _OF_THE_QUESTION) or denied) and not any(own in words for own in _OF_THE_FILE):
+                raise SpecError(f"SQLite refuses {text!r}: {error}") from None
+            raise FormatError(
+                f"the file is damaged or cannot be read ({error}): build it anew", str(self.path)
+            ) from None
+        except (sqlite3.Warning, ValueError, OverflowError) as error:
+            if isinstance(error, GraphsynthError):
+                raise
+            raise SpecError(f"SQLite refuses {text!r}: {error}") from None
 
     @contextmanager
     def reading(self, *, screened: bool = False) -> Iterator[None]:
@@ -246,7 +201,7 @@ class OpenCatalogue:
             if "no such column" not in str(error):
                 raise
             with self.reading():
-                known = ", ".join(columns(self.connection, table))
+                known = ", ".join(row[1] for row in self.connection.execute(f"PRAGMA table_info({table})"))
             raise SpecError(f"{error}; {table} has {known}") from None
 
     def sql(

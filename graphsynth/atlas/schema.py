@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import sqlite3
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 
-from graphsynth.atlas.sealing import broken_seal, seal, take_back, unfinished
+from graphsynth.atlas.sealing import DISTRUST, broken_seal, seal, take_back, unfinished
 from graphsynth.atlas.tables import APPLICATION_ID, EDGES, INDEXES, SCHEMA, SCHEMA_VERSION, wrong_rows
 from graphsynth.core.errors import FormatError, GraphsynthError
 from graphsynth.core.wording import plain
@@ -43,14 +43,20 @@ def connect(path: Path, *, create: bool = False, readonly: bool = False) -> sqli
                 "written, and open it there",
                 str(path),
             )
-    try:
-        if readonly and any(name.endswith("-journal") for name in left):
-            take_back(path)
-        return _patiently(lambda: _opened(path, mode, create, readonly))
-    except (sqlite3.Error, MemoryError, UnicodeError) as error:
-        full = getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
-        remedy = ": make room, or name another file" if create or full else ""
-        raise FormatError(f"cannot be opened as a catalogue ({plain(str(error))[:300]}){remedy}", str(path)) from None
+    last = time.monotonic() + _PATIENCE
+    while True:
+        try:
+            if readonly and any(name.endswith("-journal") for name in left):
+                take_back(path)
+            return _opened(path, mode, create, readonly)
+        except (sqlite3.Error, MemoryError, UnicodeError) as error:
+            code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+            if code != sqlite3.SQLITE_BUSY or time.monotonic() > last:
+                full = code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
+                remedy = ": make room, or name another file" if create or full else ""
+                why = plain(str(error))[:300]
+                raise FormatError(f"cannot be opened as a catalogue ({why}){remedy}", str(path)) from None
+        time.sleep(0.02)  # SQLite refuses some locks at once, without waiting for their owner
 
 
 def _opened(path: Path, mode: str, create: bool, readonly: bool) -> sqlite3.Connection:
@@ -58,7 +64,10 @@ def _opened(path: Path, mode: str, create: bool, readonly: bool) -> sqlite3.Conn
         f"{path.absolute().as_uri()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
     )
     try:
-        _distrust(connection)
+        # nothing in the file decides what is called or how much memory is taken
+        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST)
+        for pragma in (*DISTRUST, "PRAGMA mmap_size = 0"):
+            connection.execute(pragma)
         _check(connection, path, create)
         if not readonly:
             _check_seal(connection, path)
@@ -70,37 +79,16 @@ def _opened(path: Path, mode: str, create: bool, readonly: bool) -> sqlite3.Conn
     return connection
 
 
-def _patiently(work: Callable[[], sqlite3.Connection]) -> sqlite3.Connection:
-    """Try again for some seconds: SQLite refuses some locks at once, without waiting for their owner."""
-    last = time.monotonic() + _PATIENCE
-    while True:
-        try:
-            return work()
-        except sqlite3.OperationalError as error:
-            if getattr(error, "sqlite_errorcode", 0) & 0xFF != sqlite3.SQLITE_BUSY or time.monotonic() > last:
-                raise
-        time.sleep(0.02)
-
-
 def _is_still(path: Path) -> bool:
     """Whether nobody can write the file, as on a read-only medium: SQLite then needs no files beside it."""
     return not os.access(path, os.W_OK) and not os.access(path.resolve().parent, os.W_OK)
 
 
-def _distrust(connection: sqlite3.Connection) -> None:
-    """Let nothing in the file decide what is called or how much memory is taken."""
-    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST)
-    connection.execute("PRAGMA trusted_schema = OFF")
-    connection.execute("PRAGMA cell_size_check = ON")
-    connection.execute("PRAGMA mmap_size = 0")
-
-
 @contextmanager
 def readable(path: Path, *garbage: type[Exception]) -> Iterator[None]:
-    """Turn what a damaged file does to a reader into one sentence.
+    """Turn what a damaged file does to a reader into one sentence, a `FormatError`.
 
-    ``*garbage``: what values that nobody wrote may cause, beside the errors of SQLite. Raises `FormatError` if the
-    file is damaged.
+    ``*garbage``: what values that nobody wrote may cause, beside the errors of SQLite.
     """
     damage: tuple[type[Exception], ...] = (sqlite3.Error, *garbage)
     try:
@@ -144,23 +132,20 @@ def _check(connection: sqlite3.Connection, path: Path, create: bool) -> None:
         # in one transaction, so that a file is never half a catalogue
         connection.execute("BEGIN IMMEDIATE")
         if not connection.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()[0]:
-            for statement in (f"PRAGMA application_id = {APPLICATION_ID}", f"PRAGMA user_version = {SCHEMA_VERSION}"):
+            made = f"PRAGMA application_id = {APPLICATION_ID};\nPRAGMA user_version = {SCHEMA_VERSION};\n{SCHEMA}"
+            for statement in made.split(";\n"):
                 connection.execute(statement)
-            for statement in SCHEMA.split(";\n"):
-                if statement.strip():
-                    connection.execute(statement)
         connection.execute("COMMIT")
-    owner = connection.execute("PRAGMA application_id").fetchone()[0]
-    version = connection.execute("PRAGMA user_version").fetchone()[0]
-    if owner != APPLICATION_ID:
+    if connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION_ID:
         raise FormatError("is a database, but not a catalogue of graphsynth; name another file", str(path))
+    version = connection.execute("PRAGMA user_version").fetchone()[0]
     if version != SCHEMA_VERSION:
         raise FormatError(
             f"has schema version {version}, this graphsynth reads {SCHEMA_VERSION}: build it anew", str(path)
         )
     always, sometimes = _wanted()
     held = set(connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master LIMIT ?", (len(always) + 100,)))
-    others = sorted({str(row[1]) for row in held - always - sometimes} | {str(row[1]) for row in always - held})
+    others = sorted({str(row[1]) for row in (held - always - sometimes) | (always - held)})
     if others:
         raise FormatError(
             f"its tables are not those of a catalogue ({plain(', '.join(others))[:200]} differs): build it anew, or "
@@ -172,14 +157,10 @@ def _check(connection: sqlite3.Connection, path: Path, create: bool) -> None:
 @lru_cache(maxsize=1)
 def _wanted() -> tuple[frozenset[tuple[str, ...]], frozenset[tuple[str, ...]]]:
     """Everything that the schema of a file must name, and what it may name beside that."""
-    own = sqlite3.connect(":memory:")
     rows = "SELECT type, name, tbl_name, sql FROM sqlite_master"
-    own.executescript(SCHEMA)
-    always = frozenset(own.execute(rows))
-    own.executescript(INDEXES)
-    every = frozenset(own.execute(rows))
-    own.close()
-    return always, every - always
+    with closing(sqlite3.connect(":memory:")) as own:
+        always = frozenset(own.executescript(SCHEMA).execute(rows))
+        return always, frozenset(own.executescript(INDEXES).execute(rows)) - always
 
 
 def _check_seal(connection: sqlite3.Connection, path: Path) -> None:
@@ -197,10 +178,8 @@ def settle(connection: sqlite3.Connection) -> None:
 
     It carries a seal, see :mod:`graphsynth.atlas.sealing`.
     """
-    try:
+    with suppress(sqlite3.Error, OSError):  # it stays as it is: whole, with a log beside it or without a seal
         connection.execute("PRAGMA busy_timeout = 200")
         connection.execute("PRAGMA journal_mode = DELETE")
         connection.execute("PRAGMA busy_timeout = 5000")
         seal(connection)
-    except (sqlite3.Error, OSError):
-        pass  # it stays as it is: whole, with a log beside it or without a seal

@@ -26,11 +26,6 @@ _BLOCK = 1 << 20
 _PASSING = ((18, 20), (24, 28), (92, 100))
 
 
-def unseal(connection: sqlite3.Connection) -> None:
-    """Take the seal off, inside a transaction that changes something."""
-    connection.execute("DELETE FROM meta")
-
-
 def seal(connection: sqlite3.Connection) -> None:
     """Seal a file that has none; nothing happens while it has a log beside it.
 
@@ -108,8 +103,11 @@ def unfinished(path: Path) -> list[str]:
     for journal in (real.with_name(real.name + end) for end in ("-journal", "-wal")):
         try:
             about = journal.lstat()
-            plain = stat.S_ISREG(about.st_mode)
-            end = _end(journal, about.st_size) if plain else b""
+            plain, end = stat.S_ISREG(about.st_mode), b""
+            if plain:
+                with journal.open("rb") as file:
+                    file.seek(max(about.st_size - len(_NAMES), 0))
+                    end = file.read(len(_NAMES))
         except OSError:
             continue
         if not plain or end == _NAMES:
@@ -122,15 +120,12 @@ def unfinished(path: Path) -> list[str]:
     return found
 
 
+#: Nothing in a file decides what is called.
+DISTRUST = ("PRAGMA trusted_schema = OFF", "PRAGMA cell_size_check = ON")
+
+
 def take_back(path: Path) -> None:
     """Take a change back that was not finished; one that another process is making is let be."""
     with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=rw", uri=True)) as connection:
-        connection.execute("PRAGMA trusted_schema = OFF")
-        connection.execute("PRAGMA cell_size_check = ON")
-        connection.execute("SELECT COUNT(*) FROM sqlite_master")
-
-
-def _end(journal: Path, size: int) -> bytes:
-    with journal.open("rb") as file:
-        file.seek(max(size - len(_NAMES), 0))
-        return file.read(len(_NAMES))
+        for statement in (*DISTRUST, "SELECT COUNT(*) FROM sqlite_master"):
+            connection.execute(statement)

@@ -43,7 +43,7 @@ def facts(report: Report) -> tuple[Finding, ...]:
     products = report.products
     found = [finding for table in _given(report) for finding in table.findings if finding.value]
     records: tuple[Record, ...] = products.get("records", ())
-    counts = Counter(record.status for record in records)
+    counts: Counter[str] = Counter(record.status for record in records)
     if counts["assessed"] == 1 and not counts["rejected"] + counts["failed"]:
         for margin in next(record for record in records if record.status == "assessed").margins[:_MARGINS]:
             unit = margin.unit if margin.unit in ("", "°", "′", "″") else f" {margin.unit}"
