@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import kernels
 from graphsynth.dynamics.forms.one_coordinate import OneCoordinateForm, one_coordinate_obstacle
-from graphsynth.dynamics.friction.motion import FrictionAt
+from graphsynth.dynamics.friction.problem import FrictionSolution
 from graphsynth.dynamics.model import Rack, Rigid
 from graphsynth.dynamics.reactions import reactions_from_multipliers, world
 from graphsynth.dynamics.result import Checks, FrictionHistory, MotorHistory
@@ -52,7 +52,7 @@ def balance_at(
     currents: Array,
     slots: Array,
     own: Array | None,
-    fit: FrictionAt | None = None,
+    fit: FrictionSolution | None = None,
 ) -> Balance:
     """Evaluate one state; ``own`` are accelerations of another formulation, used where masses vanish."""
     T = compiled.tables
@@ -183,16 +183,12 @@ def warnings_of(checks: Checks, rtol: float, friction: FrictionHistory | None = 
     unknown = [name for name in ("position_drift", "energy", "power", "dalembert") if np.isnan(getattr(checks, name))]
     if unknown:
         found.append(f"no value of {', '.join(unknown)}: a state reached has no accelerations, or none was reached")
-    if checks.energy > max(1e-9, 100.0 * rtol):
-        found.append(
-            f"the energy balance is off by {checks.energy:.2g} of the energies in play, at a relative tolerance of "
-            f"{rtol:g}; tighten rtol"
-        )
-    if checks.electric > max(1e-9, 100.0 * rtol):
-        found.append(
-            f"the electrical energy balance is off by {checks.electric:.2g} of the energies in play, at a relative "
-            f"tolerance of {rtol:g}; tighten rtol"
-        )
+    for kind, value in (("", checks.energy), ("electrical ", checks.electric)):
+        if value > max(1e-9, 100.0 * rtol):
+            found.append(
+                f"the {kind}energy balance is off by {value:.2g} of the energies in play, at a relative tolerance of "
+                f"{rtol:g}; tighten rtol"
+            )
     if checks.position_drift > 1e-9:
         found.append(
             f"the joints are open by {checks.position_drift:.2g} characteristic lengths; project, or tighten rtol"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,18 +24,20 @@ from graphsynth.dynamics.checks import (
     second_accelerations,
     warnings_of,
 )
-from graphsynth.dynamics.friction.motion import FrictionAt, friction_at, friction_history
+from graphsynth.dynamics.forms.augmented import AugmentedForm
+from graphsynth.dynamics.forms.one_coordinate import OneCoordinateForm, one_coordinate_obstacle
+from graphsynth.dynamics.forms.partitioned import PartitionedForm
+from graphsynth.dynamics.friction.loads import FrictionRows
+from graphsynth.dynamics.friction.motion import DryMotion, friction_history
+from graphsynth.dynamics.friction.problem import FrictionProblem, FrictionSolution, Senses
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.motors import current_scale
 from graphsynth.dynamics.result import DynamicEvent, DynamicMotion
 from graphsynth.dynamics.start import StartReport, check_start, start_compiled
-from graphsynth.dynamics.stepping import Form, SolverStatistics, StepOptions
+from graphsynth.dynamics.stepping import METHODS, Form, SolverStatistics, StepOptions
 from graphsynth.dynamics.switching import integrate, with_starting_modes
 from graphsynth.dynamics.tables import Compiled, compile_model
-
-if TYPE_CHECKING:
-    from graphsynth.dynamics.friction.loads import FrictionRows
-    from graphsynth.dynamics.friction.problem import Senses
+from graphsynth.dynamics.values import initial_slots
 
 Array = NDArray[np.float64]
 FormName = Literal["auto", "one-coordinate", "partitioned", "augmented"]
@@ -111,14 +113,11 @@ def simulate_dynamics(
     >>> motion.completed, motion.checks.energy < 1e-10, motion.form
     (True, True, 'one-coordinate')
     """
-    grid = _times(times)
-    compiled = compile_model(model)
-    if start is None:
-        start = start_compiled(compiled, pose, rates, keep, keep_rates, modes, float(grid[0]))
-    report = start
-    check_start(model, report, float(grid[0]), "additional", "prescribed")
-    options = _options(method, rtol, atol, outputs, project, max_steps)
-    _check_options(form, outputs, options)
+    grid, compiled = _times(times), compile_model(model)
+    first = float(grid[0])
+    report = start_compiled(compiled, pose, rates, keep, keep_rates, modes, first) if start is None else start
+    check_start(model, report, first, "additional", "prescribed")
+    options = _options(form, method, rtol, atol, outputs, project, max_steps)
     run = _once(compiled, report, grid, form, options)
     estimate = None
     if estimate_error:
@@ -138,36 +137,34 @@ def _times(times: ArrayLike) -> Array:
     return grid
 
 
-def _options(method: str, rtol: float, atol: float | None, outputs: str, project: bool, max_steps: int) -> StepOptions:
+def _options(
+    form: str, method: str, rtol: float, atol: float | None, outputs: str, project: bool, max_steps: int
+) -> StepOptions:
     if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
         raise GeometryError(f"max_steps = {max_steps!r} is not a number of steps; give an integer of at least 1")
-    absolute = None if atol is None else finite("atol", atol)
-    return StepOptions(method, finite("rtol", rtol), absolute, str(outputs) == "exact", project, max_steps)
-
-
-def _check_options(form: str, outputs: str, options: StepOptions) -> None:
-    from graphsynth.dynamics.stepping import METHODS
-
+    absolute, relative = None if atol is None else finite("atol", atol), finite("rtol", rtol)
     if not isinstance(form, str) or form not in FORMS:
         raise GeometryError(f"form = {form!r} is not known; give one of {', '.join(FORMS)}")
     if not isinstance(outputs, str) or outputs not in ("interpolated", "exact"):
         raise GeometryError(f"outputs = {outputs!r} is not known; give 'interpolated' or 'exact'")
-    if not isinstance(options.method, str) or options.method not in METHODS:
-        raise GeometryError(f"method = {options.method!r} is not known; give one of {', '.join(METHODS)}")
-    if options.method == "CVODE":
+    if not isinstance(method, str) or method not in METHODS:
+        raise GeometryError(f"method = {method!r} is not known; give one of {', '.join(METHODS)}")
+    if method == "CVODE":
         need("sksundae.cvode", "stiff", "method 'CVODE'")
-    if not 2.3e-14 <= options.rtol < 1.0:
-        raise GeometryError(f"rtol = {options.rtol} must be at least 2.3e-14 (rounding) and below 1; correct it")
-    if options.atol is not None and not options.atol > 0.0:
-        raise GeometryError(f"atol = {options.atol} must be positive; leave it out for the natural scales")
+    if not 2.3e-14 <= relative < 1.0:
+        raise GeometryError(f"rtol = {relative} must be at least 2.3e-14 (rounding) and below 1; correct it")
+    if absolute is not None and not absolute > 0.0:
+        raise GeometryError(f"atol = {absolute} must be positive; leave it out for the natural scales")
+    return StepOptions(method, relative, absolute, outputs == "exact", project, max_steps)
 
 
 class _Run:
     """States at the output times; a workspace."""
 
-    def __init__(self, compiled: Compiled, report: StartReport, name: str, count: int, form: Form) -> None:
-        self.name, self.form, self.done, self.seconds, self.stats = name, form, 0, 0.0, SolverStatistics()
-        self.compiled, self.report = compiled, report
+    def __init__(self, compiled: Compiled, report: StartReport, name: str, count: int, project: bool) -> None:
+        self.name, self.form = name, make_form(compiled, report, name, project)
+        self.compiled, self.report, self.done, self.seconds = compiled, report, 0, 0.0
+        self.stats = SolverStatistics()
         self.q, self.v = (np.full((count, compiled.n), np.nan) for _ in range(2))
         self.slots = np.zeros((count, len(report.slots)))
         self.tail = np.full((count, len(compiled.tail)), np.nan)
@@ -189,22 +186,14 @@ class _Run:
 def make_form(compiled: Compiled, report: StartReport, name: str, project: bool) -> Form:
     """Return the formulation by name."""
     if name == "one-coordinate":
-        from graphsynth.dynamics.forms.one_coordinate import OneCoordinateForm
-
         return OneCoordinateForm(compiled, report)
     if name == "partitioned":
-        from graphsynth.dynamics.forms.partitioned import PartitionedForm
-
         return PartitionedForm(compiled, report)
-    from graphsynth.dynamics.forms.augmented import AugmentedForm
-
     return AugmentedForm(compiled, report, project)
 
 
 def _once(compiled: Compiled, report: StartReport, grid: Array, name: str, options: StepOptions) -> _Run:
     """Integrate once; in the form "auto" beyond a fold again in the augmented form."""
-    from graphsynth.dynamics.forms.one_coordinate import one_coordinate_obstacle
-
     chosen = name
     if name == "auto":
         none = one_coordinate_obstacle(compiled.model) or report.pose_class == "singular"
@@ -231,14 +220,17 @@ def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, option
     begin = perf_counter()
     if compiled.drives:
         compiled = with_starting_modes(compiled, report.v)
-    run = _Run(compiled, report, name, len(grid), make_form(compiled, report, name, options.project))
+    run = _Run(compiled, report, name, len(grid), options.project)
     with np.errstate(all="ignore"):
         if compiled.tables.friction.size:
-            _with_friction(run, grid, options)
+            run.rows = FrictionRows(compiled)
+            make = partial(make_form, name=name, project=options.project)
+            dry = DryMotion(run.rows, report, make, partial(scales, compiled, report), run.show)
+            run.stats, run.form = dry.go(grid, compiled.model.breaks, options), dry.form
+            run.form.loss, run.form.contraction, run.form.changes = dry.loss, dry.contraction, dry.changes
         else:
-            scaled, form = options.scaled(scales(compiled, report, run.form)), run.form
-            output = partial(run.show, form)
-            run.stats = integrate(form, grid, compiled.model.breaks, scaled, output)
+            scaled = options.scaled(scales(compiled, report, run.form))
+            run.stats = integrate(run.form, grid, compiled.model.breaks, scaled, partial(run.show, run.form))
     run.seconds = perf_counter() - begin
     lost = np.flatnonzero(~np.isfinite(run.q[: run.done]).all(axis=1) | ~np.isfinite(run.v[: run.done]).all(axis=1))
     if lost.size:  # an interpolated state that the formulation cannot place is a failure, not a gap
@@ -249,20 +241,6 @@ def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, option
     run.events += run.stats.events
     run.events += [DynamicEvent("change of coordinates", t, 0.0, text) for t, text in run.form.changes]
     return run
-
-
-def _with_friction(run: _Run, grid: Array, options: StepOptions) -> None:
-    """Integrate a model with friction in its joints."""
-    from graphsynth.dynamics.friction.loads import FrictionRows
-    from graphsynth.dynamics.friction.motion import DryMotion
-
-    run.rows = FrictionRows(run.compiled)
-    make = partial(make_form, name=run.name, project=options.project)
-    dry = DryMotion(run.rows, run.report, make, partial(scales, run.compiled, run.report), run.show)
-    run.stats = dry.go(grid, run.compiled.model.breaks, options)
-    assert dry.form is not None
-    run.form = dry.form
-    run.form.loss, run.form.contraction, run.form.changes = dry.loss, dry.contraction, dry.changes
 
 
 def scales(compiled: Compiled, report: StartReport, form: Form) -> Array:
@@ -280,18 +258,18 @@ def scales(compiled: Compiled, report: StartReport, form: Form) -> Array:
 def _result(
     compiled: Compiled, report: StartReport, grid: Array, run: _Run, options: StepOptions, estimate: Array | None
 ) -> DynamicMotion:
-    from graphsynth.dynamics.values import initial_slots
-
     begin, count, done = perf_counter(), len(grid), run.done
     work, currents = run.tail[:, -1], run.tail[:, : len(compiled.currents)]
     a, lam = np.full((count, compiled.n), np.nan), np.full((count, len(compiled.info)), np.nan)
     kinetic, potential = np.full((2, count), np.nan)
     balances: list[Balance] = []
-    fits: list[FrictionAt | None] = []
+    fits: list[FrictionSolution | None] = []
     for k, t in enumerate(grid[:done].tolist()):
         q, v = run.q[k], run.v[k]
         slots = run.slots[k] if run.name == "augmented" else initial_slots(compiled, q)
-        fit = None if run.rows is None else friction_at(run.rows, t, q, v, slots, run.senses[k])
+        fit, senses = None, run.senses[k]
+        if run.rows is not None and senses is not None:
+            fit = FrictionProblem(run.rows, t, q, v, slots).at(senses)
         found = balance_at(compiled.with_modes(run.modes[k]), t, q, v, currents[k], slots, run.own[k], fit)
         a[k], lam[k], kinetic[k], potential[k] = found.a, found.multipliers, found.kinetic, found.potential
         balances.append(found)
@@ -316,7 +294,10 @@ def _result(
     for array in links:
         array[done:] = np.nan
     friction = None if run.rows is None else friction_history(run.rows, count, fits)
-    completed = done == count
+    message = "completed"
+    if done < count:
+        why = run.stats.message if run.rows is not None and run.stats.message else run.form.why or run.stats.message
+        message = f"the integration stopped at t = {run.stats.time:.9g} of {grid[-1]:.9g} s: {why}"
     return DynamicMotion(
         compiled,
         grid,
@@ -329,8 +310,8 @@ def _result(
         kinetic,
         potential,
         work,
-        status="completed" if completed else "failed",
-        message="completed" if completed else _failure(run, grid),
+        status="completed" if done == count else "failed",
+        message=message,
         reached=run.stats.time,
         events=tuple(sorted(run.events, key=lambda event: event.time)),
         start=report,
@@ -348,11 +329,6 @@ def _result(
         friction=friction,
         motors=motors,
     )
-
-
-def _failure(run: _Run, grid: Array) -> str:
-    why = run.stats.message if run.rows is not None and run.stats.message else run.form.why or run.stats.message
-    return f"the integration stopped at t = {run.stats.time:.9g} of {grid[-1]:.9g} s: {why}"
 
 
 def _backend(method: str) -> str:

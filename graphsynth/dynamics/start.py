@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,24 +17,10 @@ from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.singular import BranchTangents, PoseClass, classify_pose
 from graphsynth.dynamics.tables import Compiled, compile_model, coordinate_row
 from graphsynth.dynamics.values import Values, applied_loads, initial_slots
+from graphsynth.kinematics.engine import codes
 from graphsynth.mechanism.laws import Linear
-from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
-
-
-def pose_from_drivers(
-    mechanism: Mechanism, wanted: Sequence[tuple[Any, float]], modes: Mapping[int, int]
-) -> Array | None:
-    """Poses (links, 3) with the drivers at given coordinates (key, value) in their order; None if out of reach."""
-    from graphsynth.kinematics.simulation import simulate
-
-    drivers = []
-    for driver, (key, value) in zip(mechanism.drivers, wanted):
-        sense = 1.0 if tuple(key) == (driver.base, driver.link) else -1.0
-        drivers.append(replace(driver, law=Linear(0.0, sense * float(value))))
-    motion = simulate(replace(mechanism, drivers=tuple(drivers)), [0.0], modes=modes, events=False)
-    return np.array(motion.poses[0]) if motion.assembled[0] else None
 
 
 Keys = Mapping[Any, float]
@@ -187,28 +173,57 @@ def start_compiled(
     keep, keep_rates = _keys("keep", keep), _keys("keep_rates", keep_rates)
     q0 = compiled.to_coordinates(_guess(compiled, pose, keep, modes, time))
     slots = initial_slots(compiled, q0)
-    values = Values(compiled, time, slots)
-    kept = _kept(values, keep)
-    q, residual = _close(values, kept, q0)
-    values = replace(values, slots=initial_slots(compiled, q, slots))
-    report = _blank(values, q, q0)
-    names = [*report.rows, *(f"kept {key}" for key in keep)]
-    scaled = np.abs(residual / _units(values, kept))
+    kept = Values(_keeping(compiled, keep), time, slots)
+    q, residual = _close(kept, q0)
+    values = Values(compiled, time, initial_slots(compiled, q, slots))
+    nan, count = np.full(compiled.n, np.nan), len(compiled.info)
+    report = StartReport(
+        compiled.model,
+        "consistent",
+        "",
+        time,
+        *compiled.to_links(q, nan, nan),
+        q,
+        nan,
+        nan,
+        np.full(count, np.nan),
+        np.zeros(count, dtype=np.bool_),
+        tuple(info.name for info in compiled.info),
+        float(np.abs((q - q0) / compiled.unit).max(initial=0.0)),
+        values.slots,
+    )
+    scaled = np.abs(residual / kept.compiled.row_unit)
     if not np.isfinite(residual).all() or scaled.max(initial=0.0) > _CLOSED:
-        units = _row_units(values, kept)
-        worst = {name: float(value) for name, value in zip(names, residual) if not abs(value) < 1e-12}
-        worst_name = names[int(np.argmax(scaled))]
+        worst = kept.compiled.info[int(np.argmax(scaled))]
+        open_ = abs(residual[np.argmax(scaled)])
         return replace(
             report,
             status="violated",
-            violated=worst,
-            pose_class="not tested",
-            message=f"the constraints do not close: '{worst_name}' is open by {abs(residual[np.argmax(scaled)]):.6g} "
-            f"{units[int(np.argmax(scaled))]}; correct the dimensions or the kept coordinates",
+            violated=_above(kept.compiled, residual, 1e-12),
+            message=f"the constraints do not close: '{worst.name}' is open by {open_:.6g} "
+            f"{'rad' if worst.angular else 'm'}; correct the dimensions or the kept coordinates",
         )
     report = classify(values, report)
     v0 = np.zeros(compiled.n) if rates is None else compiled.to_rates(q, _checked(compiled, rates, "rates"))
-    return _velocities(values, report, v0, _kept(values, keep_rates), [f"kept {key}" for key in keep_rates])
+    return _velocities(values, report, v0, _keeping(compiled, keep_rates))
+
+
+def _above(compiled: Compiled, residual: Array, least: float) -> dict[str, float]:
+    """Residuals above a bound, or NaN, by the names of their rows."""
+    return {info.name: float(value) for info, value in zip(compiled.info, residual) if not abs(value) <= least}
+
+
+def _keeping(compiled: Compiled, keep: Keys) -> Compiled:
+    """Return the model with coordinates held that are kept."""
+    rows = [coordinate_row(compiled, key, len(compiled.laws) + k) for k, key in enumerate(keep)]
+    held = [finite(f"kept {key}", value) for key, value in keep.items()]
+    return compiled.with_held(rows, [(f"kept {key}", -1) for key in keep], held)
+
+
+def _turned(compiled: Compiled, part: Array) -> Array:
+    """Return a part of every row as the user sees it: kernels see the held ones from the joint's first link."""
+    first = len(part) - len(compiled.held)
+    return np.concatenate([part[:first], compiled.tables.table[first:, codes.SIGN] * part[first:]])
 
 
 def _keys(name: str, given: Keys | None) -> Keys:
@@ -254,10 +269,11 @@ def _checked(compiled: Compiled, given: ArrayLike, name: str) -> Array:
 def _guess(
     compiled: Compiled, pose: ArrayLike | None, keep: Keys, modes: Mapping[int, int] | None, time: float
 ) -> Array:
+    from graphsynth.kinematics.simulation import simulate
+
     mechanism = compiled.model.mechanism
     if pose is not None:
         return _checked(compiled, pose, "pose")
-    drivers = [driver.pair for driver in mechanism.drivers]
     driven = compiled.driven(time)[:, 0]
     wanted: dict[Any, tuple[Any, float]] = {
         driver.pair: ((driver.base, driver.link), float(driven[k]))
@@ -267,46 +283,31 @@ def _guess(
         coordinate_row(compiled, key, 0)  # a key that names nothing is refused
         finite(f"kept {key}", value)
         if not isinstance(key[1], str):
-            wanted[(min(key), max(key))] = (key, value)
-    if drivers and all(pair in wanted for pair in drivers):
-        found = pose_from_drivers(mechanism, [wanted[pair] for pair in drivers], modes or {})
-        if found is not None:
-            return found
+            wanted[(min(key), max(key))] = (tuple(key), float(value))
+    if mechanism.drivers and all(driver.pair in wanted for driver in mechanism.drivers):
+        drivers = []
+        for driver in mechanism.drivers:
+            own, value = wanted[driver.pair]
+            drivers.append(replace(driver, law=Linear(0.0, value if own == (driver.base, driver.link) else -value)))
+        motion = simulate(replace(mechanism, drivers=tuple(drivers)), [0.0], modes=modes or {}, events=False)
+        if motion.assembled[0]:
+            return np.array(motion.poses[0])
         raise GeometryError(f"the mechanism cannot be assembled at {dict(keep)}; choose other coordinates or modes")
     if mechanism.pose is not None:
         return np.array(mechanism.pose)
     raise GeometryError("there is no pose to start from; give pose=, or keep= with the coordinate of every driver")
 
 
-def _kept(values: Values, keep: Mapping[Any, float]) -> tuple[list[Any], Array]:
-    """Rows that hold kept coordinates, in the form of `Values.extra`."""
-    rows = [coordinate_row(values.compiled, key, k) for k, key in enumerate(keep)]
-    return rows, np.array([finite(f"kept {key}", value) for key, value in keep.items()])
-
-
-def _units(values: Values, kept: tuple[list[Any], Array]) -> Array:
-    """Return the unit of every row: the characteristic length, or 1 for angles."""
-    own = values.compiled.row_unit
-    return np.concatenate([own, [1.0 if row[4] else values.size for row in kept[0]]])
-
-
-def _row_units(values: Values, kept: tuple[list[Any], Array]) -> list[str]:
-    angular = [info.angular for info in values.compiled.info] + [row[4] for row in kept[0]]
-    return ["rad" if flag else "m" for flag in angular]
-
-
-def _close(values: Values, kept: tuple[list[Any], Array], q0: Array) -> tuple[Array, Array]:
+def _close(values: Values, q0: Array) -> tuple[Array, Array]:
     """Nearest point to q0 on the constraints, by Gauss-Newton; also the residual of every row."""
-    q, scale = q0.copy(), values.compiled.unit
-    size = np.inf
-    unit = _units(values, kept)
-    for _ in range(_ROUNDS):
-        C, J = values.with_extra(q, kept)
+    q, scale, unit, size = q0.copy(), values.compiled.unit, values.compiled.row_unit, np.inf
+    for k in range(_ROUNDS):
+        C, J, _, _ = values.system(q, np.zeros_like(q))
         if not np.isfinite(C).all():
             return q, np.full(len(C), np.nan)
         scaled = J * scale / unit[:, None]
         inverse = np.linalg.pinv(scaled, rcond=RANK)
-        away = (q0 - q) / scale
+        away = (q0 - q) / scale if k < _ROUNDS - 10 else np.zeros_like(q)  # at last only back to the constraints
         step = -inverse @ (C / unit) + away - inverse @ (scaled @ away)
         length = float(np.abs(step).max(initial=0.0))
         if length > 0.5:
@@ -315,32 +316,7 @@ def _close(values: Values, kept: tuple[list[Any], Array], q0: Array) -> tuple[Ar
         if length < 1e-15 or (length < 1e-12 and length >= 0.5 * size):
             break
         size = length
-    return q, values.with_extra(q, kept)[0]
-
-
-def _blank(values: Values, q: Array, q0: Array) -> StartReport:
-    compiled = values.compiled
-    nan = np.full(compiled.n, np.nan)
-    pose, rate, second = compiled.to_links(q, nan, nan)
-    count = len(compiled.info)
-    moved = float(np.abs((q - q0) / compiled.unit).max(initial=0.0))
-    return StartReport(
-        compiled.model,
-        "consistent",
-        "",
-        values.time,
-        pose,
-        rate,
-        second,
-        q,
-        nan,
-        nan,
-        np.full(count, np.nan),
-        np.zeros(count, dtype=np.bool_),
-        tuple(info.name for info in compiled.info),
-        moved,
-        values.slots,
-    )
+    return q, _turned(values.compiled, values.system(q, np.zeros_like(q))[0])
 
 
 def classify(values: Values, report: StartReport) -> StartReport:
@@ -373,51 +349,46 @@ def classify(values: Values, report: StartReport) -> StartReport:
 def _dependent(left: Array, names: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
     """Smallest sets of dependent rows: the reduced echelon form of the left null vectors."""
     basis = left.T.copy()
-    found = []
-    pivots: list[int] = []
     for k in range(len(basis)):
         column = int(np.argmax(np.abs(basis[k])))
-        pivots.append(column)
         basis[k] /= basis[k, column]
         for other in range(len(basis)):
             if other != k:
                 basis[other] -= basis[other, column] * basis[k]
-    for row in basis:
-        members: list[Hashable] = [name for name, value in zip(names, row) if abs(value) > 1e-8]
-        found.append(tuple(str(name) for name in members))
-    return tuple(found)
+    return tuple(tuple(name for name, value in zip(names, row) if abs(value) > 1e-8) for row in basis)
 
 
-def _velocities(
-    values: Values, report: StartReport, v0: Array, kept: tuple[list[Any], Array], names: list[str]
-) -> StartReport:
-    compiled = values.compiled
-    _, J, _, vel = values.system(report.q, v0)
-    rows, wanted = kept
-    _, Jk = values.extra(report.q, rows, np.zeros(len(rows)))
-    matrix, right = np.vstack([J, Jk]), np.concatenate([vel, wanted])
-    unit = _units(values, kept)
-    step = _nearest_rates(values, (matrix * values.compiled.unit) / unit[:, None], (right - matrix @ v0) / unit)
+def _velocities(values: Values, report: StartReport, v0: Array, kept: Compiled) -> StartReport:
+    compiled, unit = values.compiled, kept.row_unit
+    _, J, _, right = Values(kept, values.time, values.slots).system(report.q, v0)
+    first = len(compiled.info)
+    right[first:] = kept.tables.table[first:, codes.SIGN] * kept.held
+    matrix = J * compiled.unit / unit[:, None]
+    # the smallest step in the metric of the masses: geometry alone satisfies the rows, however much the masses differ,
+    # and these choose what is left free; where rows contradict each other the squares of their residuals are least
+    U, S, Vt = np.linalg.svd(matrix)
+    rank = int(np.sum(RANK * S[0] < S)) if S.size else 0
+    step = compiled.unit * (Vt[:rank].T @ ((U.T @ ((right - J @ v0) / unit))[:rank] / S[:rank]))
+    free = compiled.unit[:, None] * Vt[rank:].T
+    lower = compiled.tables.lower
+    weight = lower.T if lower.size else np.diag(1.0 / compiled.unit)  # massless links: the units of the coordinates
+    root = weight @ np.column_stack([free, step])
+    step -= free @ np.linalg.lstsq(root[:, :-1], root[:, -1], rcond=None)[0]
     v = v0 + step
-    residual = matrix @ v - right
-    speed = max(float(np.abs(v / values.compiled.unit).max(initial=0.0)), float(np.abs(right / unit).max(initial=0.0)))
+    residual = _turned(kept, J @ v - right)
+    speed = max(float(np.abs(part).max(initial=0.0)) for part in (v / compiled.unit, right / unit))
     if float(np.abs(residual / unit).max(initial=0.0)) > 1e-9 * max(speed, _REST):
-        all_names = [*report.rows, *names]
         worst = int(np.argmax(np.abs(residual / unit)))
-        found = {
-            name: float(value) for name, value in zip(all_names, residual) if abs(value) > 1e-12 * max(speed, _REST)
-        }
+        info = kept.info[worst]
         return replace(
             report,
             status="contradicting rates",
-            violated=found,
-            message=f"the rates contradict the joints: '{all_names[worst]}' is missed by {abs(residual[worst]):.6g} "
-            f"{_row_units(values, kept)[worst]}/s; keep fewer rates or correct them",
+            violated=_above(kept, residual, 1e-12 * max(speed, _REST)),
+            message=f"the rates contradict the joints: '{info.name}' is missed by {abs(residual[worst]):.6g} "
+            f"{'rad' if info.angular else 'm'}/s; keep fewer rates or correct them",
         )
-    moved = float(np.abs(step / values.compiled.unit).max(initial=0.0))
     a, lam, text, status = _accelerations(values, report.q, v, applied_loads(compiled, values.time, report.q, v))
     pose, rate, second = compiled.to_links(report.q, v, a)
-    message = _sentence(report) + text if status == "consistent" else text
     return replace(
         report,
         status=status,
@@ -427,23 +398,9 @@ def _velocities(
         velocities=rate,
         accelerations=second,
         poses=pose,
-        velocity_correction=moved,
-        message=message,
+        velocity_correction=float(np.abs(step / compiled.unit).max(initial=0.0)),
+        message=_sentence(report) + text if status == "consistent" else text,
     )
-
-
-def _nearest_rates(values: Values, matrix: Array, right: Array) -> Array:
-    """Smallest step in the metric of the masses that satisfies ``matrix x = right`` (x in units of the coordinates).
-
-    The constraints are solved by geometry alone, however much the masses differ: what they leave free is chosen by the
-    masses.  Where they contradict each other the squares of their residuals are least.
-    """
-    U, S, Vt = np.linalg.svd(matrix)
-    rank = int(np.sum(RANK * S[0] < S)) if S.size else 0
-    step = values.compiled.unit * (Vt[:rank].T @ ((U.T @ right)[:rank] / S[:rank]))
-    free = values.compiled.unit[:, None] * Vt[rank:].T
-    root = np.linalg.solve(values.mass_root_inverse, np.column_stack([free, step]))
-    return np.asarray(step - free @ np.linalg.lstsq(root[:, :-1], root[:, -1], rcond=None)[0])
 
 
 def _sentence(report: StartReport) -> str:

@@ -7,7 +7,7 @@ mass.  Joint points are shifted to the centres of mass, so the rows of the plana
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -27,6 +27,8 @@ from graphsynth.mechanism.laws import Driver
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+#: Kind, links a and b, parameters of a constraint row.
+Row = tuple[int, int, int, list[float]]
 
 #: Kind of a rack row, beside those of :mod:`graphsynth.kinematics.engine.codes`.
 RACK = 20
@@ -191,6 +193,15 @@ class Compiled:
         found[:, count : count + len(self.held), 0] = self.held
         return found
 
+    def with_held(self, rows: Sequence[Row], info: Sequence[tuple[str, int]], held: Iterable[float]) -> Compiled:
+        """Return the same with coordinates held at values; of every row its name and joint."""
+        T = self.tables
+        ints, table = _stacked(rows, T.table.shape[1])
+        slots = np.concatenate([T.slots, np.full(len(rows), -1, dtype=np.int64)])
+        tables = T._replace(rows=np.vstack([T.rows, ints]), table=np.vstack([T.table, table]), slots=slots)
+        more = (RowInfo(name, _angular(row[0]), joint) for (name, joint), row in zip(info, rows))
+        return replace(self, tables=tables, info=(*self.info, *more), held=tuple(float(x) for x in held))
+
     def driven(self, t: float) -> Array:
         """Prescribed coordinates and their two derivatives, shape (drivers, 3); at least one row."""
         return np.asarray(self.driven_at(np.array([t]))[0])
@@ -295,7 +306,7 @@ def _shifted(at: tuple[float, float], centre: Array) -> tuple[float, float]:
 def _constraints(
     model: DynamicModel, joints: list[Any], centres: Array
 ) -> tuple[IntArray, Array, IntArray, list[RowInfo], list[int]]:
-    found: list[tuple[int, int, int, list[float]]] = []
+    found: list[Row] = []
     info: list[RowInfo] = []
     first: list[int] = []
     slots: list[int] = []
@@ -313,14 +324,18 @@ def _constraints(
                 own_name = f"additional {number + 1}: {own_name}"
             info.append(RowInfo(own_name, _angular(kind), index))
             found.append((kind, a, b, parameters))
-    width = max([codes.ROW_WIDTH, *(len(row[3]) for row in found)])
-    table = np.zeros((len(found), width))
-    for k, row in enumerate(found):
+    rows, table = _stacked(found, max([codes.ROW_WIDTH, *(len(row[3]) for row in found)]))
+    own_slots = np.array(slots, dtype=np.int64)
+    table[:, codes.SLOT] = np.where(own_slots >= 0, own_slots, table[:, codes.SLOT])
+    return rows, table, own_slots, info, first
+
+
+def _stacked(rows: Sequence[Row], width: int) -> tuple[IntArray, Array]:
+    """Kinds and links of rows; their parameters."""
+    table = np.zeros((len(rows), width))
+    for k, row in enumerate(rows):
         table[k, : len(row[3])] = row[3]
-        if slots[k] >= 0:
-            table[k, codes.SLOT] = slots[k]
-    rows = np.array([row[:3] for row in found], dtype=np.int64).reshape(-1, 3)
-    return rows, table, np.array(slots, dtype=np.int64), info, first
+    return np.array([row[:3] for row in rows], dtype=np.int64).reshape(-1, 3), table
 
 
 def _moved(joint: Any, centres: Array) -> Any:
@@ -330,7 +345,7 @@ def _moved(joint: Any, centres: Array) -> Any:
     return replace(joint, at_a=_shifted(joint.at_a, centres[joint.a]), at_b=_shifted(joint.at_b, centres[joint.b]))
 
 
-def joint_rows(joint: Any) -> list[tuple[int, int, int, list[float]]]:
+def joint_rows(joint: Any) -> list[Row]:
     """Equations of a joint, in the parameters of the engine's rows."""
     if isinstance(joint, Rack):
         e = [math.cos(joint.angle), math.sin(joint.angle)]
@@ -354,7 +369,7 @@ def joint_rows(joint: Any) -> list[tuple[int, int, int, list[float]]]:
     return found
 
 
-def driver_row(model: DynamicModel, driver: Driver, centres: Array, slot: int) -> tuple[int, int, int, list[float]]:
+def driver_row(model: DynamicModel, driver: Driver, centres: Array, slot: int) -> Row:
     """Row that prescribes the coordinate of a joint; of a pin in a slot it is the way along the slot."""
     joint = model.mechanism.joint(*driver.pair)
     sign = 1.0 if driver.base == joint.a else -1.0
@@ -367,11 +382,8 @@ def driver_row(model: DynamicModel, driver: Driver, centres: Array, slot: int) -
     return codes.DRIVE_ANGLE, joint.a, joint.b, row
 
 
-def coordinate_row(compiled: Compiled, key: Sequence[Any], slot: int) -> tuple[int, int, int, list[float], bool]:
-    """Row that prescribes a coordinate: ``(link, "x" | "y" | "theta")`` or ``(base, link)`` of a joint.
-
-    Kind, a, b, parameters and whether it is an angle; `GeometryError` for a key that names nothing.
-    """
+def coordinate_row(compiled: Compiled, key: Sequence[Any], slot: int) -> Row:
+    """Row that prescribes ``(link, "x" | "y" | "theta")`` or ``(base, link)``; `GeometryError` if it names nothing."""
     model, frame = compiled.model, compiled.model.mechanism.frame
     try:
         one, two = key
@@ -382,16 +394,14 @@ def coordinate_row(compiled: Compiled, key: Sequence[Any], slot: int) -> tuple[i
         joint = model.mechanism.joint(*driver.pair)
         if not isinstance(joint, Revolute | Prismatic):
             raise GeometryError(f"joint {one}-{two} is {joint.kind}; only coordinates of R and P joints can be kept")
-        kind, a, b, row = driver_row(model, driver, compiled.centres, slot)
-        return kind, a, b, row, kind == codes.DRIVE_ANGLE
+        return driver_row(model, driver, compiled.centres, slot)
     if two not in ("x", "y", "theta") or one not in model.bodies:
         raise GeometryError(f"{key!r} names no coordinate; give (moving link, 'x' | 'y' | 'theta')")
     own = (-float(compiled.centres[one, 0]), -float(compiled.centres[one, 1]))
     row = [0.0, 0.0, *own, 0.0, 0.0, *[0.0] * 6]
     row[codes.SIGN], row[codes.SLOT] = 1.0, float(slot)
     row[codes.TX], row[codes.TY] = (1.0, 0.0) if two == "x" else (0.0, 1.0)
-    kind = codes.DRIVE_ANGLE if two == "theta" else codes.DRIVE_SLIDE
-    return kind, frame, one, row, two == "theta"
+    return codes.DRIVE_ANGLE if two == "theta" else codes.DRIVE_SLIDE, frame, one, row
 
 
 def _angular(kind: int) -> bool:

@@ -134,57 +134,21 @@ class Values:
     time: float
     slots: Array
 
-    @property
-    def size(self) -> float:
-        """Characteristic length."""
-        return self.compiled.tables.size
-
     @cached_property
     def driven(self) -> Array:
         """Prescribed coordinates and derivatives."""
         return self.compiled.driven(self.time)
 
-    @cached_property
-    def mass_root_inverse(self) -> Array:
-        """``L^-T`` of the mass matrix; the units of the coordinates if there are massless links."""
-        lower = self.compiled.tables.lower
-        if not lower.size:
-            return np.diag(self.compiled.unit)
-        return np.asarray(np.linalg.inv(lower).T)
-
     def system(self, q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
         """Constraint values, Jacobian, right sides of accelerations and velocities."""
         T = self.compiled.tables
-        found = kernels.constraint_system(T, kernels.state_rows(T, q, v), self.slots, self.driven)
-        return found[0], found[1], found[2], found[3]
+        C, J, gam, vel = kernels.constraint_system(T, kernels.state_rows(T, q, v), self.slots, self.driven)
+        return C, J, gam, vel
 
     def scaled_jacobian(self, q: Array) -> Array:
         """Jacobian without units."""
         J = self.system(q, np.zeros_like(q))[1]
         return np.asarray(J * self.compiled.unit / self.compiled.row_unit[:, None])
-
-    def extra(self, q: Array, rows: list[Any], wanted: Array) -> tuple[Array, Array]:
-        """Values and Jacobian of additional prescribed coordinates."""
-        if not rows:
-            return np.empty(0), np.empty((0, len(q)))
-        T = self.compiled.tables
-        table = np.zeros((len(rows), T.table.shape[1]))
-        for k, row in enumerate(rows):
-            table[k, : len(row[3])] = row[3]
-        ints = np.array([row[:3] for row in rows], dtype=np.int64)
-        T = T._replace(rows=ints, table=table, slots=np.full(len(rows), -1, dtype=np.int64))
-        driven = np.zeros((len(rows), 3))
-        driven[:, 0] = wanted
-        C, J, _, _ = kernels.constraint_system(T, kernels.state_rows(T, q, np.zeros_like(q)), self.slots, driven)
-        # the kernel writes a prescribed coordinate as seen from the joint's first link: turn it to the user's sense
-        sense = table[:, codes.SIGN]
-        return sense * C, sense[:, None] * J
-
-    def with_extra(self, q: Array, kept: tuple[list[Any], Array]) -> tuple[Array, Array]:
-        """Values and Jacobian of all constraints and the kept coordinates."""
-        C, J, _, _ = self.system(q, np.zeros_like(q))
-        Ck, Jk = self.extra(q, kept[0], kept[1])
-        return np.concatenate([C, Ck]), np.vstack([J, Jk])
 
     def blind(self, q: Array, rank: int) -> bool:
         """Whether constraints look dependent to the masses (``rank`` in their metric) that geometry tells apart."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -86,7 +87,7 @@ class Guard:
             least = max(min(value[f], self.value[f]), 0.0)
             if abs(value[f] - self.value[f]) > 2.0 * (self._narrow[f] + 0.5 * least):
                 return self._shorter(t0, h, 0.5)
-        dense = _Dense(solver)
+        dense = cache(solver.dense_output) if hasattr(solver, "dense_output") else None
         found = [
             (at, f)
             for f in (*np.flatnonzero(sliding), *self.piece.stuck, *self._held)
@@ -97,8 +98,11 @@ class Guard:
             event = self._located(stepper, t0, y0, t1, guess, int(self.hit))
             return Finding(max(event - t0, 0.0) or h, event)
         if factor >= 1.0:
-            self.factor = factor
-            self.message = self._still_one(min(t1, stepper.latest), np.asarray(solver.y))
+            self.factor, t, y = factor, min(t1, stepper.latest), np.asarray(solver.y)
+            q, v = self.form.state(t, y)
+            problem = FrictionProblem(self.piece.rows, t, q, v, self.form.slots_at(q))
+            moving = {f: s for f, s in enumerate(self.piece.senses) if s or self.piece.rows.elements[f].smooth}
+            self.message = decide(problem, moving, self.piece.stuck).message  # why the motion is no longer the only one
             if self.message:
                 return Finding(message=self.message)
         self.value, self.slope = value, slope
@@ -111,13 +115,6 @@ class Guard:
             return Finding(message=_UNRESOLVED)
         return Finding(h * part)
 
-    def _still_one(self, t: float, y: Array) -> str:
-        """Say why the motion is no longer the only one; empty if it is."""
-        q, v = self.form.state(t, y)
-        problem = FrictionProblem(self.piece.rows, t, q, v, self.form.slots_at(q))
-        sliding = {f: s for f, s in enumerate(self.piece.senses) if s or self.piece.rows.elements[f].smooth}
-        return decide(problem, sliding, self.piece.stuck).message
-
     def _crossing(
         self, f: int, t0: float, t1: float, value: Array, slope: Array, dense: Any, slides: bool, latest: float
     ) -> float | None:
@@ -125,13 +122,13 @@ class Guard:
         g0, g1 = float(self.value[f]), float(value[f])
 
         def at(t: float) -> float:
-            return float(self._values(min(t, latest), np.asarray(dense(t)))[0][f])
+            return float(self._values(min(t, latest), np.asarray(dense()(t)))[0][f])
 
         if g1 <= 0.0:
             if g0 <= 0.0:
                 return t0
-            return _root(at, t0, t1, g0, g1) if dense.known else t0 + (t1 - t0) * g0 / (g0 - g1)
-        if not dense.known or (slides and not self._may_touch(f, t1 - t0, g1, float(slope[f]))):
+            return t0 + (t1 - t0) * g0 / (g0 - g1) if dense is None else _root(at, t0, t1, g0, g1)
+        if dense is None or (slides and not self._may_touch(f, t1 - t0, g1, float(slope[f]))):
             return None
         times = [t0 + part * (t1 - t0) for part in _INSIDE]
         inside = [at(t) for t in times]
@@ -182,19 +179,6 @@ class Guard:
             t = float(fresh)
         self.uncertainty = high - low if last is None else float(4.0 * np.spacing(t))
         return t
-
-
-class _Dense:
-    """The interpolant of the last step, made when it is asked for; not ``known`` where the solver has none."""
-
-    def __init__(self, solver: Any) -> None:
-        self._solver, self.known = solver, hasattr(solver, "dense_output")
-        self._found: Any = None
-
-    def __call__(self, t: float) -> Array:
-        if self._found is None:
-            self._found = self._solver.dense_output()
-        return np.asarray(self._found(t))
 
 
 def _root(value: Callable[[float], float], low: float, high: float, at_low: float, at_high: float) -> float:

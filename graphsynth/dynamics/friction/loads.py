@@ -6,7 +6,7 @@ Loads ``x >= 0`` satisfy ``x = load(start + slopes x)``: what friction in joints
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from graphsynth.dynamics import kernels
 from graphsynth.dynamics.elements import JointFriction
-from graphsynth.dynamics.tables import Compiled, RowInfo, driver_row
-from graphsynth.kinematics.engine import codes
+from graphsynth.dynamics.tables import Compiled, driver_row
 from graphsynth.mechanism.laws import Driver
 
 Array = NDArray[np.float64]
@@ -50,8 +49,8 @@ def fitting_loads(elements: Sequence[FrictionElement], start: Array, slopes: Arr
             continue
         x = _polished(elements, start, slopes, x)
         scale = max(size, float(np.abs(x).max()))
-        summed = _loads(elements, np.abs(start) + np.abs(slopes) @ np.abs(x))  # what cancels leaves its rounding
-        fits = (np.abs(_loads(elements, start + slopes @ x) - x) <= _SOLVED * np.maximum(summed, scale)).all()
+        summed = loads_of(elements, np.abs(start) + np.abs(slopes) @ np.abs(x))  # what cancels leaves its rounding
+        fits = (np.abs(loads_of(elements, start + slopes @ x) - x) <= _SOLVED * np.maximum(summed, scale)).all()
         apart = _SAME * float(np.abs(x).max()) + _ROUNDING * float(summed.max())
         if fits and not any(float(np.abs(x - y).max()) <= apart for y in found):
             found.append(x)
@@ -78,7 +77,8 @@ def sliding_loads(elements: Sequence[FrictionElement], start: Array, slopes: Arr
     return np.abs(normal), known & (np.abs(np.abs(normal) - x) <= rounding).all(axis=1)
 
 
-def _loads(elements: Sequence[FrictionElement], lam: Array) -> Array:
+def loads_of(elements: Sequence[FrictionElement], lam: Array) -> Array:
+    """Return the loads of elements, N, from the multipliers."""
     return np.array([e.load(lam) for e in elements])
 
 
@@ -100,7 +100,7 @@ def _slope(e: FrictionElement, lam: Array) -> Array:
 def _newton(elements: Sequence[FrictionElement], start: Array, slopes: Array, x: Array) -> tuple[Array, float]:
     """One step of Newton's method, and the residual before it."""
     lam = start + slopes @ x
-    rest = _loads(elements, lam) - x
+    rest = loads_of(elements, lam) - x
     matrix = np.eye(len(x)) - np.array([_slope(e, lam) for e in elements]) @ slopes
     try:
         return x + np.linalg.solve(matrix, rest), float(np.abs(rest).max())
@@ -110,7 +110,7 @@ def _newton(elements: Sequence[FrictionElement], start: Array, slopes: Array, x:
 
 def _unique(elements: Sequence[FrictionElement], start: Array, slopes: Array) -> Array:
     """Return the loads where substitution contracts."""
-    x = _loads(elements, start)
+    x = loads_of(elements, start)
     best, least = x, np.inf
     for step in range(_ROUNDS):
         fresh, size = _newton(elements, start, slopes, x)
@@ -119,7 +119,7 @@ def _unique(elements: Sequence[FrictionElement], start: Array, slopes: Array) ->
         if size <= 1e-15 * max(float(np.abs(x).max()), 1e-300) or (step > 8 and size <= 1e-13 * float(np.abs(x).max())):
             break
         if step > 8 and step % 2:  # Newton's method may go in circles among the pieces
-            fresh = _loads(elements, start + slopes @ x)
+            fresh = loads_of(elements, start + slopes @ x)
         x = fresh
     return best
 
@@ -303,23 +303,10 @@ class FrictionRows:
 
 def locked(compiled: Compiled, rows: FrictionRows, which: Sequence[int], held: Array) -> Compiled:
     """Return the model with the coordinates of some friction elements' joints held at given values."""
-    T, count = compiled.tables, len(compiled.laws)
-    ints, floats, info = [], np.zeros((len(which), T.table.shape[1])), []
-    for k, f in enumerate(which):
-        joint = rows.joints[f]
-        kind, a, b, own = driver_row(compiled.model, Driver(joint.a, joint.b), compiled.centres, count + k)
-        ints.append((kind, a, b))
-        floats[k, : len(own)] = own
-        info.append(
-            RowInfo(
-                f"sticking {joint.kind} {joint.a}-{joint.b}",
-                kind == codes.DRIVE_ANGLE,
-                compiled.info[int(T.friction[f, 0])].joint,
-            )
-        )
-    tables = T._replace(
-        rows=np.vstack([T.rows, np.array(ints, dtype=np.int64).reshape(-1, 3)]),
-        table=np.vstack([T.table, floats]),
-        slots=np.concatenate([T.slots, np.full(len(ints), -1, dtype=np.int64)]),
-    )
-    return replace(compiled, tables=tables, info=(*compiled.info, *info), held=tuple(float(x) for x in held))
+    joints, first = [rows.joints[f] for f in which], len(compiled.laws)
+    own = [
+        driver_row(compiled.model, Driver(joint.a, joint.b), compiled.centres, first + k)
+        for k, joint in enumerate(joints)
+    ]
+    at = (compiled.info[int(row)].joint for row in compiled.tables.friction[list(which), 0])
+    return compiled.with_held(own, [(f"sticking {j.kind} {j.a}-{j.b}", k) for j, k in zip(joints, at)], held)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.friction.guard import Guard
 from graphsynth.dynamics.friction.loads import FrictionRows
-from graphsynth.dynamics.friction.problem import NO_LOADS, FrictionProblem, Senses
+from graphsynth.dynamics.friction.problem import NO_LOADS, FrictionProblem, FrictionSolution, Senses
 from graphsynth.dynamics.friction.state import Piece, decide, make_piece, state_values
 from graphsynth.dynamics.result import DynamicEvent, FrictionHistory
 from graphsynth.dynamics.start import StartReport
@@ -102,7 +101,7 @@ class DryMotion:
     loss: float = 0.0
     contraction: float = 0.0
     changes: list[tuple[float, str]] = field(default_factory=list)
-    form: Form | None = None
+    form: Form = field(init=False)
     stats: SolverStatistics = field(default_factory=SolverStatistics)
 
     def go(self, grid: Array, breaks: Sequence[float], options: StepOptions) -> SolverStatistics:
@@ -222,7 +221,10 @@ class DryMotion:
             if fit is None:
                 self.stats.message = "the friction of the joints that stick is not determined at the release"
                 return None
-            along = [f for f in piece.stuck if f == hit or (f in piece.shared and self._with(problem, f, hit))]
+            # of those that share, those that can move with it only
+            A = problem.A
+            tied = [f for f in piece.shared if A[f, hit] ** 2 >= (1.0 - 1e-9) * A[f, f] * A[hit, hit]]
+            along = [f for f in piece.stuck if f == hit or f in tied]
             released = {f: -int(np.sign(fit.forces[f])) or 1 for f in along}
             resting = [f for f in piece.stuck if f not in released]
         else:
@@ -230,11 +232,6 @@ class DryMotion:
             problem = self._problem(self.stats.time)
             resting.append(hit)
         return self._next(problem, piece, resting, released, (hit, uncertainty))
-
-    def _with(self, problem: FrictionProblem, f: int, hit: int) -> bool:
-        """Whether two elements can move together only."""
-        A = problem.A
-        return bool(abs(A[f, hit]) ** 2 >= (1.0 - 1e-9) * A[f, f] * A[hit, hit])
 
     def _stop(self, t: float, which: Sequence[int]) -> None:
         """Take out of the velocities what rounding left of rates that have come to 0."""
@@ -303,39 +300,7 @@ class DryMotion:
             )
 
 
-class FrictionAt(NamedTuple):
-    """Friction at one state: accelerations, multipliers, generalised force, and per element state, rate, force, load.
-
-    ``shared`` names elements that stick together in a loop.
-    """
-
-    a: Array
-    multipliers: Array
-    rubbing: Array
-    senses: tuple[int, ...]
-    rates: Array
-    forces: Array
-    loads: Array
-    shared: tuple[str, ...]
-
-
-def friction_at(
-    rows: FrictionRows, t: float, q: Array, v: Array, slots: Array, senses: tuple[int, ...] | None
-) -> FrictionAt | None:
-    """Solve the friction problem at a state whose senses are known; None if there is no single solution."""
-    if senses is None:
-        return None
-    problem = FrictionProblem(rows, t, q, v, slots)
-    fit = problem.at(senses)
-    if fit is None:
-        return None
-    rests = np.array([s == 0 and not e.smooth for s, e in zip(senses, rows.elements)])
-    rates = np.where(rests | (np.abs(problem.rates) <= problem.noise), 0.0, problem.rates)
-    names = tuple(dict.fromkeys(rows.elements[f].name for f in fit.shared))
-    return FrictionAt(fit.a, fit.multipliers, problem.W.T @ fit.forces, senses, rates, fit.forces, fit.loads, names)
-
-
-def friction_history(rows: FrictionRows, count: int, fits: list[FrictionAt | None]) -> FrictionHistory:
+def friction_history(rows: FrictionRows, count: int, fits: list[FrictionSolution | None]) -> FrictionHistory:
     """Collect the friction of all output times."""
     shape = (count, len(rows.elements))
     state = np.zeros(shape, dtype=np.int64)
@@ -345,5 +310,5 @@ def friction_history(rows: FrictionRows, count: int, fits: list[FrictionAt | Non
         if fit is not None:
             state[k], rates[k], forces[k], loads[k] = fit.senses, fit.rates, fit.forces, fit.loads
             if fit.shared:
-                shared[fit.shared] = None
+                shared[tuple(dict.fromkeys(rows.elements[f].name for f in fit.shared))] = None
     return FrictionHistory(tuple(e.name for e in rows.elements), state, rates, forces, loads, tuple(shared))

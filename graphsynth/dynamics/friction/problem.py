@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.dynamics import kernels
-from graphsynth.dynamics.friction.loads import FrictionRows, fitting_loads
+from graphsynth.dynamics.friction.loads import FrictionRows, fitting_loads, loads_of
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import applied_loads
 
@@ -47,6 +47,7 @@ _ROUNDS = 200
 class FrictionSolution:
     """One state of friction: senses (0 sticks), forces (N or N m, on b), loads (N), accelerations, multipliers.
 
+    ``rates`` are 0 where an element sticks or rounding is all there is; ``rubbing`` is the generalised force;
     ``shared`` are the elements that stick together in a loop: how they share their friction is not determined.
     """
 
@@ -55,6 +56,8 @@ class FrictionSolution:
     loads: Array
     a: Array
     multipliers: Array
+    rates: Array
+    rubbing: Array
     shared: tuple[int, ...] = ()
 
 
@@ -173,14 +176,16 @@ class FrictionProblem:
         from scipy.optimize import brentq
 
         D, e, at_rest = sorted({*moving, f}), self.elements[f], set(self.resting)
-        free, part = _Hold(self, []), self._part
+        part = self._part
 
         def forces(use: float) -> Array:
             ratio = np.array(
                 [use * e.static * e.lever if g == f else self._ratio(g, moving[g], begun, g in at_rest) for g in D]
             )
             fits, _ = fitting_loads([self.elements[g] for g in D], part.lam0, part.B[:, D] * ratio)
-            return free.forces(ratio * fits[0], D)
+            found = np.zeros(len(self.elements))
+            found[D] = ratio * fits[0]
+            return found
 
         uses = np.linspace(-1.0, 1.0, _FOLLOWED)
         rates = [self._udot(forces(use), f) for use in uses]
@@ -232,22 +237,24 @@ class FrictionProblem:
         at_rest = set(self.resting)
         ratio = np.array([self._ratio(f, moving[f], begun, f in at_rest) for f in D])
         kept = self._independent(stuck)
-        hold = _Hold(self, kept)
-        start, slopes = hold.multipliers(np.zeros(len(D)), D), np.empty((len(self._part.lam0), len(D)))
-        for k in range(len(D)):
-            one = np.zeros(len(D))
-            one[k] = ratio[k]
-            slopes[:, k] = hold.multipliers(one, D) - start
+        # friction of all elements from the loads of those that slide: those kept are held at rest
+        held, change = np.zeros(len(self.elements)), np.zeros((len(self.elements), len(D)))
+        change[D, range(len(D))] = ratio
+        if kept:
+            inverse = np.linalg.inv(self.A[np.ix_(kept, kept)])
+            held[kept] = -inverse @ self.b[kept]
+            change[kept] = -inverse @ self.A[kept] @ change
+        start, slopes = self._part.lam0 + self._part.B @ held, self._part.B @ change
         fits, known = fitting_loads([self.elements[f] for f in D], start, slopes)
         found, unsettled = [], False
         for x in fits:
-            forces = hold.forces(ratio * x, D)
+            forces = held + change @ x
             shared: tuple[int, ...] = ()
             if len(kept) < len(stuck):
                 if any(abs(self._udot(forces, f)) > self._starting(f) for f in stuck):
                     continue  # they cannot all be at rest
                 shared = tuple(stuck)
-                spread = self._share(hold, D, ratio, stuck, kept, x)
+                spread = self._share(held, change, D, stuck, kept, x)
                 if spread is None:
                     unsettled = True
                     continue
@@ -261,12 +268,16 @@ class FrictionProblem:
 
     def _made(self, forces: Array, moving: Mapping[int, int], shared: tuple[int, ...]) -> FrictionSolution:
         lam = self._part.lam0 + self._part.B @ forces
+        senses = tuple(moving.get(f, 0) for f in range(len(self.elements)))
+        rests = [s == 0 and not e.smooth for s, e in zip(senses, self.elements)]
         return FrictionSolution(
-            tuple(moving.get(f, 0) for f in range(len(self.elements))),
+            senses,
             forces,
-            np.array([e.load(lam) for e in self.elements]),
+            loads_of(self.elements, lam),
             self._part.a0 + self._part.G @ forces,
             lam,
+            np.where(rests | (np.abs(self.rates) <= self.noise), 0.0, self.rates),
+            self.W.T @ forces,
             shared,
         )
 
@@ -282,27 +293,26 @@ class FrictionProblem:
         return kept
 
     def _share(
-        self, hold: _Hold, D: list[int], ratio: Array, stuck: list[int], kept: list[int], x: Array
+        self, held: Array, change: Array, D: list[int], stuck: list[int], kept: list[int], x: Array
     ) -> Array | None:
         """Friction of elements that stick together, spread so that all are used to the same part of their limits.
 
         Only its sums over the motions that it prevents are determined.  None if the loads do not settle.
         """
-        forces = hold.forces(ratio * x, D)
+        forces = held + change @ x
         map_ = self.A[np.ix_(kept, stuck)]  # how friction prevents motions: rows of rank len(kept)
         for step in range(_ROUNDS):
-            lam = self._part.lam0 + self._part.B @ forces
-            loads = np.array([e.load(lam) for e in self.elements])
+            loads = loads_of(self.elements, self._part.lam0 + self._part.B @ forces)
             limits = np.array([self.elements[f].static * self.elements[f].lever * loads[f] for f in stuck])
-            fresh = hold.forces(ratio * loads[D], D)
+            fresh = held + change @ loads[D]
             need = map_ @ fresh[stuck]
             part = _least_use(map_, need, limits)
             if part is None:
                 return None
             fresh[stuck] = part
-            change = float(np.abs(fresh - forces).max())
+            moved = float(np.abs(fresh - forces).max())
             forces = fresh if step < 20 else 0.5 * (forces + fresh)
-            if change <= 1e-13 * float(np.abs(forces).max(initial=0.0)) + 1e-300:
+            if moved <= 1e-13 * float(np.abs(forces).max(initial=0.0)) + 1e-300:
                 return forces
         return None
 
@@ -327,25 +337,6 @@ class FrictionProblem:
         moving = {f: s for f, s in enumerate(senses) if f not in stuck and (s or self.elements[f].smooth)}
         fits, _, _ = self._of(moving, stuck, {f for f in moving if abs(self.rates[f]) <= self.noise[f]}, within)
         return fits[0] if len(fits) == 1 else None
-
-
-class _Hold:
-    """Friction of elements held at rest, as a function of the friction of those that slide."""
-
-    def __init__(self, problem: FrictionProblem, kept: list[int]) -> None:
-        self._problem, self._kept = problem, kept
-        self._inverse = np.linalg.inv(problem.A[np.ix_(kept, kept)]) if kept else np.zeros((0, 0))
-
-    def forces(self, sliding: Array, D: list[int]) -> Array:
-        p, found = self._problem, np.zeros(len(self._problem.elements))
-        found[D] = sliding
-        if self._kept:
-            found[self._kept] = -self._inverse @ (p.b[self._kept] + p.A[self._kept] @ found)
-        return found
-
-    def multipliers(self, sliding: Array, D: list[int]) -> Array:
-        part = self._problem._part
-        return np.asarray(part.lam0 + part.B @ self.forces(sliding, D))
 
 
 def _least_use(rows: Array, need: Array, limits: Array) -> Array | None:

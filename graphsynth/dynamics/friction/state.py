@@ -41,7 +41,12 @@ def decide(
         return Decision("", "")
     names, shared = problem.undetermined()
     if names:
-        return Decision("undetermined", _undetermined(names, shared))
+        return Decision(
+            "undetermined",
+            f"the friction in joint {' and '.join(names)} depends on a reaction that is not determined: "
+            f"{', '.join(shared)} share it in proportions that the equations leave open; remove one of the redundant "
+            "constraints, or the friction",
+        )
     sliding, still, fresh = dict(sliding), sorted(resting), set(begun)
     if len(still) > MOST and len(problem._independent([f for f in still if not problem.idle(f)])) > MOST:
         return Decision(
@@ -59,15 +64,12 @@ def decide(
             if found[0].senses[f] and problem.elements[f].onset < problem.elements[f].static
         }
         if not falls:
-            return _begun(problem, found[0], fresh)
+            break
         sliding.update(falls)
         fresh |= set(falls)
         still = [f for f in still if f not in falls]
-
-
-def _begun(problem: FrictionProblem, fit: FrictionSolution, fresh: set[int]) -> Decision:
-    """Take a solution if all that has begun to slide goes on."""
-    for f in fresh:
+    fit = found[0]
+    for f in fresh:  # all that has begun to slide must go on
         if fit.senses[f] * problem._udot(fit.forces, f) < -problem._starting(f):
             return Decision(
                 "not decided",
@@ -75,14 +77,6 @@ def _begun(problem: FrictionProblem, fit: FrictionSolution, fresh: set[int]) -> 
                 "that of sliding: what follows is not decided; give a stribeck_speed, over which friction falls",
             )
     return Decision("", "", fit)
-
-
-def _undetermined(names: tuple[str, ...], shared: tuple[str, ...]) -> str:
-    which = " and ".join(names)
-    return (
-        f"the friction in joint {which} depends on a reaction that is not determined: {', '.join(shared)} share it in "
-        "proportions that the equations leave open; remove one of the redundant constraints, or the friction"
-    )
 
 
 def _refused(problem: FrictionProblem, found: list[FrictionSolution], known: bool) -> Decision:
