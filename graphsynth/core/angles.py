@@ -21,15 +21,9 @@ _SAMPLES = 361
 
 
 @overload
-def degrees(values: float) -> float:
-    """Return an angle given in degrees in radians."""
-
-
+def degrees(values: float) -> float: ...
 @overload
-def degrees(values: ArrayLike) -> NDArray[np.float64]:
-    """Return angles given in degrees in radians, an array of the same shape."""
-
-
+def degrees(values: ArrayLike) -> NDArray[np.float64]: ...
 def degrees(values: ArrayLike) -> float | NDArray[np.float64]:
     """Return angles given in degrees as the radians that every function takes.
 
@@ -58,15 +52,8 @@ def degrees(values: ArrayLike) -> float | NDArray[np.float64]:
 
 
 def angle(name: str, value: Any) -> float:
-    """Return an angle in radians: a number is radians, a text has its unit.
+    """Return an angle in radians: a number is radians, a text has its unit; `GeometryError` for anything else.
 
-    Raises
-    ------
-    GeometryError
-        A text without a unit, or something that is no finite number.
-
-    Examples
-    --------
     >>> angle("tilt", "30 deg") == degrees(30.0), angle("tilt", 0.1)
     (True, 0.1)
     """
@@ -76,8 +63,6 @@ def angle(name: str, value: Any) -> float:
 def angles(name: str, values: Any) -> NDArray[np.float64]:
     """Return angles or lengths: numbers as they are, texts like "30 deg" in radians, "0..360 deg" as 361 samples.
 
-    Examples
-    --------
     >>> angles("inputs", ["0 deg", "180 deg"]).tolist(), len(angles("inputs", "0..90 deg"))
     ([0.0, 3.141592653589793], 361)
     """

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from graphsynth.core.errors import GraphsynthError
+from graphsynth.core.wording import shown
 
 #: Packages whose classes are told apart.
 _TOLD_APART = ("graphsynth", "fractions")
@@ -37,17 +38,9 @@ def checker(error: type[GraphsynthError], aliases: Mapping[str, str] | None = No
     ``ArrayLike`` (numbers, NaN among them), ``Path``, ``Callable``, classes of the package and fractions, iterables
     and mappings of these, and what is joined by ``|``; any other annotation is left to the function.  What a name is
     says the function's module, its imports for type checking among them, which are followed for a value of another
-    class only: no module is loaded for what is right.
+    class only: no module is loaded for what is right.  ``error`` is the exception of the caller's room, ``aliases`` are
+    other names of annotations.
 
-    Parameters
-    ----------
-    error : type
-        Exception of the caller's room.
-    aliases : mapping of str to str, optional
-        Other names of annotations.
-
-    Examples
-    --------
     >>> from graphsynth.core.errors import GeometryError
     >>> @checker(GeometryError)
     ... def half(size: float, parts: "Count" = 2) -> float:
@@ -83,13 +76,6 @@ def checker(error: type[GraphsynthError], aliases: Mapping[str, str] | None = No
         return call
 
     return decorate
-
-
-def _shown(value: Any) -> str:
-    try:
-        return " ".join(repr(value).split())[:60]
-    except Exception:  # an integer of more digits than Python writes, an object that cannot be shown
-        return f"of type {type(value).__name__}"
 
 
 def _split(text: str, at: str) -> list[str]:
@@ -133,9 +119,9 @@ def _part(annotation: str, words: Mapping[str, Look], module: Mapping[str, Any])
     if head == "Callable":
         return words[head]
     if head == "Mapping" and len(inner) == 2:
-        return partial(_mapping, _union(inner[1], words, module))
+        return partial(_entries, "mapping; give a dict", _union(inner[1], words, module))
     if inner and (head in ("Iterable", "Sequence", "list") or (head == "tuple" and inner[1:] == ["..."])):
-        return partial(_iterable, _union(inner[0], words, module))
+        return partial(_entries, "list; give a list of entries", _union(inner[0], words, module))
     return partial(_instance, annotation, module) if re.fullmatch(r"[A-Z]\w+", annotation) else None
 
 
@@ -171,67 +157,33 @@ def _real(value: Any) -> float | None:
         return None
 
 
-def _number(value: Any) -> str:
-    return "" if _real(value) is not None else f"= {_shown(value)} is not a real number; give one"
+def _says(holds: Callable[[Any], bool], wrong: str) -> Look:
+    """Return the look at values of which something holds, and what is said of others."""
+    return lambda value: "" if holds(value) else f"= {shown(value)} {wrong}"
 
 
 def _finite(value: Any) -> str:
     number = _real(value)
     if number is None:
-        return f"= {_shown(value)} is not a real number; give a finite one"
-    return "" if math.isfinite(number) else f"= {_shown(value)} is not finite; give a finite number"
+        return f"= {shown(value)} is not a real number; give a finite one"
+    return "" if math.isfinite(number) else f"= {shown(value)} is not finite; give a finite number"
 
 
-def _positive(value: Any) -> str:
-    number = _real(value)
-    if number is not None and 0.0 < number < math.inf:
-        return ""
-    return f"= {_shown(value)} must be positive and finite; give a number above 0"
-
-
-def _budget(value: Any) -> str:
-    number = _real(value)
-    return "" if number is not None and number > 0.0 else f"= {_shown(value)} must be positive; give a number above 0"
-
-
-def _complex(value: Any) -> str:
+def _is_complex(value: Any) -> bool:
     try:
-        number = complex(math.nan) if isinstance(value, bool | np.bool_ | str | bytes) else complex(value)
+        return not isinstance(value, bool | np.bool_ | str | bytes) and bool(np.isfinite(complex(value)))
     except (TypeError, ValueError, OverflowError):
-        number = complex(math.nan)
-    if math.isfinite(number.real) and math.isfinite(number.imag):
-        return ""
-    return f"= {_shown(value)} is not a finite complex number; give one"
+        return False
 
 
 def _whole(value: Any) -> str:
     try:
         number = operator.index(value)
     except TypeError:
-        return f"= {_shown(value)} is not a whole number; give one"
+        return f"= {shown(value)} is not a whole number; give one"
     if isinstance(value, bool) or not -(2**63) <= number < 2**63:
-        return f"= {_shown(value)} must be a whole number from -2^63 to 2^63 - 1; correct the value"
+        return f"= {shown(value)} must be a whole number from -2^63 to 2^63 - 1; correct the value"
     return ""
-
-
-def _count(value: Any) -> str:
-    if not _whole(value) and operator.index(value) >= 1:
-        return ""
-    return f"= {_shown(value)} must be a positive integer; give 1 or more, below 2^63"
-
-
-def _truth(value: Any) -> str:
-    if isinstance(value, bool | np.bool_) or (isinstance(value, int) and value in (0, 1)):
-        return ""
-    return f"= {_shown(value)} is neither True nor False; give one of them"
-
-
-def _text(value: Any) -> str:
-    return "" if isinstance(value, str) else f"= {_shown(value)} is no text; give text"
-
-
-def _path(value: Any) -> str:
-    return "" if isinstance(value, str | Path) else f"= {_shown(value)} is no path; give text or a Path"
 
 
 def _numbers(value: Any) -> str:
@@ -239,35 +191,40 @@ def _numbers(value: Any) -> str:
         kind = np.asarray(value).dtype.kind
     except (TypeError, ValueError) as error:
         return f"is not an array of numbers: {error}"
-    return "" if kind in "biufc" else f"= {_shown(value)} is not an array of numbers; give finite ones"
+    return "" if kind in "biufc" else f"= {shown(value)} is not an array of numbers; give finite ones"
 
 
-def _callable(value: Any) -> str:
-    return "" if callable(value) else f"= {_shown(value)} cannot be called; give a function"
-
-
-def _iterable(entries: Look | None, value: Any) -> str:
-    if isinstance(value, str | bytes) or not hasattr(value, "__iter__"):
-        return f"= {_shown(value)} is no list; give a list of entries"
-    if entries is not None and hasattr(value, "__len__"):  # a generator can be read only once
-        for place, entry in enumerate(value):
-            if wrong := entries(entry):
-                return f"[{place}] {wrong}"
-    return ""
-
-
-def _mapping(values: Look | None, value: Any) -> str:
-    if not hasattr(value, "items"):
-        return f"= {_shown(value)} is no mapping; give a dict"
-    if values is not None:
-        for key, entry in value.items():
-            if wrong := values(entry):
-                return f"[{key!r}] {wrong}"
+def _entries(kind: str, look: Look | None, value: Any) -> str:
+    """Look at the entries of a mapping, or of a list."""
+    needed = "items" if kind.startswith("mapping") else "__iter__"
+    if isinstance(value, str | bytes) or not hasattr(value, needed):
+        return f"= {shown(value)} is no {kind}"
+    if look is not None and hasattr(value, "__len__"):  # a generator can be read only once
+        for place, entry in value.items() if needed == "items" else enumerate(value):
+            if wrong := look(entry):
+                return f"[{place!r}] {wrong}"
     return ""
 
 
 _SIMPLE: dict[str, Look] = {
-    "float": _finite, "int": _whole, "bool": _truth, "str": _text, "complex": _complex, "Real": _number,
-    "Positive": _positive, "Budget": _budget, "Count": _count, "ArrayLike": _numbers, "Path": _path,
-    "Callable": _callable,
-}  # fmt: skip
+    "float": _finite,
+    "int": _whole,
+    "ArrayLike": _numbers,
+    "bool": _says(
+        lambda value: isinstance(value, bool | np.bool_) or (isinstance(value, int) and value in (0, 1)),
+        "is neither True nor False; give one of them",
+    ),
+    "str": _says(lambda value: isinstance(value, str), "is no text; give text"),
+    "complex": _says(_is_complex, "is not a finite complex number; give one"),
+    "Real": _says(lambda value: _real(value) is not None, "is not a real number; give one"),
+    "Positive": _says(
+        lambda value: 0.0 < (_real(value) or 0.0) < math.inf, "must be positive and finite; give a number above 0"
+    ),
+    "Budget": _says(lambda value: (_real(value) or 0.0) > 0.0, "must be positive; give a number above 0"),
+    "Count": _says(
+        lambda value: not _whole(value) and operator.index(value) >= 1,
+        "must be a positive integer; give 1 or more, below 2^63",
+    ),
+    "Path": _says(lambda value: isinstance(value, str | Path), "is no path; give text or a Path"),
+    "Callable": _says(callable, "cannot be called; give a function"),
+}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.arguments import checker
 from graphsynth.core.errors import GeometryError, GraphsynthError
+from graphsynth.core.wording import index_of, shown
 
 #: Lets a function keep what its annotations say; a `GeometryError` names the argument that is something else.
 checked = checker(GeometryError, {"Condition": "str"})
@@ -65,11 +65,8 @@ def point(name: str, value: Any) -> Point:
 
 def link_number(name: str, value: Any) -> int:
     """Return a link number as an int; raise `GeometryError` for anything else."""
-    try:
-        number = -1 if isinstance(value, bool) else operator.index(value)
-    except TypeError:
-        number = -1
-    if number < 0:
+    number = None if isinstance(value, bool) else index_of(value)
+    if number is None or number < 0:
         raise GeometryError(f"{name} = {value!r} is not a link; give its number, 0 or more")
     return number
 
@@ -163,12 +160,9 @@ def plane_point(name: str, value: Any) -> complex:
 
 def whole(name: str, value: Any, least: int, most: int = 10_000_000) -> int:
     """Return a whole number between the bounds; raise `GeometryError` for anything else."""
-    try:
-        number = operator.index(value)
-    except TypeError as error:
-        raise GeometryError(f"{name} = {value!r} is not a whole number; give one from {least} on") from error
-    if isinstance(value, bool) or not least <= number <= most:
-        raise GeometryError(f"{name} = {value!r} must be a whole number from {least} to {most}")
+    number = None if isinstance(value, bool) else index_of(value)
+    if number is None or not least <= number <= most:
+        raise GeometryError(f"{name} = {shown(value)} must be a whole number from {least} to {most}")
     return number
 
 
@@ -191,13 +185,6 @@ def triples(name: str, values: ArrayLike, *, nan: bool = False) -> NDArray[np.fl
 def together(**given: ArrayLike) -> list[NDArray[np.float64]]:
     """Return arrays whose last axis holds three numbers (NaN stays NaN) and whose others broadcast.
 
-    Raises
-    ------
-    GeometryError
-        Shapes that do not fit each other, entries that are no real numbers.
-
-    Examples
-    --------
     >>> [array.shape for array in together(pose=[0, 0, 0], theta=np.zeros((5, 3)))]
     [(3,), (5, 3)]
     """
@@ -211,24 +198,10 @@ def together(**given: ArrayLike) -> list[NDArray[np.float64]]:
 
 
 def check_sizes(owner: str, sizes: Mapping[str, Size], error: type[GraphsynthError] = GeometryError) -> None:
-    """Refuse sizes whose products leave the range of double precision; zero and None are left to other checks.
+    """Refuse sizes (of complex ones the magnitude) beyond 1e60 or between 0 and 1e-60: of what, by their names.
 
-    Parameters
-    ----------
-    owner : str
-        What has these sizes, for the sentence.
-    sizes : mapping of str to float, complex or None
-        Checked values by name: lengths, masses, stiffnesses, ...; the magnitude of a complex one.
-    error : type
-        Exception of the caller's room.
+    Their products would leave the range of double precision; zero and None are left to other checks.
 
-    Raises
-    ------
-    GeometryError or ``error``
-        A size beyond 1e60 or between 0 and 1e-60.
-
-    Examples
-    --------
     >>> check_sizes("the lever", {"length": 1e-70})
     Traceback (most recent call last):
         ...
@@ -241,28 +214,11 @@ def check_sizes(owner: str, sizes: Mapping[str, Size], error: type[GraphsynthErr
 
 
 def check_fields(
-    owner: object,
-    names: Iterable[str],
-    error: type[GraphsynthError] = GeometryError,
-    *,
-    small: Iterable[str] = (),
+    owner: object, names: Iterable[str], error: type[GraphsynthError] = GeometryError, *, small: Iterable[str] = ()
 ) -> None:
-    """Apply `check_sizes` to attributes of a dataclass.
+    """Apply `check_sizes` to attributes of a dataclass that set a scale.
 
-    Parameters
-    ----------
-    owner : dataclass
-    names : iterable of str
-        Attributes that set a scale: from 1e-60 to 1e60, or zero.
-    error : type
-        Exception of the caller's room.
-    small : iterable of str
-        Attributes that may be as near to zero as they like: offsets, speeds, loads.
-
-    Raises
-    ------
-    GeometryError or ``error``
-        A size out of its bounds.
+    Those in ``small``, such as offsets, speeds and loads, may be as near to zero as they like.
     """
     sizes = {name: getattr(owner, name) for name in names}
     for name in small:
@@ -275,16 +231,6 @@ def check_largest(largest: float, what: str = "dimension") -> None:
     """Refuse a mechanism whose largest dimension is beyond 1e60, or below 1e-60 but not zero.
 
     Smaller dimensions of the same mechanism may be as small as they like.
-
-    Raises
-    ------
-    GeometryError
-        Which dimension it is, and its bounds.
-
-    Examples
-    --------
-    >>> check_largest(2.5), check_largest(0.0)
-    (None, None)
     """
     if largest != 0.0 and not SMALLEST <= largest <= LARGEST:
         raise GeometryError(

@@ -89,20 +89,10 @@ class Kernel(Native):  # type: ignore[misc]  # of the library, where there is on
 def kernel(
     function: Callable[..., Any] | None = None, *, signature: Callable[[], Any] | None = None, **options: Any
 ) -> Any:
-    """Make a function a kernel: called from the library, or compiled with numba on first use and kept on disk.
+    """Make a function a `Kernel`: called from the library, or compiled with numba on first use and kept on disk.
 
-    Parameters
-    ----------
-    function : callable
-        A function of a kernel module.  Division by zero gives infinity or NaN, as in C (``error_model="numpy"``).
-    signature : callable, optional
-        Returns the numba signature, if it is to be compiled for these types and for no others.
-    **options
-        Further options of ``numba.njit``, for example ``inline="always"``.
-
-    Returns
-    -------
-    Kernel
+    Division by zero gives infinity or NaN, as in C (``error_model="numpy"``).  ``signature`` returns the numba
+    signature, if it is to be compiled for these types and for no others; further options are those of ``numba.njit``.
     """
     if function is None:
         return lambda target: Kernel(target, signature, options)
@@ -175,10 +165,6 @@ def _cache_class() -> Any:
             self._file = Path(function.__code__.co_filename)
             self._name = _name_of(function)
             self._digest = digest
-
-        @property
-        def cache_path(self) -> str:
-            return str(next(_folders(self._file)))
 
         def _place(self, sig: Any, codegen: Any) -> tuple[tuple[Any, ...], str, str]:
             """Return what a file must be of, how its name begins and its whole name."""

@@ -9,28 +9,10 @@ from graphsynth.core.errors import MissingExtraError
 
 
 def need(module: str, extra: str, purpose: str) -> Any:
-    """Import an optional package, or a module of it.
+    """Import an optional package, or a module of it, that an extra of graphsynth in ``pyproject.toml`` installs.
 
-    Parameters
-    ----------
-    module : str
-        What to import, for example ``"sksundae.cvode"``.
-    extra : str
-        The extra of graphsynth in ``pyproject.toml`` that installs it.
-    purpose : str
-        What needs it, as the subject of a sentence in the singular.
+    ``purpose`` is what needs it, as the subject of a sentence in the singular.
 
-    Returns
-    -------
-    module
-
-    Raises
-    ------
-    MissingExtraError
-        If it is not installed.
-
-    Examples
-    --------
     >>> need("no_such_package", "dxf", "DXF")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...

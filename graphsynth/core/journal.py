@@ -33,38 +33,16 @@ _LINE = re.compile(rb'\{"piece": ([0-9]{1,12}), "check": "([0-9a-f]{16})", "valu
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What a journal is of, and what is said when it cannot be used.
+    """What a journal is of, and what is said when it cannot be used."""
 
-    Parameters
-    ----------
-    kind : str
-        For people, such as ``"count"``.
-    title : str
-        The question, for people.
-    digest : str
-        Of all that the results of the pieces, their number and their order depend on; see :func:`digest_of`.
-    piece : str
-        What a piece is called.
-    foreign : str
-        Says that a journal is of something else.
-    remedy : str
-        What to do then.
-    place : str
-        What to do if the file cannot be written.
-    again : str
-        What goes on with interrupted work.
-    error : type
-        Of what is raised.
-    """
-
-    kind: str
-    title: str
-    digest: str
-    piece: str = "piece"
+    kind: str  # for people, such as "count"
+    title: str  # the question, for people
+    digest: str  # of all that the results of the pieces, their number and their order depend on; see `digest_of`
+    piece: str = "piece"  # what one is called
     foreign: str = "belongs to another question or version"
     remedy: str = "give the same options, or name another file"
-    place: str = "name another file"
-    again: str = "the same command"
+    place: str = "name another file"  # what to do if the file cannot be written
+    again: str = "the same command"  # goes on with interrupted work
     error: type[GraphsynthError] = GraphsynthError
 
 
@@ -79,8 +57,6 @@ def writing(
 ) -> Iterator[None]:
     """Turn what the system says of a place that cannot be written into one sentence with the remedy.
 
-    Examples
-    --------
     >>> with writing("out", "choose another folder"):
     ...     raise PermissionError(errno.EACCES, "Permission denied")
     Traceback (most recent call last):
@@ -94,30 +70,12 @@ def writing(
 
 
 class Journal:
-    """The results of one work, kept in a file; without a path nothing is kept.
+    """The results of one work, kept in a file, which is made if it is not there; without a path nothing is kept.
 
-    Parameters
-    ----------
-    path : Path or None
-        The file; made if it is not there.
-    work : Work
-        What it must be of.
-    over : callable, optional
-        Whether work of which these are the results is over, so that the file is begun anew, whatever it is of.
-    fresh : bool, optional
-        Begin the file anew, whatever it is.
-
-    Attributes
-    ----------
-    entries : tuple of str
-        The results that are there: those of the first pieces, in order.
-
-    Raises
-    ------
-    GraphsynthError
-        If another process writes the file, it belongs to another question, or it cannot be written.
-    FormatError
-        If it is no journal, or somebody changed it.
+    ``over`` says whether work of which these are the results is over, so that the file is begun anew, whatever it is
+    of; ``fresh`` begins it anew, whatever it is.  ``entries`` are the results that are there: those of the first
+    pieces, in order.  The error of the work is raised if another process writes the file, it belongs to another
+    question, or it cannot be written; `FormatError` if it is no journal, or somebody changed it.
     """
 
     def __init__(
@@ -161,18 +119,26 @@ class Journal:
         data = b"" if fresh else self._stream.read()
         whole = data[: data.rfind(b"\n") + 1]
         if whole:
-            owner, title = _owner(whole, path, self.work)
+            try:
+                head = json.loads(whole.partition(b"\n")[0])
+                known, owner, title = head["journal"] == _FORMAT, str(head["question"]), str(head["title"])
+            except (ValueError, LookupError, TypeError, RecursionError):
+                known = False
+            if not known:
+                raise FormatError(f"not a journal of graphsynth; {self.work.remedy}", str(path))
             entries = _entries(whole, owner, path, self.work)
             if not over(entries):
                 if owner != self.work.digest:
                     raise self.work.error(f"{path} (of {title}) {self.work.foreign}; {self.work.remedy}")
                 self._take(data, whole[: whole.index(b"\n") + 1], entries)
                 return
-        elif not self._head().startswith(data):
+        own = {"journal": _FORMAT, "of": self.work.kind, "title": self.work.title, "question": self.work.digest}
+        first = json.dumps(own, ensure_ascii=False).encode() + b"\n"
+        if not whole and not first.startswith(data):
             raise FormatError(f"not a journal of graphsynth; {self.work.remedy}", str(path))
         self._cut(0)
-        self._write(self._head())
-        self._ends = [len(self._head())]
+        self._write(first)
+        self._ends = [len(first)]
 
     def _take(self, data: bytes, head: bytes, entries: list[str]) -> None:
         """Go on with these entries; what is torn or doubled leaves the file."""
@@ -189,19 +155,10 @@ class Journal:
         check = _check(self.work.digest, number, value.encode())
         return f'{{"piece": {number}, "check": "{check}", "value": {value}}}\n'.encode()
 
-    def _head(self) -> bytes:
-        """Return the first line."""
-        work = self.work
-        head = {"journal": _FORMAT, "of": work.kind, "title": work.title, "question": work.digest}
-        return json.dumps(head, ensure_ascii=False).encode() + b"\n"
-
     def append(self, value: str) -> None:
         """Keep the result of the next piece, one line of JSON; it is in the file when this returns.
 
-        Raises
-        ------
-        GraphsynthError
-            If it cannot be written, such as on a full disk; what is there stays, and the same command goes on from it.
+        If it cannot be written, such as on a full disk, what is there stays, and the same command goes on from it.
         """
         if self._stream is not None:
             line = self._line(len(self._ends), value)
@@ -247,17 +204,6 @@ class Journal:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.close()
-
-
-def _owner(data: bytes, path: Path, work: Work) -> tuple[str, str]:
-    """Return the digest and the title of the question a journal belongs to."""
-    try:
-        head = json.loads(data.partition(b"\n")[0])
-        if head["journal"] == _FORMAT:
-            return str(head["question"]), str(head["title"])
-    except (ValueError, LookupError, TypeError, RecursionError):
-        pass
-    raise FormatError(f"not a journal of graphsynth; {work.remedy}", str(path))
 
 
 def _entries(data: bytes, owner: str, path: Path, work: Work) -> list[str]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, InvalidStateError
 from contextlib import contextmanager
 from functools import partial
 from itertools import islice
-from threading import RLock
 from typing import Any, TypeVar
 
 from graphsynth.core.errors import GraphsynthError, SpecError
@@ -24,13 +26,7 @@ _LOST = (
 
 
 def check_executor(executor: object) -> None:
-    """Refuse what cannot be handed work.
-
-    Raises
-    ------
-    SpecError
-        If it is neither None nor has the method ``submit`` of an executor.
-    """
+    """Refuse, by a `SpecError`, what is neither None nor has the method ``submit`` of an executor."""
     if executor is not None and not callable(getattr(executor, "submit", None)):
         raise SpecError(
             f"executor = {executor!r} must be a concurrent.futures.Executor, such as ProcessPoolExecutor(4), or None"
@@ -41,14 +37,8 @@ def in_order(executor: Executor | None, function: Callable[[P], T], pieces: Iter
     """Yield ``function(piece)`` for each piece, in order, whoever computes it.
 
     At most ``AHEAD`` pieces are submitted before their results are read, so memory stays bounded.  Without an executor
-    the pieces are done here, one by one; with a :class:`Crew` this process does its share of them.
-
-    Raises
-    ------
-    SpecError
-        At once, if `executor` is none.
-    GraphsynthError
-        If the workers died and could not be replaced.
+    the pieces are done here, one by one; with a :class:`Crew` this process does its share of them.  `SpecError` at
+    once if `executor` is none, `GraphsynthError` if the workers died and could not be replaced.
     """
     check_executor(executor)
     return _in_order(executor, function, pieces)
@@ -79,11 +69,7 @@ def _in_order(executor: Executor | None, function: Callable[[P], T], pieces: Ite
 class Again(Executor):
     """An executor that submits work again that was lost with a worker; its futures hold what the last attempt gave.
 
-    Parameters
-    ----------
-    executor : Executor
-    lost : callable
-        Whether an exception tells of work that was lost, not of work that failed.
+    ``lost`` says whether an exception tells of work that was lost, not of work that failed.
     """
 
     def __init__(self, executor: Executor, lost: Callable[[BaseException], bool]) -> None:
@@ -130,20 +116,14 @@ class Again(Executor):
 class Crew(Again):
     """Other processes and this one: what is submitted runs in the others, and :func:`in_order` works here as well.
 
-    Parameters
-    ----------
-    others : Executor
-    hands : int
-        How many processes they are.
-    renew : callable, optional
-        Gives other processes in the place of those that were lost, of which one was killed.
+    ``hands`` is how many they are; ``renew`` gives other ones in the place of those lost, of which one was killed.
     """
 
     def __init__(self, others: Executor, hands: int, renew: Callable[[], Executor] | None = None) -> None:
         super().__init__(others, lambda error: isinstance(error, BrokenExecutor))
         self.most = 2 * hands + 1  # pieces handed out at once: nobody runs dry, and few are left when this process is
         self._renew = renew
-        self._lock = RLock()
+        self._lock = threading.RLock()
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Let the others end; they are not replaced any more."""
@@ -177,19 +157,15 @@ def _shared(
         if not waiting[0].done() and len(waiting) < AHEAD and more:
             more = False
             for piece in islice(pieces, 1):
-                waiting.append(_done_here(function, piece))
+                future: Future[T] = Future()
+                try:
+                    future.set_result(function(piece))
+                except Exception as error:  # raised in its turn, when the result is asked for
+                    future.set_exception(error)
+                waiting.append(future)
                 more = True
         else:
             yield waiting.popleft().result()
-
-
-def _done_here(function: Callable[[P], T], piece: P) -> Future[T]:
-    future: Future[T] = Future()
-    try:
-        future.set_result(function(piece))
-    except Exception as error:  # raised in its turn, when the result is asked for
-        future.set_exception(error)
-    return future
 
 
 @contextmanager
@@ -220,84 +196,59 @@ def processes(workers: int, prepare: Callable[[], None] | None = None) -> Iterat
     except (ImportError, NotImplementedError, OSError):  # no semaphores, no more processes: everything is done here
         yield None
         return
-    with _quiet_cancelling():  # all along: a worker stopped while it starts breaks the pool before this process knows
-        try:
-            yield crew
-        except BaseException:
-            crew.shutdown(wait=False, cancel_futures=True)
-            for child in active_children():
-                child.kill()
-            raise
-        finally:
-            crew.shutdown(wait=True, cancel_futures=True)
-
-
-@contextmanager
-def _quiet_cancelling() -> Iterator[None]:
-    """Keep the thread of a pool from complaining that work it lost with its processes was cancelled before."""
-    import threading
-
     usual = threading.excepthook
 
     def hook(arguments: threading.ExceptHookArgs) -> None:
+        """Keep the thread of a pool from complaining that work it lost with its processes was cancelled before."""
         if not issubclass(arguments.exc_type, InvalidStateError):
             usual(arguments)
 
-    threading.excepthook = hook
+    threading.excepthook = hook  # all along: a worker stopped while it starts breaks the pool before this process knows
     try:
-        yield
+        yield crew
+    except BaseException:
+        crew.shutdown(wait=False, cancel_futures=True)
+        for child in active_children():
+            child.kill()
+        raise
     finally:
+        crew.shutdown(wait=True, cancel_futures=True)
         threading.excepthook = usual
 
 
 def _begin_worker(*_: Any) -> None:
     """Leave Ctrl-C to the parent process, which stops the workers; end with it if it is killed."""
     import signal
+    from multiprocessing import parent_process
     from multiprocessing.util import Finalize
-    from threading import Thread
 
     from graphsynth.core.compilation import announce
 
     announce(lambda: None, lambda text: None)  # this process tells nothing
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _die_with_parent()
-    Thread(target=_end_with_parent, daemon=True).start()
+    parent = parent_process()
+    if parent is not None and sys.platform == "linux":
+        import fcntl
+
+        # have the system kill this process with its parent, also in the middle of compiled code that lets no thread run
+        fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(parent.sentinel, fcntl.F_SETSIG, signal.SIGKILL)
+        fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, fcntl.fcntl(parent.sentinel, fcntl.F_GETFL) | os.O_ASYNC)
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
     Finalize(None, _leave, exitpriority=-1000)
 
 
 def _leave() -> None:
     """End at once: the system takes back what an interpreter would take a quarter of a second to take apart."""
-    import os
-    import sys
-
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(0)
 
 
-def _die_with_parent() -> None:
-    """Have Linux kill this process with its parent, also in the middle of compiled code that lets no thread run."""
-    import os
-    import sys
-    from multiprocessing import parent_process
-
-    parent = parent_process()
-    if sys.platform == "linux" and parent is not None:
-        import fcntl
-        import signal
-
-        fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(parent.sentinel, fcntl.F_SETSIG, signal.SIGKILL)
-        fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, fcntl.fcntl(parent.sentinel, fcntl.F_GETFL) | os.O_ASYNC)
-
-
-def _end_with_parent() -> None:
+def _end_with(sentinel: int) -> None:
     """Wait for the end of the parent process: a killed one cannot tell its workers, and they would wait for ever."""
-    import os
-    from multiprocessing import parent_process
     from multiprocessing.connection import wait
 
-    parent = parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)
+    wait([sentinel])
+    os._exit(1)

@@ -6,6 +6,7 @@ function.  The table of these functions is filled by ``graphsynth/__init__.py``,
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -25,10 +26,7 @@ class Shown:
     """Shows itself in at most ten lines, and in a notebook as a picture with a table."""
 
     __slots__ = ()
-
-    def _told(self) -> tuple[str, list[tuple[str, str]]]:
-        """Return a title and rows of a name and a value."""
-        raise NotImplementedError
+    _told: Callable[[], tuple[str, list[tuple[str, str]]]]  #: a title, and rows of a name and a value
 
     def _picture(self) -> str:
         """Return an SVG for a notebook; empty for none."""

@@ -19,22 +19,9 @@ _DEEP = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){100}""")
 
 
 def read_bytes(path: Path, most: int = FILE_MAX, what: str = "a file of its kind", place: str = "") -> bytes:
-    """Read a whole file: no folder, no device, no pipe, and no more than ``most`` bytes.
+    """Read a whole file: no folder, no device, no pipe, and no more than ``most`` bytes; else a `FormatError`.
 
-    Parameters
-    ----------
-    path : Path
-    most : int
-        Bytes.
-    what : str
-        What the file should be, for the message.
-    place : str, optional
-        What messages call the file; its path by default.
-
-    Raises
-    ------
-    FormatError
-        For a file that cannot be read, or is not one.
+    For the message: ``what`` the file should be, and what its ``place`` is called, its path by default.
     """
     place = place or str(path)
     try:
@@ -55,13 +42,7 @@ def read_bytes(path: Path, most: int = FILE_MAX, what: str = "a file of its kind
 
 
 def text_of(data: str | bytes, place: str = "", what: str = "it") -> str:
-    """Decode UTF-8, without the mark that some editors put before the first letter.
-
-    Raises
-    ------
-    FormatError
-        For other bytes.
-    """
+    """Decode UTF-8, without the mark that some editors put before the first letter; `FormatError` for other bytes."""
     if isinstance(data, str):
         return data.removeprefix("\ufeff")
     try:
@@ -75,13 +56,8 @@ def text_of(data: str | bytes, place: str = "", what: str = "it") -> str:
 def toml_tables(text: str, place: str = "text") -> dict[str, Any]:
     """Read TOML as plain values.
 
-    Raises
-    ------
-    FormatError
-        For anything else; also for keys of more than 100 parts and whole numbers of thousands of digits.
+    `FormatError` for anything else; also for keys of more than 100 parts and whole numbers of thousands of digits.
 
-    Examples
-    --------
     >>> toml_tables("a.b = 1")
     {'a': {'b': 1}}
     """
@@ -93,7 +69,15 @@ def toml_tables(text: str, place: str = "text") -> dict[str, Any]:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # ValueError: TOMLDecodeError, and integers of thousands of digits
         raise FormatError(f"not TOML: {_brief(error)}", place) from None
-    _check_numbers(tables, place)
+    waiting: list[Any] = [tables]
+    while waiting:  # whole numbers of thousands of hexadecimal digits, which no message could show, are refused
+        value = waiting.pop()
+        if isinstance(value, dict):
+            waiting += value.values()
+        elif isinstance(value, list):
+            waiting += value
+        elif isinstance(value, int) and value.bit_length() > _BITS:
+            raise FormatError(f"a whole number of {value.bit_length()} bits; TOML has at most 64", place)
     return tables
 
 
@@ -103,38 +87,8 @@ def _brief(error: Exception) -> str:
     return said if len(said) <= 300 else f"{said[:200]} ... {said[-80:]}"
 
 
-def _check_numbers(tables: dict[str, Any], place: str) -> None:
-    """Refuse whole numbers of thousands of hexadecimal digits, which no message could show."""
-    waiting: list[Any] = [tables]
-    while waiting:
-        value = waiting.pop()
-        if isinstance(value, dict):
-            waiting += value.values()
-        elif isinstance(value, list):
-            waiting += value
-        elif isinstance(value, int) and value.bit_length() > _BITS:
-            raise FormatError(f"a whole number of {value.bit_length()} bits; TOML has at most 64", place)
-
-
 def json_value(text: str, place: str = "") -> Any:
-    """Read JSON as plain values.
-
-    Parameters
-    ----------
-    text : str
-        The document.
-    place : str, optional
-        What messages call it.
-
-    Returns
-    -------
-    dict, list, str, number, bool or None
-
-    Raises
-    ------
-    FormatError
-        For anything else, NaN and keys given twice too, whatever the depth.
-    """
+    """Read JSON as plain values; `FormatError` for anything else, NaN and keys given twice too, whatever the depth."""
     try:
         return json.loads(text, parse_constant=_no_constant, object_pairs_hook=_pairs)
     except json.JSONDecodeError as error:
@@ -147,13 +101,11 @@ def json_value(text: str, place: str = "") -> Any:
 
 
 def _pairs(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        left = set(found)
-        for name, _ in pairs:
-            if name not in left:
-                raise FormatError(f"the key {name[:24]!r} is there twice")
-            left.remove(name)
+    found: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in found:
+            raise FormatError(f"the key {name[:24]!r} is there twice")
+        found[name] = value
     return found
 
 

@@ -14,8 +14,6 @@ def replacing(path: Path) -> Iterator[Path]:
 
     If the block fails, as on a full disk, nothing of it is left, and what was there before stays.
 
-    Examples
-    --------
     >>> import tempfile
     >>> folder = tempfile.TemporaryDirectory()
     >>> path = Path(folder.name) / "a.txt"

@@ -12,8 +12,6 @@ from graphsynth.core.errors import SpecError
 def plain(text: str) -> str:
     r"""Return a text without characters that are not seen or that steer a terminal; they stand as escapes.
 
-    Examples
-    --------
     >>> print(plain("red \x1b[31m"))
     red \x1b[31m
     """
@@ -34,7 +32,7 @@ def shown(value: Any) -> str:
     if isinstance(value, int) and value.bit_length() > 200:
         return f"a number of {value.bit_length()} bits"
     try:
-        text = repr(value)
+        text = " ".join(repr(value).split())
     except Exception:  # whatever a foreign __repr__ raises; of an integer of thousands of digits inside, ValueError
         text = f"a value of type {type(value).__name__}"
     return text if len(text) <= 60 else text[:57] + "..."
@@ -43,13 +41,8 @@ def shown(value: Any) -> str:
 def whole(value: Any, name: str, least: int, most: int | None = None) -> int:
     """Return a whole number of any integer type as an int.
 
-    Raises
-    ------
-    SpecError
-        For anything else, a truth value too, and for a number out of its bounds.
+    `SpecError` for anything else, a truth value too, and for a number out of its bounds.
 
-    Examples
-    --------
     >>> import numpy as np
     >>> whole(np.uint8(4), "links", 2, 255)
     4

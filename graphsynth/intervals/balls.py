@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import GraphsynthError
+from graphsynth.intervals.operations import Array
 from graphsynth.intervals.reading import precision
-
-Array = NDArray[np.float64]
 
 #: Unit roundoff of binary64.
 U = 2.0**-53

@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import IntervalError
 from graphsynth.intervals.interval import Interval, _make, interval
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from graphsynth.intervals.operations import Array, Mask
 
 
 class Status(IntEnum):
@@ -84,18 +82,13 @@ class Paving:
     @property
     def outer(self) -> Interval:
         """Hull of all boxes, shape (n,): every solution lies in it."""
-        n = self.boxes.shape[1]
-        if len(self.status) == 0:
-            return Interval.empty(n)
-        return _make(self.boxes.lo.min(axis=0), self.boxes.hi.max(axis=0))
+        return _make(self.boxes.lo.min(axis=0, initial=np.inf), self.boxes.hi.max(axis=0, initial=-np.inf))
 
     @property
     def inside(self) -> Interval:
         """Hull of the inner boxes, shape (n,): its extreme faces are touched by solutions; empty if there are none."""
-        n = self.boxes.shape[1]
-        if not self.inner.any():
-            return Interval.empty(n)
-        return _make(self.boxes.lo[self.inner].min(axis=0), self.boxes.hi[self.inner].max(axis=0))
+        own = self.boxes[self.inner]
+        return _make(own.lo.min(axis=0, initial=np.inf), own.hi.max(axis=0, initial=-np.inf))
 
     @property
     def verdict(self) -> Status:
@@ -119,17 +112,20 @@ class Paving:
         return len(lo)
 
 
+def bounded(name: str, values: Any) -> Interval:
+    """Read a vector of bounded intervals; `IntervalError` for anything else."""
+    found = interval(values)
+    if found.ndim != 1 or found.size == 0 or not found.is_bounded.all():
+        raise IntervalError(f"{name} = {found!r} is empty, unbounded or no vector; give finite bounds, shape (n,)")
+    return found
+
+
 def posed(box: Any, tolerance: float | Sequence[float]) -> tuple[Interval, Array]:
     """Read a start box, and the widths at which boxes are not cut further: a part of its own, or one for each unknown.
 
-    Raises
-    ------
-    IntervalError
-        A box that is empty, unbounded or no vector; widths that are not as many positive numbers.
+    `IntervalError` for widths that are not as many positive numbers.
     """
-    start = interval(box)
-    if start.ndim != 1 or start.size == 0 or not start.is_bounded.all():
-        raise IntervalError(f"the box {start!r} is not a vector of bounded intervals; give finite bounds, shape (n,)")
+    start = bounded("box", box)
     if isinstance(tolerance, int | float | np.number):
         return start, tolerance * np.where(start.width > 0.0, start.width, 1.0)
     widths = np.array(tolerance, dtype=np.float64)

@@ -12,21 +12,20 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graphsynth.core.arguments import Budget, Positive
 from graphsynth.core.errors import IntervalError
-from graphsynth.intervals.boxes import Paving, Status, posed
+from graphsynth.intervals.boxes import Paving, Status, bounded, posed
 from graphsynth.intervals.guard import check_rounding, checked
 from graphsynth.intervals.interval import Interval, _make, interval
 from graphsynth.intervals.paving import pave
 from graphsynth.intervals.proving import System, read_parameters
 
-Array = NDArray[np.float64]
 #: Boxes between two looks at the clock; waiting and kept boxes for which there is room at first.
 _AT_ONCE, _DEPTH, _KEPT = 100_000, 256, 64
 #: A cell that is wide is not worth fine boxes: their widths, relative to the start box, next to that of the cell.
@@ -39,11 +38,9 @@ class CompiledSystem(Protocol):
     @property
     def py_func(self) -> Callable[..., bool]:
         """The function as it is written."""
-        ...
 
     def __call__(self, *bounds: Any) -> bool:
         """Write bounds of the equations, and of their derivatives."""
-        ...
 
 
 @checked
@@ -87,11 +84,7 @@ def pave_compiled(
     box : Interval or anything it takes, shape (n,)
         Start box, bounded.
     parameters : Interval or anything it takes, shape (m,), optional
-    tolerance : float or sequence of float
-        Boxes whose widths are all below this part of those of the start box, or below widths given, are not cut
-        further.
-    max_boxes, max_seconds : int, float
-        Budget; the clock is read every 100000 boxes.
+    tolerance, max_boxes, max_seconds : as for `Search`; the clock is read every 100000 boxes
 
     Returns
     -------
@@ -103,8 +96,6 @@ def pave_compiled(
     IntervalError
         For a box that is empty, unbounded or no vector, budgets and tolerances that are not positive, a system that
         is not compiled.
-    GraphsynthError
-        If the processor's rounding has been changed.
 
     Notes
     -----
@@ -148,23 +139,14 @@ def pave_compiled(
         elif outcome == krawczyk.DONE or state[krawczyk.TESTED] >= max_boxes or perf_counter() - begin >= max_seconds:
             break
     waiting, count, tested, _ = state.tolist()
-    return _collected(stack[:waiting], kept[:count], domains[:count], status[:count], (tested, perf_counter() - begin))
-
-
-def _doubled(rows: NDArray[Any]) -> NDArray[Any]:
-    return np.concatenate([rows, np.empty_like(rows)])
-
-
-def _collected(stack: Array, kept: Array, domains: Array, status: NDArray[np.int8], work: tuple[int, float]) -> Paving:
-    """Make the result; undecided boxes that a proved solution stands for are left out."""
-    found = np.concatenate([status, np.full(len(stack), Status.UNDECIDED, dtype=np.int8)])
-    boxes, own = np.concatenate([kept, stack]), np.concatenate([domains, stack])
+    boxes, own = (np.concatenate([part[:count], stack[:waiting]]) for part in (kept, domains))
+    found = np.concatenate([status[:count], np.full(waiting, Status.UNDECIDED, dtype=np.int8)])
     stays = np.ones(len(found), dtype=np.bool_)
-    for low, high in domains[status == Status.UNIQUE]:
+    for low, high in own[found == Status.UNIQUE]:  # it stands for undecided boxes in its domain: they are left out
         stays &= ~((boxes[:, 0] >= low) & (boxes[:, 1] <= high)).all(axis=1) | (found == Status.UNIQUE)
     lo, hi, dlo, dhi = (part[stays, side] for part in (boxes, own) for side in (0, 1))
-    inner = np.zeros(len(lo), dtype=np.bool_)
-    return Paving(_make(lo, hi), found[stays], _make(dlo, dhi), inner, len(stack) == 0, *work)
+    inner, seconds = np.zeros(len(lo), dtype=np.bool_), perf_counter() - begin
+    return Paving(_make(lo, hi), found[stays], _make(dlo, dhi), inner, waiting == 0, tested, seconds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,8 +222,7 @@ def pave_cells(
     f, box : as for `krawczyk`; f may also be a `compiled_system`, which is faster by a factor of a hundred
     parameters : Interval or anything it takes, shape (m,)
         Bounded.
-    tolerance : float
-        As for `Search`.
+    tolerance : as for `Search`
     smallest : float
         Cells whose widths are all at most ``smallest`` times those of the parameter box are not cut further.
     cell_boxes : int
@@ -267,12 +248,11 @@ def pave_cells(
     ('UNIQUE', 1, True)
     """
     check_rounding()
-    p, start = interval(parameters), interval(box)
-    if p.ndim != 1 or p.size == 0 or not p.is_bounded.all():
-        raise IntervalError(f"the parameters {p!r} are not a vector of bounded intervals; give finite bounds, (m,)")
+    p, start = bounded("parameters", parameters), interval(box)
     begin, tested, finished = perf_counter(), 0, True
     scale = np.where(start.width > 0.0, start.width, 1.0)
     widths = np.where(p.width > 0.0, p.width, 1.0)
+    paved: Any = pave_compiled if hasattr(f, "nopython_signatures") else partial(pave, batch=256)
     waiting: deque[tuple[Interval, Interval, Paving | None]] = deque([(p, start, None)])
     done: list[tuple[Interval, Paving]] = []
     while waiting:
@@ -286,33 +266,18 @@ def pave_cells(
         wide = float(sides.max())
         fine = max(tolerance, _COARSE * wide) if wide > smallest else tolerance
         limits = {"max_boxes": min(cell_boxes, max_boxes), "max_seconds": max(left, 1e-9)}
-        found = _paved(f, inside, cell, {"tolerance": (fine * scale).tolist(), **limits})
+        found = paved(f, inside, cell, tolerance=(fine * scale).tolist(), **limits)
         tested += found.tested
-        if _settled(found):
+        if _settled(found) or wide <= smallest:
             done.append((cell, found))
-        elif wide <= smallest:
-            done.append((cell, found))
-            finished = False
+            finished = finished and _settled(found)
         else:
-            part = _around(found.outer, inside)
-            waiting.extend((half, part, found) for half in _halves(cell, int(sides.argmax())))
+            # the hull of all solutions, a little larger so that a proof has room, within the box it comes from
+            part = (found.outer + _make(-0.02, 0.02) * inside.width).intersect(inside)
+            side = sides.argmax()
+            lower, upper = cell.hi.copy(), cell.lo.copy()
+            lower[side] = upper[side] = cell.mid[side]
+            halves = _make(cell.lo, lower, cell.flags), _make(upper, cell.hi, cell.flags)
+            waiting.extend((half, part, found) for half in halves)
     cells, pavings = zip(*done)
     return CellPaving(Interval.stack(cells), pavings, finished, tested, perf_counter() - begin)
-
-
-def _paved(f: Any, box: Interval, cell: Interval, options: dict[str, Any]) -> Paving:
-    if hasattr(f, "nopython_signatures"):
-        return pave_compiled(f, box, cell, **options)
-    return pave(f, box, cell, batch=256, **options)
-
-
-def _around(hull: Interval, inside: Interval) -> Interval:
-    """Return the hull of all solutions, a little larger so that a proof has room, within the box it comes from."""
-    grow = _make(-0.02, 0.02) * inside.width
-    return (hull + grow).intersect(inside)
-
-
-def _halves(cell: Interval, side: int) -> tuple[Interval, Interval]:
-    lower, upper = cell.hi.copy(), cell.lo.copy()
-    lower[side] = upper[side] = cell.mid[side]
-    return _make(cell.lo, lower, cell.flags), _make(upper, cell.hi, cell.flags)

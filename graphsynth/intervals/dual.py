@@ -125,9 +125,7 @@ def variables(box: Interval) -> list[Dual]:
     if box.ndim == 0:
         raise IntervalError("one interval is no box; give a vector of them, shape (n,) or (N, n)")
     n = box.shape[-1]
-    unit = np.zeros((n, n) + (1,) * (box.ndim - 1))
-    for i in range(n):
-        unit[i, i] = 1.0
+    unit = np.eye(n).reshape((n, n) + (1,) * (box.ndim - 1))
     return [Dual(box[..., i], _make(unit[i], unit[i])) for i in range(n)]
 
 
@@ -167,8 +165,7 @@ def jacobian_of(results: Sequence[Any], n: int, shape: tuple[int, ...]) -> Inter
     rows = []
     for result in results:
         grad = result.grad if isinstance(result, Dual) else Interval.zeros((n,) + (1,) * len(shape))
-        parts = [_spread(grad[j], shape) for j in range(n)]
-        rows.append(Interval.stack(parts, axis=-1))
+        rows.append(Interval.stack([_spread(grad[j], shape) for j in range(n)], axis=-1))
     return Interval.stack(rows, axis=-2)
 
 
@@ -189,11 +186,6 @@ def jacobian(f: Callable[..., Sequence[Any]], box: Any, parameters: Any = None) 
     derivatives : Interval, shape (equations, n) or (N, equations, n)
         Certified; where ``guaranteed`` is False something was undefined or discontinuous, and no mean value theorem
         holds over the box.
-
-    Raises
-    ------
-    GraphsynthError
-        If the processor's rounding has been changed.
 
     Examples
     --------

@@ -16,30 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals.dual import Dual
-from graphsynth.intervals.interval import Interval, _clipped, _make, interval
-from graphsynth.intervals.operations import common_shape, run
-from graphsynth.intervals.reading import DISCONTINUOUS
-
-Array = NDArray[np.float64]
+from graphsynth.intervals.interval import Interval, _both, _make, _marked, interval
+from graphsynth.intervals.operations import Array, run
+from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS
 
 
 def _apply(name: str, *arguments: Interval) -> Interval:
     """Run a compiled loop over broadcast arguments; decorations of all are joined."""
     lo, hi = run(name, *[side for a in arguments for side in (a.lo, a.hi)])
-    flags = arguments[0].flags
-    for a in arguments[1:]:
-        flags = np.asarray(np.bitwise_or(flags, a.flags))
-    return _make(lo, hi, flags)
+    return _make(lo, hi, _both(*[a.flags for a in arguments]))
 
 
-def _mark(x: Interval, where: NDArray[np.bool_]) -> Interval:
-    if not where.any():
-        return x
-    return _make(x.lo, x.hi, np.asarray(np.bitwise_or(x.flags, np.where(where, DISCONTINUOUS, np.uint8(0)))))
-
-
-def _mark_clipped(x: Interval, where: NDArray[np.bool_]) -> Interval:
-    return _make(x.lo, x.hi, _clipped(x.flags, where))
+def _mark(x: Interval, where: NDArray[np.bool_], mark: np.uint8 = CLIPPED) -> Interval:
+    return _make(x.lo, x.hi, _marked(x.flags, where, mark))
 
 
 class _Unary(Protocol):
@@ -106,9 +95,10 @@ def _binary(slopes: Callable[[Dual, Dual, Interval], Dual]) -> Callable[[Callabl
         @wraps(function)
         def apply(x: Any, y: Any, /) -> Any:
             if isinstance(x, Dual) or isinstance(y, Dual):
-                x, y = _dual(x, y), _dual(y, x)
+                x, y = (a if isinstance(a, Dual) else Dual(interval(a), b.grad * 0) for a, b in ((x, y), (y, x)))
                 return slopes(x, y, function(x.value, y.value))
-            return function(*_both(x, y))
+            x = interval(x)
+            return function(x, x._beside(y))
 
         names = ", ".join(signature(function).parameters)
         _document(apply, names, "\n        Shapes that broadcast.")
@@ -157,7 +147,7 @@ def cos(x: Interval) -> Interval:
 def tan(x: Interval) -> Interval:
     """Tangent; the whole line across a pole, recorded (`Decoration.DISCONTINUOUS`)."""
     result = _apply("tan", x)
-    return _mark(result, ~result.is_bounded & ~result.is_empty)
+    return _mark(result, ~result.is_bounded & ~result.is_empty, DISCONTINUOUS)
 
 
 @_unary(lambda x, value: 1 / (x.sqr() + 1))
@@ -169,13 +159,13 @@ def atan(x: Interval) -> Interval:
 @_unary(lambda x, value: 1 / sqrt((1 - x) * (1 + x)))
 def asin(x: Interval) -> Interval:
     """Inverse sine; a part outside [-1, 1] is clipped and recorded."""
-    return _mark_clipped(_apply("asin", x), (x.lo < -1.0) | (x.hi > 1.0))
+    return _mark(_apply("asin", x), (x.lo < -1.0) | (x.hi > 1.0))
 
 
 @_unary(lambda x, value: -1 / sqrt((1 - x) * (1 + x)))
 def acos(x: Interval) -> Interval:
     """Inverse cosine; a part outside [-1, 1] is clipped and recorded."""
-    return _mark_clipped(_apply("acos", x), (x.lo < -1.0) | (x.hi > 1.0))
+    return _mark(_apply("acos", x), (x.lo < -1.0) | (x.hi > 1.0))
 
 
 @_unary(lambda x, value: value)
@@ -187,7 +177,7 @@ def exp(x: Interval) -> Interval:
 @_unary(lambda x, value: 1 / x)
 def log(x: Interval) -> Interval:
     """Natural logarithm; a part at or below 0 is clipped and recorded."""
-    return _mark_clipped(_apply("log", x), x.lo <= 0.0)
+    return _mark(_apply("log", x), x.lo <= 0.0)
 
 
 def _atan2_slopes(y: Dual, x: Dual, value: Interval) -> Dual:
@@ -204,8 +194,8 @@ def atan2(y: Interval, x: Interval) -> Interval:
     >>> atan2(Interval(1), Interval(1)).contains(0.7853981633974483)
     True
     """
-    result = _mark(_apply("atan2", y, x), (y.lo < 0.0) & (y.hi >= 0.0) & (x.lo < 0.0))
-    return _mark_clipped(result, (y.lo <= 0.0) & (y.hi >= 0.0) & (x.lo <= 0.0) & (x.hi >= 0.0))
+    result = _mark(_apply("atan2", y, x), (y.lo < 0.0) & (y.hi >= 0.0) & (x.lo < 0.0), DISCONTINUOUS)
+    return _mark(result, (y.lo <= 0.0) & (y.hi >= 0.0) & (x.lo <= 0.0) & (x.hi >= 0.0))
 
 
 @_binary(lambda x, y, value: Dual(value, (x.value / value) * x.grad + (y.value / value) * y.grad))
@@ -214,40 +204,21 @@ def hypot(x: Interval, y: Interval) -> Interval:
     return _apply("hypot", x, y)
 
 
-def _smaller_slopes(x: Dual, y: Dual, value: Interval) -> Dual:
-    return _selected(value, x, y, x.value.hi < y.value.lo, y.value.hi < x.value.lo)
-
-
-@_binary(_smaller_slopes)
+@_binary(lambda x, y, value: _selected(value, x, y, x.value.hi < y.value.lo, y.value.hi < x.value.lo))
 def minimum(x: Interval, y: Interval) -> Interval:
     """Smaller of two; the derivative holds both where either may be the smaller."""
     return _combined(x, y, np.minimum(x.lo, y.lo), np.minimum(x.hi, y.hi))
 
 
-def _larger_slopes(x: Dual, y: Dual, value: Interval) -> Dual:
-    return _selected(value, x, y, x.value.lo > y.value.hi, y.value.lo > x.value.hi)
-
-
-@_binary(_larger_slopes)
+@_binary(lambda x, y, value: _selected(value, x, y, x.value.lo > y.value.hi, y.value.lo > x.value.hi))
 def maximum(x: Interval, y: Interval) -> Interval:
     """Larger of two; the derivative holds both where either may be the larger."""
     return _combined(x, y, np.maximum(x.lo, y.lo), np.maximum(x.hi, y.hi))
 
 
-def _dual(x: Any, like: Any) -> Dual:
-    return x if isinstance(x, Dual) else Dual(interval(x), like.grad * 0)
-
-
-def _both(x: Any, y: Any) -> tuple[Interval, Interval]:
-    """Read two operands whose shapes must fit."""
-    x, y = interval(x), interval(y)
-    common_shape(x.lo, y.lo)
-    return x, y
-
-
 def _combined(x: Interval, y: Interval, lo: Array, hi: Array) -> Interval:
     void = x.is_empty | y.is_empty
-    return _make(np.where(void, np.inf, lo), np.where(void, -np.inf, hi), np.asarray(np.bitwise_or(x.flags, y.flags)))
+    return _make(np.where(void, np.inf, lo), np.where(void, -np.inf, hi), _both(x.flags, y.flags))
 
 
 def _selected(value: Interval, x: Dual, y: Dual, first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Dual:
@@ -296,7 +267,8 @@ def divide_extended(a: Any, b: Any) -> tuple[Interval, Interval]:
     >>> divide_extended(Interval(1), Interval(-2, 4))
     (Interval([-inf, -0.5]), Interval([0.25, inf]))
     """
-    a, b = _both(a, b)
+    a = interval(a)
+    b = a._beside(b)
     split = (b.lo < 0.0) & (b.hi > 0.0) & ((a.lo > 0.0) | (a.hi < 0.0)) & ~a.is_empty
     whole = a / b
     left = a / _make(np.where(split, b.lo, 1.0), np.where(split, 0.0, 1.0))

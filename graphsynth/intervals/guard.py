@@ -30,13 +30,13 @@ _PRODUCT_BITS = (1, 1 << 51, 1)
 _ONE, _PART, _NEXT, _LEAST = 1.0, 1.5 * _U, 1.0 + 2.0 * _U, 2.0**-1022
 
 
-def rounding_faults() -> list[str]:
-    """Return what is wrong with the processor's rounding now; an empty list if nothing.
+def check_rounding() -> None:
+    """Refuse to go on unless the processor rounds to nearest and keeps subnormal numbers.
 
-    Examples
-    --------
-    >>> rounding_faults()
-    []
+    Raises
+    ------
+    GraphsynthError
+        Naming what is wrong; interval bounds made in such a state would not be bounds.
     """
     faults = []
     with np.errstate(all="ignore"):
@@ -49,22 +49,6 @@ def rounding_faults() -> list[str]:
     scalar = np.array([a * b for a, b in zip(_TINY.tolist(), _FACTOR.tolist())])
     if tuple(array_bits) != _PRODUCT_BITS or tuple(scalar.view(np.int64).tolist()) != _PRODUCT_BITS:
         faults.append("it flushes subnormal numbers to zero")
-    return faults
-
-
-def check_rounding() -> None:
-    """Refuse to go on unless the processor rounds to nearest and keeps subnormal numbers.
-
-    Raises
-    ------
-    GraphsynthError
-        Naming what is wrong; interval bounds made in such a state would not be bounds.
-
-    Examples
-    --------
-    >>> check_rounding()
-    """
-    faults = rounding_faults()
     if faults:
         raise GraphsynthError(
             f"the processor cannot be trusted with bounds: {' and '.join(faults)}, although IEEE 754 rounding to "
@@ -74,11 +58,6 @@ def check_rounding() -> None:
 
 
 def check_quickly() -> None:
-    """Do what `check_rounding` does, in a tenth of a microsecond where all is well.
-
-    Raises
-    ------
-    GraphsynthError
-    """
+    """Do what `check_rounding` does, in a tenth of a microsecond where all is well."""
     if _ONE + _PART != _NEXT or -_ONE - _PART != -_NEXT or _LEAST * 0.5 == 0.0:
         check_rounding()

@@ -14,17 +14,15 @@ from collections.abc import Iterable
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from graphsynth.core.errors import FormatError, IntervalError
 from graphsynth.intervals import operations
 from graphsynth.intervals.measures import Measures
+from graphsynth.intervals.operations import Array, Flags, Mask
 from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, decimal_outward, read_bounds, read_points
 
-Array = NDArray[np.float64]
 _MOST = int(np.finfo(np.float64).max)
-Mask = NDArray[np.bool_]
-Flags = NDArray[np.uint8]
 
 
 def _both(*flags: Flags) -> Flags:
@@ -95,16 +93,9 @@ class Interval(Measures):
     def __reduce__(self) -> tuple[Any, ...]:
         return _make, (self.lo, self.hi, self.flags)
 
-    # -- other ways to make one ------------------------------------------------------------------------------------
-
     @classmethod
     def from_bounds(cls, lo: ArrayLike, hi: ArrayLike) -> Interval:
-        """Make intervals from float bounds; ``(inf, -inf)`` is the empty one.
-
-        Raises
-        ------
-        FormatError
-            Bounds that are no floats.
+        """Make intervals from float bounds; ``(inf, -inf)`` is the empty one, `FormatError` for what is no float.
 
         Examples
         --------
@@ -121,10 +112,7 @@ class Interval(Measures):
     def midrad(cls, mid: Any, rad: Any) -> Interval:
         """Enclose ``mid - rad`` to ``mid + rad``; both exact text or numbers, or floats taken as they are.
 
-        Raises
-        ------
-        IntervalError
-            For a negative radius.
+        A negative radius is an `IntervalError`.
 
         Examples
         --------
@@ -154,13 +142,7 @@ class Interval(Measures):
 
     @classmethod
     def stack(cls, parts: Iterable[Interval], axis: int = 0) -> Interval:
-        """Join intervals of one shape along a new axis.
-
-        Raises
-        ------
-        IntervalError
-            Nothing to join, or an axis that there is not.
-        """
+        """Join intervals of one shape along a new axis; `IntervalError` for nothing to join, or no such axis."""
         if not isinstance(parts, Iterable):
             raise IntervalError(f"{parts!r} is no list of intervals; give a list")
         parts = [interval(part) for part in parts]
@@ -175,28 +157,18 @@ class Interval(Measures):
             flags = np.stack([np.broadcast_to(p.flags, low.shape) for p, low in zip(parts, lo)], axis)
         return _make(np.stack(lo, axis), np.stack(hi, axis), flags)
 
-    # -- shape -----------------------------------------------------------------------------------------------------
-
     def __len__(self) -> int:
         return len(self.lo)
 
     def __getitem__(self, key: Any) -> Interval:
-        return _make(np.asarray(self.lo[key]), np.asarray(self.hi[key]), self._flags_at(key))
-
-    def _flags_at(self, key: Any) -> Flags:
-        return self.flags if self.flags.ndim == 0 else np.asarray(self.flags[key])
+        flags = self.flags if self.flags.ndim == 0 else np.asarray(self.flags[key])
+        return _make(np.asarray(self.lo[key]), np.asarray(self.hi[key]), flags)
 
     def __iter__(self) -> Any:
         return (self[k] for k in range(len(self)))
 
     def reshape(self, *shape: int) -> Interval:
-        """Return the same intervals in another shape.
-
-        Raises
-        ------
-        IntervalError
-            A shape of another size.
-        """
+        """Return the same intervals in another shape; `IntervalError` for one of another size."""
         try:
             lo, hi = self.lo.reshape(*shape), self.hi.reshape(*shape)
         except (TypeError, ValueError, OverflowError) as error:
@@ -206,13 +178,7 @@ class Interval(Measures):
         return _make(lo, hi, self.flags if self.flags.ndim == 0 else self.flags.reshape(*shape))
 
     def sum(self, axis: int | None = None) -> Interval:
-        """Sum along an axis (all axes for None), added in order, so independent of threads.
-
-        Raises
-        ------
-        IntervalError
-            An axis that there is not.
-        """
+        """Sum along an axis (all for None), added in order, so independent of threads; `IntervalError` for none."""
         if axis is None:
             return self.reshape(-1).sum(0)
         if not isinstance(axis, int | np.integer) or not -self.ndim <= axis < self.ndim:
@@ -251,8 +217,6 @@ class Interval(Measures):
         read: Interval = interval(other)
         operations.common_shape(self.lo, read.lo)
         return read
-
-    # -- comparisons: certain for all points, or possible for some ---------------------------------------------------
 
     def certainly_less(self, other: Any) -> Mask:
         """Whether every point lies below every point of the other; true for an empty one."""
@@ -294,8 +258,6 @@ class Interval(Measures):
         other = self._beside(other)
         return np.asarray((self.lo == other.lo) & (self.hi == other.hi))
 
-    # -- sets ------------------------------------------------------------------------------------------------------
-
     def intersect(self, other: Any) -> Interval:
         """Return the common part."""
         other = self._beside(other)
@@ -311,10 +273,7 @@ class Interval(Measures):
     def inflate(self, relative: float = 0.1, absolute: float = 0.0) -> Interval:
         """Widen both ends by ``relative`` times the radius plus ``absolute``, and at least one step.
 
-        Raises
-        ------
-        IntervalError
-            A number that is negative or not finite.
+        `IntervalError` for a number that is negative or not finite.
         """
         for name, value in (("relative", relative), ("absolute", absolute)):
             if not isinstance(value, int | float | np.number) or not 0.0 <= value <= _MOST:
@@ -331,8 +290,6 @@ class Interval(Measures):
         low, high = np.where(void, -np.inf, mid), np.where(void, np.inf, mid)
         return _make(self.lo, low, self.flags), _make(high, self.hi, self.flags)
 
-    # -- arithmetic ------------------------------------------------------------------------------------------------
-
     def _binary(self, name: str, other: Any, reverse: bool = False) -> Interval:
         try:
             other = interval(other)
@@ -341,7 +298,7 @@ class Interval(Measures):
         a, b = (other, self) if reverse else (self, other)
         flags = _both(a.flags, b.flags)
         if name == "divide":
-            flags = _clipped(flags, (b.lo <= 0.0) & (b.hi >= 0.0))
+            flags = _marked(flags, (b.lo <= 0.0) & (b.hi >= 0.0))
         return _make(*operations.run(name, a.lo, a.hi, b.lo, b.hi), flags)
 
     def __add__(self, other: Any) -> Interval:
@@ -384,7 +341,7 @@ class Interval(Measures):
             raise IntervalError(f"exponent {exponent} is too large; powers of at most 2^31 - 1 are taken")
         if exponent == 2:
             return self.sqr()
-        flags = _clipped(self.flags, (self.lo <= 0.0) & (self.hi >= 0.0)) if exponent < 0 else self.flags
+        flags = _marked(self.flags, (self.lo <= 0.0) & (self.hi >= 0.0)) if exponent < 0 else self.flags
         return _make(*operations.run("power", self.lo, self.hi, extra=(int(exponent),)), flags)
 
     def sqr(self) -> Interval:
@@ -393,7 +350,7 @@ class Interval(Measures):
 
     def sqrt(self) -> Interval:
         """Square root; a negative part of the argument is clipped and recorded."""
-        return _make(*operations.run("root", self.lo, self.hi), _clipped(self.flags, self.lo < 0.0))
+        return _make(*operations.run("root", self.lo, self.hi), _marked(self.flags, self.lo < 0.0))
 
     def __eq__(self, other: object) -> Any:
         raise TypeError("intervals have no ==; use equal, certainly_less, possibly_equal or subset")
@@ -413,11 +370,11 @@ def _one(lo: float, hi: float) -> str:
     return "empty" if lo > hi else f"[{decimal_outward(lo, -1)}, {decimal_outward(hi, 1)}]"
 
 
-def _clipped(flags: Flags, where: Mask) -> Flags:
-    """Mark the places where an argument was clipped."""
+def _marked(flags: Flags, where: Mask, mark: np.uint8 = CLIPPED) -> Flags:
+    """Mark the places where an argument was clipped, or crossed a discontinuity."""
     if not where.any():
         return flags
-    return np.asarray(np.bitwise_or(flags, np.where(where, CLIPPED, np.uint8(0))))
+    return np.asarray(np.bitwise_or(flags, np.where(where, mark, np.uint8(0))))
 
 
 # an Interval refuses to be set; its slots are filled once, through their descriptors
@@ -455,10 +412,7 @@ def _full(shape: int | tuple[int, ...], lo: float, hi: float) -> Interval:
 def interval(value: Any) -> Interval:
     """Return an `Interval` as it is; take anything else as points.
 
-    Raises
-    ------
-    TypeError
-        For a type that brings its own arithmetic, so that Python asks it instead.
+    `TypeError` for a type that brings its own arithmetic, so that Python asks it instead.
     """
     if isinstance(value, Interval):
         return value

@@ -104,7 +104,7 @@ def solve_linear(matrix: Any, right: Any) -> LinearResult:
 
 
 def _tighten(residual: Interval, rest: Interval, D: Interval) -> Interval:
-    """Repeat the contraction, one component after the other with the newest values, until it gains little."""
+    """Repeat the contraction until it gains little."""
     for _ in range(_ROUNDS):
         before = D.width
         D = D.intersect(residual + rest[None].times(D[None])[0])

@@ -8,15 +8,11 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graphsynth.core.errors import FormatError
 from graphsynth.intervals import operations
+from graphsynth.intervals.operations import Array, Flags, Mask
 from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS, FLOAT_INPUT, fraction
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Flags = NDArray[np.uint8]
 
 
 class Measures:
@@ -99,14 +95,7 @@ class Measures:
     def contains(self, point: Any) -> Any:
         """Whether a number lies inside, exactly decided; text and fractions for one interval, floats for arrays.
 
-        An infinity is no number and lies in no interval.
-
-        Raises
-        ------
-        FormatError
-            For anything that is no number.
-        IntervalError
-            For an array of another shape.
+        An infinity is no number and lies in no interval; `FormatError` for anything else that is none.
 
         Examples
         --------
@@ -118,20 +107,17 @@ class Measures:
         if isinstance(point, np.ndarray) and point.ndim and point.dtype.kind in "fiu":
             operations.common_shape(lo, point)
             if point.dtype.kind in "iu":
-                point = _exact_floats(point)
+                point = point.astype(np.float64)
+                if (np.abs(point) > 2.0**53).any():
+                    raise FormatError(
+                        "an array of whole numbers beyond 2^53 is not one of floats; ask number by number"
+                    )
             return np.asarray((lo <= point) & (point <= hi) & np.isfinite(point))
         value = _number(point)
         if value is None:
             return False if self.ndim == 0 else np.zeros(self.shape, dtype=np.bool_)
         inside = [a <= value <= b for a, b in zip(lo.ravel().tolist(), hi.ravel().tolist())]
         return inside[0] if self.ndim == 0 else np.array(inside, dtype=np.bool_).reshape(self.shape)
-
-
-def _exact_floats(whole: NDArray[Any]) -> Array:
-    floats = whole.astype(np.float64)
-    if (np.abs(floats) > 2.0**53).any():
-        raise FormatError("an array of whole numbers beyond 2^53 is not one of floats; ask number by number")
-    return floats
 
 
 def _number(point: Any) -> Fraction | float | None:

@@ -29,10 +29,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals.balls import TINY, UP, Balls, exact, join, tau_times
-from graphsynth.intervals.proving import inverses, krawczyk_image
+from graphsynth.intervals.operations import Array, Mask
+from graphsynth.intervals.proving import inverses
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
 
 #: Entries of the Jacobians handled at once.
@@ -48,23 +47,18 @@ class MovingSystem(Protocol):
     @property
     def weights(self) -> Array:
         """Size of one unit of every unknown, shape (n,): a length for lengths, 1 for angles."""
-        ...
 
     def units(self, x: Array, u: Array, checked: bool = True) -> Balls:
         """``exp(i angle)`` of every angle of the equations at midpoints, shape (N, angles)."""
-        ...
 
     def residual(self, x: Balls, u: Balls, units: Balls) -> Balls:
         """``f``, shape (N, n); ``units`` belong to the midpoints of x and u."""
-        ...
 
     def derivatives(self, x: Balls, u: Balls, units: Balls) -> tuple[Balls, Balls]:
         """``df/dx`` (N, n, n) and ``df/du`` (N, n)."""
-        ...
 
     def branch(self, x: Balls, u: Array) -> tuple[NDArray[np.int64], Balls]:
         """Whole turns counted in the equations (N, any) and continuous directions (N, any) over the boxes ``x``."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,8 +193,8 @@ class _Test:
         """Radius of the Krawczyk image around the moving centres of some boxes; infinite where it is undefined."""
         boxes = self.boxes.take(which)
         J, _ = self.system.derivatives(boxes.hull(radius), boxes.u, self.units[which])
-        spread = Balls(np.zeros_like(radius), radius)
-        K, _ = krawczyk_image(exact(np.eye(radius.shape[-1])), exact(self.Y[which]), self.newton[which], J, spread)
+        rest = exact(np.eye(radius.shape[-1])) - exact(self.Y[which]).times(J)
+        K = self.newton[which] + rest.times(Balls(np.zeros_like(radius), radius))
         return np.where(np.isfinite(K.size), K.size, np.inf)
 
     def proof(self, radii: tuple[float, ...]) -> Proof:
@@ -250,42 +244,39 @@ def cover(system: MovingSystem, nodes: Nodes, budget: Budget, begin: float | Non
     begin = perf_counter() if begin is None else begin
     count = max(len(nodes.x) - 1, 0)
     found = Cover(np.ones(count, dtype=bool))
-    left = np.arange(count)
-    right, owner = left + 1, left.copy()
+    spans = np.arange(count) + np.array([[0], [1], [0]])  # left node, right node, and the given interval they belong to
     for _ in range(_DEPTH):
-        good = nodes.proof.proved[left] & nodes.proof.proved[right]
-        _give_up(found, nodes, left[~good], right[~good], owner[~good])
-        left, right, owner = left[good], right[good], owner[good]
-        if left.size == 0:
+        good = nodes.proof.proved[spans[:2]].all(axis=0)
+        _give_up(found, nodes, spans[:, ~good])
+        spans = spans[:, good]
+        if spans.size == 0:
             return found
-        if found.tested + left.size > budget.boxes or perf_counter() - begin > budget.seconds:
+        if found.tested + len(spans[0]) > budget.boxes or perf_counter() - begin > budget.seconds:
             found.exhausted = True
             break
-        found.tested += left.size
-        boxes, proof, linked, parted = _try(system, nodes, left, right)
+        found.tested += len(spans[0])
+        boxes, proof, linked, parted = _try(system, nodes, spans[0], spans[1])
         ok = proof.proved & linked
-        _give_up(found, nodes, left[parted], right[parted], owner[parted])
         found.boxes.append((boxes.take(ok), proof.tight[ok]))
-        found.owners.append(owner[ok])
-        rest = ~ok & ~parted
-        left, right, owner, boxes = left[rest], right[rest], owner[rest], boxes.take(rest)
-        a, b = nodes.u.mid[left], nodes.u.mid[right]
-        narrow = np.abs(b - a) <= 1e-13 * np.maximum(np.abs(a), np.abs(b)) + 1e-300
-        _give_up(found, nodes, left[narrow], right[narrow], owner[narrow])
-        left, right, owner, boxes = left[~narrow], right[~narrow], owner[~narrow], boxes.take(~narrow)
-        if left.size == 0:
+        found.owners.append(spans[2, ok])
+        a, b = nodes.u.mid[spans[:2]]
+        narrow = ~ok & ~parted & (np.abs(b - a) <= 1e-13 * np.maximum(np.abs(a), np.abs(b)) + 1e-300)
+        _give_up(found, nodes, spans[:, parted])
+        _give_up(found, nodes, spans[:, narrow])
+        left = ~ok & ~parted & ~narrow
+        spans, boxes = spans[:, left], boxes.take(left)
+        if spans.size == 0:
             return found
-        middle = len(nodes.x) + np.arange(left.size)
+        middle = len(nodes.x) + np.arange(len(spans[0]))
         nodes = nodes.join(prove_nodes(system, exact(boxes.u.mid), boxes.x))
-        left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
-        owner = np.concatenate([owner, owner])
-    _give_up(found, nodes, left, right, owner)
+        spans = np.hstack([[spans[0], middle, spans[2]], [middle, spans[1], spans[2]]])
+    _give_up(found, nodes, spans)
     return found
 
 
-def _give_up(found: Cover, nodes: Nodes, left: Index, right: Index, owner: Index) -> None:
-    found.covered[owner] = False
-    found.undecided += [(float(nodes.u.mid[a]), float(nodes.u.mid[b])) for a, b in zip(left, right)]
+def _give_up(found: Cover, nodes: Nodes, spans: Index) -> None:
+    found.covered[spans[2]] = False
+    found.undecided += map(tuple, nodes.u.mid[spans[:2]].T.tolist())
 
 
 def _try(system: MovingSystem, nodes: Nodes, left: Index, right: Index) -> tuple[Boxes, Proof, Mask, Mask]:
@@ -307,7 +298,10 @@ def _try(system: MovingSystem, nodes: Nodes, left: Index, right: Index) -> tuple
             gap = exact(node.x) - boxes.at(node.u)
             inside = (((gap.size + node.proof.tight) * UP) < proof.radius).all(axis=1)
             outside = (gap.least > (proof.radius + node.proof.tight) * UP).any(axis=1)
-        same = (turns == node.turns).all(axis=1) & _same_direction(directions, node.directions)
+            # both directions are arguments of one vector at the common solution, so they differ by whole turns: less
+            # than half a turn apart they are equal, the same branch of the argument in both boxes
+            near = ((directions - node.directions).size < 3.0).all(axis=1)
+        same = (turns == node.turns).all(axis=1) & near
         met.append(np.asarray(inside & same, dtype=np.bool_))
         missed.append(np.asarray(outside | (turns != node.turns).any(axis=1), dtype=np.bool_))
     parted = proof.proved & ((met[0] & missed[1]) | (met[1] & missed[0]))
@@ -324,30 +318,18 @@ def _centres(system: MovingSystem, a: Nodes, b: Nodes, middle: Array) -> tuple[A
     x, V = correct(system, guess, middle, steps=4)
     direct = (np.abs(a.x - b.x) / system.weights).max(axis=1)
 
-    def detour(point: Array) -> Array:
-        away = (np.abs(point - a.x) + np.abs(point - b.x)) / system.weights
+    def detour(point: Array, rows: Any) -> Array:
+        away = (np.abs(point - a.x[rows]) + np.abs(point - b.x[rows])) / system.weights
         return np.asarray(np.nan_to_num(away.max(axis=1), nan=np.inf))
 
-    astray = np.flatnonzero(detour(x) > 1.5 * direct + 1e-9)
+    before = detour(x, slice(None))
+    astray = np.flatnonzero(before > 1.5 * direct + 1e-9)
     if astray.size:
         x2, V2 = correct(system, (a.x + 0.5 * h * a.V)[astray], middle[astray], steps=4)
-        best = x.copy()
-        best[astray] = x2
-        better = astray[(detour(best) < detour(x))[astray]]
-        keep = np.isin(astray, better)
-        x[better], V[better] = x2[keep], V2[keep]
+        shorter = detour(x2, astray) < before[astray]
+        x[astray[shorter]], V[astray[shorter]] = x2[shorter], V2[shorter]
     lost = np.asarray(~np.isfinite(x + V).all(axis=1), dtype=np.bool_)[:, None]
     return np.where(lost, guess, x), np.where(lost, 0.0, V)
-
-
-def _same_direction(own: Balls, other: Balls) -> Mask:
-    """Directions counted with turns must be the same branch of the argument in both boxes.
-
-    Both are arguments of one vector at the common solution, so they differ by whole turns; less than half a turn apart
-    they are equal.
-    """
-    with np.errstate(all="ignore"):
-        return np.asarray(((own - other).size < 3.0).all(axis=1))
 
 
 def whole_turns(nodes: Nodes, angular: Mask) -> list[int] | None:

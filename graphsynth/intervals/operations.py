@@ -13,6 +13,8 @@ from graphsynth.core.errors import IntervalError
 from graphsynth.intervals.guard import check_quickly
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Flags = NDArray[np.uint8]
 
 
 @cache

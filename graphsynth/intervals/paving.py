@@ -21,10 +21,8 @@ from graphsynth.core.errors import FormatError, IntervalError
 from graphsynth.intervals.boxes import Paving, PavingProgress, Status, posed
 from graphsynth.intervals.guard import check_rounding, checked
 from graphsynth.intervals.interval import Interval, _make
+from graphsynth.intervals.operations import Array, Mask
 from graphsynth.intervals.proving import System, image, read_parameters
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _FORMAT = 2
 _GAIN = 0.9
@@ -88,6 +86,7 @@ class Search:
         check_rounding()
         start, self.widths = posed(box, tolerance)
         self.f, self.start, self.parameters = f, start, read_parameters(parameters)
+        self._posed = {"start_lo": start.lo, "start_hi": start.hi, "widths": self.widths}
         self.max_boxes, self.max_seconds, self.batch = max_boxes, max_seconds, batch
         self.inner_by = None if inner is None else list(inner)
         given = 0 if self.parameters is None else self.parameters.size
@@ -124,8 +123,8 @@ class Search:
         """Return what is known now; waiting boxes are UNDECIDED."""
         s = self._state
         count = len(s["waiting_lo"])
-        lo, hi = np.concatenate([s["lo"], s["waiting_lo"]]), np.concatenate([s["hi"], s["waiting_hi"]])
-        dlo, dhi = (np.concatenate([s[f"domain_{e}"], s[f"waiting_{e}"]]) for e in ("lo", "hi"))
+        keys = ("lo", "hi", "domain_lo", "domain_hi")
+        lo, hi, dlo, dhi = (np.concatenate([s[key], s[f"waiting_{key[-2:]}"]]) for key in keys)
         status = np.concatenate([s["status"], np.full(count, Status.UNDECIDED, dtype=np.int8)])
         inner = np.concatenate([s["inner"], np.zeros(count, dtype=np.bool_)])
         return Paving(_make(lo, hi), status, _make(dlo, dhi), inner, count == 0, self.tested, self.seconds)
@@ -135,20 +134,13 @@ class Search:
         """Write the state to an ``.npz`` file of plain arrays."""
         meta, own = np.array([_FORMAT, self.tested, self.batch], dtype=np.int64), np.array([self.seconds])
         with Path(path).open("wb") as file:
-            np.savez(file, meta=meta, seconds=own, **self._posed(), **self._state)  # type: ignore[arg-type]
-
-    def _posed(self) -> dict[str, Array]:
-        """Return what is asked."""
-        return {"start_lo": self.start.lo, "start_hi": self.start.hi, "widths": self.widths}
+            np.savez(file, meta=meta, seconds=own, **self._posed, **self._state)  # type: ignore[arg-type]
 
     @checked
     def load(self, path: str | Path) -> Search:
         """Go on from a saved state of the same search; returns the search itself.
 
-        Raises
-        ------
-        FormatError
-            For a file that is not a saved state, or that belongs to another box, tolerance or batch.
+        `FormatError` for a file that is not a saved state, or that belongs to another box, tolerance or batch.
         """
         try:
             with np.load(path, allow_pickle=False) as file:
@@ -156,7 +148,7 @@ class Search:
             meta, seconds = data["meta"], float(data["seconds"][0])
             state = {key: data[key] for key in _ARRAYS}
             same = int(meta[0]) == _FORMAT and int(meta[2]) == self.batch
-            same = same and all(np.array_equal(data[key], value) for key, value in self._posed().items())
+            same = same and all(np.array_equal(data[key], value) for key, value in self._posed.items())
             rows = {len(state[key]) for key in _ARRAYS[2:]}
             sound = len(rows) == 1 and all(state[key].shape[1:] == self.start.shape for key in _ARRAYS[:6])
             sound = sound and not any(np.isnan(state[key]).any() for key in _ARRAYS[:6])
@@ -169,8 +161,6 @@ class Search:
         self._state, self.tested, self.seconds = state, int(meta[1]), seconds
         return self
 
-    # -- one batch ---------------------------------------------------------------------------------------------------
-
     def _advance(self) -> None:
         s = self._state
         count = self.batch
@@ -182,29 +172,27 @@ class Search:
         if self.inner_by is None:
             status[self._sharpened(X, status)] = Status.EMPTY  # its solutions are kept one by one
             proved = (status == Status.UNIQUE) | (status == Status.EXISTS)
-            self._keep(X[proved], domain[proved], status[proved], np.zeros(int(proved.sum()), dtype=np.bool_))
+            self._keep(X[proved], domain[proved], status[proved])
             left = status == Status.UNDECIDED
             X, last = X[left], last[left]
             X = X[~self._prove_beyond(X, last)]
         elif len(X):  # a set is wanted, not the hull of a proof: go on cutting
             inside = self._inner(X)
-            self._keep(X[inside], X[inside], np.full(int(inside.sum()), Status.UNDECIDED, dtype=np.int8), None)
+            self._keep(X[inside], X[inside], Status.UNDECIDED, inner=True)
             X = X[~inside]
-        self._cut_or_keep(X)
-        if self.inner_by is None:
-            self._absorb()
-
-    def _cut_or_keep(self, X: Interval) -> None:
-        """Keep boxes at the limit of the resolution as undecided, cut the others."""
+        # keep boxes at the limit of the resolution as undecided, cut the others
         sides = X.width / self.widths
         widest = sides.argmax(axis=1) if len(X) else np.zeros(0, dtype=np.int64)
         row = np.arange(len(X))
         middle = X.mid[row, widest]
         small = sides.max(axis=1, initial=0.0) <= 1.0
         small |= (middle <= X.lo[row, widest]) | (middle >= X.hi[row, widest])
-        done = np.full(int(small.sum()), Status.UNDECIDED, dtype=np.int8)
-        self._keep(X[small], X[small], done, np.zeros(len(done), dtype=np.bool_))
-        self._cut(X[~small], widest[~small], middle[~small])
+        self._keep(X[small], X[small], Status.UNDECIDED)
+        halves = _halves(X[~small], widest[~small], middle[~small])
+        for key, rows in zip(_ARRAYS[:2], halves):  # neighbours, at the back of the queue
+            s[key] = np.concatenate([s[key], rows])
+        if self.inner_by is None:
+            self._absorb()
 
     def _contract(self, X: Interval) -> tuple[Interval, Interval, NDArray[np.int8], Array]:
         """Repeat the test on each box while it gains; the domain is the box of the first proof."""
@@ -244,7 +232,7 @@ class Search:
         lo, hi = _halves(boxes, widest, boxes.mid[np.arange(some.size), widest])
         halves, domain, found, norm = self._contract(_make(lo, hi))
         unique = found == Status.UNIQUE
-        self._keep(halves[unique], domain[unique], found[unique], np.zeros(int(unique.sum()), dtype=np.bool_))
+        self._keep(halves[unique], domain[unique], found[unique])
         settled = unique | (found == Status.EMPTY)
         left = np.flatnonzero(~settled)
         settled[left] = self._prove_beyond(halves[left], norm[left])
@@ -270,16 +258,14 @@ class Search:
             keep = good & step.image.subset(self.start).all(axis=1)
             settled[near[(step.status == Status.EMPTY) | outside | keep]] = True
             if keep.any():
-                self._keep_polished(step.box[keep], trial[keep], step.status[keep])
+                box = step.box[keep]
+                for _ in range(_POLISH):
+                    box = image(self.f, box.inflate(0.01, 1e-300), self.parameters).box.intersect(box)
+                    self.tested += len(box)
+                self._keep(box, trial[keep], step.status[keep])
             again = ~good & (step.status != Status.EMPTY) & (step.image.width < 4.0 * trial.width).all(axis=1)
             near, trial = near[again], trial[again].hull(step.image[again])
         return settled
-
-    def _keep_polished(self, box: Interval, domain: Interval, status: NDArray[np.int8]) -> None:
-        for _ in range(_POLISH):
-            box = image(self.f, box.inflate(0.01, 1e-300), self.parameters).box.intersect(box)
-            self.tested += len(box)
-        self._keep(box, domain, status, np.zeros(len(status), dtype=np.bool_))
 
     def _inner(self, X: Interval) -> Mask:
         """Whether for every point of a box there are values of the chosen parameters that make it a solution."""
@@ -301,20 +287,11 @@ class Search:
         status = image(flipped, boxes, X).status
         return np.asarray((status == Status.UNIQUE) | (status == Status.EXISTS))
 
-    def _keep(self, box: Interval, domain: Interval, status: NDArray[np.int8], inner: Mask | None) -> None:
-        s = self._state
-        inner = np.ones(len(status), dtype=np.bool_) if inner is None else inner
-        s["lo"], s["hi"] = np.concatenate([s["lo"], box.lo]), np.concatenate([s["hi"], box.hi])
-        s["domain_lo"] = np.concatenate([s["domain_lo"], domain.lo])
-        s["domain_hi"] = np.concatenate([s["domain_hi"], domain.hi])
-        s["status"], s["inner"] = np.concatenate([s["status"], status]), np.concatenate([s["inner"], inner])
-
-    def _cut(self, X: Interval, widest: NDArray[np.intp], middle: Array) -> None:
-        """Halve boxes; halves stay neighbours, at the back of the queue."""
-        lo, hi = _halves(X, widest, middle)
-        s = self._state
-        s["waiting_lo"] = np.concatenate([s["waiting_lo"], lo])
-        s["waiting_hi"] = np.concatenate([s["waiting_hi"], hi])
+    def _keep(self, box: Interval, domain: Interval, status: Any, *, inner: bool = False) -> None:
+        """Keep boxes, with the status of each or of all."""
+        own = (box.lo, box.hi, domain.lo, domain.hi, np.full(len(box), status, np.int8), np.full(len(box), inner))
+        for key, rows in zip(_ARRAYS[2:], own):
+            self._state[key] = np.concatenate([self._state[key], rows])
 
     def _absorb(self) -> None:
         """Drop what a proved box already stands for: a box inside its domain, or the same solution found twice."""

@@ -14,20 +14,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Protocol, Self, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.arguments import Count
 from graphsynth.core.errors import IntervalError
-from graphsynth.intervals.boxes import Status
+from graphsynth.intervals.boxes import Status, bounded
 from graphsynth.intervals.dual import evaluate, jacobian_of, values_of, variables
 from graphsynth.intervals.guard import check_rounding, checked
 from graphsynth.intervals.interval import Interval, _make, interval
+from graphsynth.intervals.operations import Array, Mask
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 #: ``f(x)`` or ``f(x, p)``: sequences of unknowns and parameters in, a sequence of as many equations as unknowns out.
 System = Callable[..., Sequence[Any]]
 
@@ -120,32 +119,6 @@ def inverses(matrices: Array) -> tuple[Array, Mask]:
     return (inverse if fine.all() else np.where(fine[:, None, None], inverse, 0.0)), ~fine
 
 
-class Enclosures(Protocol):
-    """What `krawczyk_image` needs of an arithmetic: arrays of intervals or of balls."""
-
-    def __add__(self, other: Self) -> Self:
-        """Sum."""
-
-    def __sub__(self, other: Self) -> Self:
-        """Difference."""
-
-    def times(self, other: Self) -> Self:
-        """Products of matrices (N, n, n) with matrices or vectors (N, n)."""
-
-
-E = TypeVar("E", bound=Enclosures)
-
-
-def krawczyk_image(identity: E, Y: E, newton: E, slopes: E, spread: E) -> tuple[E, E]:
-    """Krawczyk's operator ``K(X) = z - Y F(z) + (I - Y L) (X - z)`` in any arithmetic of enclosures, and ``I - Y L``.
-
-    ``newton`` is ``z - Y F(z)`` and ``spread`` is ``X - z``.  Any ``Y`` is allowed: if K(X) lies in the interior of X,
-    then X holds exactly one solution, it lies in K(X), and the Jacobian is regular everywhere in X.
-    """
-    rest = identity - Y.times(slopes)
-    return newton + rest.times(spread), rest
-
-
 def points(values: Array) -> Interval:
     """Real numbers as intervals."""
     return _make(values, values)
@@ -202,8 +175,8 @@ def image(f: System, boxes: Interval, parameters: Interval | None = None) -> Ima
         at = values_of(_square(f, [centre[:, i] for i in range(n)], parameters, shape), shape)
         Y, singular = inverses(slopes.mid)
         real = points(Y)
-        newton = centre - real.times(at)
-        K, rest = krawczyk_image(points(np.eye(n)), real, newton, slopes, boxes - centre)
+        rest = points(np.eye(n)) - real.times(slopes)
+        K = centre - real.times(at) + rest.times(boxes - centre)
     void: Mask = np.asarray(boxes.is_empty.any(axis=1))
     smooth = _all_guaranteed(over, 1) & _all_guaranteed(slopes, 2) & _all_guaranteed(at, 1)
     smooth = np.asarray(smooth & boxes.is_bounded.all(axis=1) & ~singular)
@@ -213,21 +186,15 @@ def image(f: System, boxes: Interval, parameters: Interval | None = None) -> Ima
     exact = bool(over.exact_input.all() and slopes.exact_input.all())
     inside = smooth & K.interior(boxes).all(axis=1)
     within = smooth & K.subset(boxes).all(axis=1) & ~inside
-    if within.any():  # a preconditioner proved nonsingular is needed for existence alone
-        within = within & _regular(Y, slopes)
+    if within.any():  # existence alone needs Y nonsingular, as is proved by |I - Y mid L| < 1 in the maximum norm
+        with np.errstate(all="ignore"):
+            near = points(np.eye(n)) - real.times(points(slopes.mid))
+            within = within & (_make(np.zeros_like(near.mag), near.mag).sum(-1).hi.max(axis=-1) < 1.0)
     status = np.where(
         none, Status.EMPTY, np.where(inside, Status.UNIQUE, np.where(within, Status.EXISTS, Status.UNDECIDED))
     )
     box = _where(~none, meet, Interval.empty(K.shape))
     return Image(status.astype(np.int8), box, K, np.where(rest.is_empty, np.inf, rest.mag), smooth, singular, exact)
-
-
-def _regular(Y: Array, slopes: Interval) -> Mask:
-    """Whether ``|I - Y mid L| < 1`` in the maximum norm is proved, so that Y is nonsingular."""
-    with np.errstate(all="ignore"):
-        rest = points(np.eye(Y.shape[-1])) - points(Y).times(points(slopes.mid))
-        norm = _make(np.zeros_like(rest.mag), rest.mag).sum(-1).hi.max(axis=-1)
-    return np.asarray(norm < 1.0)
 
 
 def _all_guaranteed(a: Interval, axes: int) -> Mask:
@@ -277,8 +244,6 @@ def krawczyk(
     ------
     IntervalError
         For a box that is empty, unbounded or not a vector, and for a number of equations that differs from n.
-    GraphsynthError
-        If the processor's rounding has been changed.
 
     Notes
     -----
@@ -293,33 +258,34 @@ def krawczyk(
     ('UNIQUE', True)
     """
     check_rounding()
-    start = _start(box)
+    start = bounded("box", box)
     parameters = read_parameters(parameters)
-    X, best, tested = start, None, 0
+    X, tested, proved, domain = start, 0, Status.UNDECIDED, start
     for _ in range(rounds):
         step = image(f, X.reshape(1, -1), parameters)
         tested += 1
-        if step.status[0] == Status.EMPTY:
-            return _report(Status.EMPTY, step, X, tested, "no solution: the equations or the image exclude the box")
-        best, width = _stronger(best, step, X), X.width
+        status = Status(int(step.status[0]))
+        if status is Status.EMPTY:
+            return _report(status, step, X, X, tested, "no solution: the equations or the image exclude the box")
+        if status < proved:  # the first proof of uniqueness (its box is the largest), else the first of existence
+            proved, domain = status, X
+        width = X.width
         X = step.box[0]
         if not (X.width < _GAIN * width).any():
             break
-    if best is not None:
-        status, domain = best
-        wording = "exactly one solution" if status is Status.UNIQUE else "at least one solution"
-        return _report(status, step, X, tested, f"{wording}: the image lies in a box tested", domain)
+    if proved is not Status.UNDECIDED:
+        wording = "exactly one solution" if proved is Status.UNIQUE else "at least one solution"
+        return _report(proved, step, X, domain, tested, f"{wording}: the image lies in a box tested")
     if inflate and bool(step.guaranteed[0]):
-        found = _inflated(f, X, start, parameters, rounds)
+        found = _inflated(f, X, start, parameters, rounds, tested)
         if found is not None:
-            status, image_step, domain, reason, extra = found
-            return _report(status, image_step, X, tested + extra, reason, domain, start)
+            return found
     reason = "the image is not inside the box: the box is too wide, or a solution is multiple or near a face"
     if step.singular[0]:
         reason = "the midpoint of the Jacobian is singular: cut the box"
     elif not step.guaranteed[0]:
         reason = "the equations or their derivatives are undefined, unbounded or discontinuous somewhere in the box"
-    return _report(Status.UNDECIDED, step, X, tested, reason)
+    return _report(Status.UNDECIDED, step, X, X, tested, reason)
 
 
 def read_parameters(parameters: Any) -> Interval | None:
@@ -332,65 +298,37 @@ def read_parameters(parameters: Any) -> Interval | None:
     return p
 
 
-def _start(box: Any) -> Interval:
-    start = interval(box)
-    if start.ndim != 1 or start.size == 0:
-        raise IntervalError(f"the box has shape {start.shape}; give one interval per unknown, shape (n,)")
-    if not start.is_bounded.all():
-        raise IntervalError(f"the box {start!r} is empty or unbounded; give finite bounds")
-    return start
-
-
-def _stronger(best: tuple[Status, Interval] | None, step: Image, X: Interval) -> tuple[Status, Interval] | None:
-    """Keep the first proof of uniqueness (its box is the largest), else the first of existence."""
-    status = Status(int(step.status[0]))
-    if status is Status.UNIQUE and (best is None or best[0] is not Status.UNIQUE):
-        return status, X
-    if status is Status.EXISTS and best is None:
-        return status, X
-    return best
-
-
 def _inflated(
-    f: System, X: Interval, start: Interval, parameters: Interval | None, rounds: int
-) -> tuple[Status, Image, Interval, str, int] | None:
+    f: System, X: Interval, start: Interval, parameters: Interval | None, rounds: int, tested: int
+) -> KrawczykResult | None:
     """Test boxes enlarged around X; X holds every solution of the start box."""
     trial = X
     for k in range(rounds):
         trial = trial.inflate(0.1, 1e-300)
         step = image(f, trial.reshape(1, -1), parameters)
-        K = step.image[0]
-        if step.status[0] == Status.EMPTY:
-            return Status.EMPTY, step, trial, "no solution: the image excludes an enlarged box", k + 1
-        if step.status[0] == Status.UNIQUE:
-            if K.subset(start).all():
-                return Status.UNIQUE, step, trial, "exactly one solution: the image lies inside an enlarged box", k + 1
-            if K.disjoint(start).any():
-                return Status.EMPTY, step, trial, "no solution: the only one near lies outside the box", k + 1
+        K, status, reason = step.image[0], Status(int(step.status[0])), ""
+        if status is Status.EMPTY:
+            reason = "no solution: the image excludes an enlarged box"
+        elif status is Status.UNIQUE and K.subset(start).all():
+            reason = "exactly one solution: the image lies inside an enlarged box"
+        elif status is Status.UNIQUE and K.disjoint(start).any():
+            status, reason = Status.EMPTY, "no solution: the only one near lies outside the box"
+        elif status is Status.UNIQUE:
             reason = "exactly one solution in an enlarged box, but it may lie outside the given one: see domain, image"
-            return Status.UNDECIDED, step, trial, reason, k + 1
+            status = Status.UNDECIDED
+        if reason:
+            box = step.box[0].intersect(start) if status is Status.UNIQUE else X
+            return _report(status, step, box, trial, tested + k + 1, reason)
         if not step.guaranteed[0]:
             return None
         trial = K.hull(X) if (K.width < 4.0 * trial.width).all() else trial
     return None
 
 
-def _report(
-    status: Status,
-    step: Image,
-    X: Interval,
-    rounds: int,
-    reason: str,
-    domain: Interval | None = None,
-    start: Interval | None = None,
-) -> KrawczykResult:
-    K = step.image[0]
-    domain = X if domain is None else domain
-    box = Interval.empty(X.shape) if status is Status.EMPTY else step.box[0]
-    if start is not None and status is not Status.EMPTY:
-        box = box.intersect(start) if status is Status.UNIQUE else X
+def _report(status: Status, step: Image, box: Interval, domain: Interval, rounds: int, reason: str) -> KrawczykResult:
+    box = Interval.empty(box.shape) if status is Status.EMPTY else box
     with np.errstate(all="ignore"):
         factor = (step.factor[0] @ domain.rad) / domain.rad
     contraction = float(np.max(factor)) if np.isfinite(factor).all() else float("inf")
     radius = spectral_radius(step.factor[0])
-    return KrawczykResult(status, box, domain, K, radius, contraction, rounds, reason, step.exact_input)
+    return KrawczykResult(status, box, domain, step.image[0], radius, contraction, rounds, reason, step.exact_input)

@@ -7,19 +7,17 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from decimal import Decimal
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from enum import IntFlag
 from fractions import Fraction
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graphsynth.core.errors import FormatError, GeometryError, IntervalError
 from graphsynth.intervals.guard import check_quickly
+from graphsynth.intervals.operations import Array, Flags
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.uint8]
 CLIPPED: Final = np.uint8(1)
 DISCONTINUOUS: Final = np.uint8(2)
 FLOAT_INPUT: Final = np.uint8(4)
@@ -44,8 +42,6 @@ class Decoration(IntFlag):
 def lower_bound(value: Fraction) -> float:
     """Return the largest double not above ``value``.
 
-    Examples
-    --------
     >>> lower_bound(Fraction(1, 10)) < Fraction(1, 10) < upper_bound(Fraction(1, 10))
     True
     """
@@ -70,8 +66,6 @@ def enclose(value: Fraction) -> tuple[float, float]:
 def text_ends(text: str) -> tuple[str, str, bool]:
     """Split text that gives a range: both parts and whether the second is a radius; a single number is both ends.
 
-    Examples
-    --------
     >>> text_ends("[1, 2]"), text_ends("17.5 +- 0.005"), text_ends("1/30")
     (('1', '2', False), ('17.5', '0.005', True), ('1/30', '1/30', False))
     """
@@ -150,8 +144,6 @@ def read_one(value: Any) -> tuple[float, float, bool]:
 def decimal_outward(x: float, side: int, digits: int = 17) -> str:
     """Write a bound as a decimal that is not inside it: not above a lower bound (side -1), not below an upper (+1).
 
-    Examples
-    --------
     >>> decimal_outward(0.1, -1), decimal_outward(0.1, 1)
     ('0.1', '0.10000000000000001')
     """
@@ -160,27 +152,23 @@ def decimal_outward(x: float, side: int, digits: int = 17) -> str:
     exact, short = Fraction(x), repr(x)
     if Fraction(short) == exact or (Fraction(short) < exact) == (side < 0):
         return short.removesuffix(".0")
-    from decimal import ROUND_CEILING, ROUND_FLOOR, Context
-
-    context = Context(prec=digits, rounding=ROUND_FLOOR if side < 0 else ROUND_CEILING, Emin=-9999, Emax=9999)
-    return str(context.create_decimal(Decimal(x)))
+    return str(_rounded(x, side, digits))
 
 
 def shortened(x: float, side: int, digits: int = 6) -> str:
     """Write a bound in a few digits for a sentence, rounded so that it stays a bound: down (-1) or up (+1).
 
-    Examples
-    --------
     >>> shortened(0.0350992730735, -1), shortened(0.0350992730735, 1), shortened(0.5, -1)
     ('0.0350992', '0.0350993', '0.5')
     """
     if not math.isfinite(x) or x == 0.0:
         return "0" if x == 0.0 else repr(x)
-    from decimal import ROUND_CEILING, ROUND_FLOOR, Context
+    return f"{float(_rounded(x, side, digits)):.{digits}g}"  # the same digits, written as floats are
 
+
+def _rounded(x: float, side: int, digits: int) -> Decimal:
     context = Context(prec=digits, rounding=ROUND_FLOOR if side < 0 else ROUND_CEILING, Emin=-9999, Emax=9999)
-    value = context.create_decimal(Decimal(x))
-    return f"{float(value):.{digits}g}"  # the same digits, written as floats are
+    return context.create_decimal(Decimal(x))
 
 
 def read_points(value: Any) -> tuple[Array, Array, Flags]:
@@ -191,7 +179,9 @@ def read_points(value: Any) -> tuple[Array, Array, Flags]:
         value = value[()]
     if _is_double(value):
         array = np.array(value, dtype=np.float64)
-        _finite(array)
+        if not np.isfinite(array).all():
+            bad = array[~np.isfinite(array)].ravel()[0]
+            raise IntervalError(f"{bad} is not a point; give finite numbers, or bounds that may be infinite")
         return array, array.copy(), _FLOAT
     if isinstance(value, np.ndarray | list | tuple):
         nested = [read_points(item) for item in value]
@@ -211,12 +201,6 @@ def read_points(value: Any) -> tuple[Array, Array, Flags]:
 def _is_double(value: Any) -> bool:
     """Whether numpy floats are doubles or shorter: extended precision is enclosed number by number."""
     return isinstance(value, np.ndarray | np.generic) and value.dtype.kind == "f" and value.dtype.itemsize <= 8
-
-
-def _finite(array: Array) -> None:
-    if not np.isfinite(array).all():
-        bad = array[~np.isfinite(array)].ravel()[0]
-        raise IntervalError(f"{bad} is not a point; give finite numbers, or bounds that may be infinite")
 
 
 def _bound(value: Any, side: int) -> Array:
@@ -247,9 +231,6 @@ def read_bounds(lower: Any, upper: Any) -> tuple[Array, Array]:
         a, b = lo[wrong].ravel()[0], hi[wrong].ravel()[0]
         raise IntervalError(f"lower bound {a} and upper bound {b} hold no number; give lower <= upper")
     return lo, hi
-
-
-# --- exact numbers, and balls of python-flint
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import checked
+from graphsynth.core.checks import checked, finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.equations import FLOATS, Seen, derivatives, seen
 from graphsynth.mechanism.joints import Cam, Gear, JointGeometry
@@ -60,8 +60,6 @@ def residual(joints: Sequence[JointGeometry], poses: ArrayLike) -> Array:
     distance of the joint's points from the origins; 1 if both vanish).  A gear pair counts modulo a tooth-independent
     full turn of wheel b.
 
-    Examples
-    --------
     >>> from graphsynth.mechanism.joints import Revolute
     >>> residual([Revolute(0, 1, at_a=(1.0, 0.0))], [[0, 0, 0], [1, 2, 0.3]]).tolist()
     [0.0, 2.0]
@@ -105,28 +103,11 @@ def jacobian(joints: Sequence[JointGeometry], poses: ArrayLike) -> Array:
 class MobilityReport:
     """Mobility by the structural count and by rank at one pose (estimated: floating point).
 
-    Attributes
-    ----------
-    count : int
-        ``3 (N - 1) - sum over joints of (3 - f)``.
-    by_rank : int
-        ``3 (N - 1) - rank``: infinitesimal freedoms at the pose.
-    rank, rows : int
-        Rank and number of constraint rows; ``rows - rank`` constraints are redundant at the pose.
-    singular_values : ndarray
-        Descending, of the matrix with rotations scaled by ``Lc``.
-    tolerance : float
-        Singular values below ``tolerance * largest`` were taken as zero.
-    gap : float
-        Smallest singular value kept over the largest: how clear the decision is; NaN for rank 0.
-    freedoms : ndarray, shape (by_rank, links, 3)
-        Basis of the instantaneous motions ``(dx, dy, dtheta)`` of the links.
-    violation : float
-        Largest constraint violation at the pose, in lengths.
-    Lc : float
-        Characteristic length.
-    statement : str
-        The result in one sentence.
+    ``count`` is ``3 (N - 1) - sum over joints of (3 - f)``, ``by_rank`` is ``3 (N - 1) - rank``: infinitesimal freedoms
+    at the pose, with ``freedoms`` (by_rank, links, 3) as a basis of motions ``(dx, dy, dtheta)`` of the links.  The
+    ``singular_values`` descend, of the matrix with rotations scaled by the characteristic length ``Lc``; those below
+    ``tolerance * largest`` were taken as zero, and ``gap`` is the smallest one kept over the largest: how clear the
+    decision is; NaN for rank 0.  ``violation`` is the largest constraint violation at the pose, in lengths.
     """
 
     count: int
@@ -166,26 +147,11 @@ def characteristic_length(mechanism: Mechanism) -> float:
 
 @checked
 def mobility_report(mechanism: Mechanism, pose: ArrayLike | None = None) -> MobilityReport:
-    """Mobility by count and by rank of the constraint matrix (numpy SVD).
+    """Mobility by count and by rank of the constraint matrix (numpy SVD) at a pose, the mechanism's own by default.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-    pose : array_like, shape (links, 3), optional
-        An assembled pose; the mechanism's own by default.
+    Rank is a statement on this pose: at a singular pose it counts freedoms that exist only there.  `GeometryError` if
+    there is no pose, or the joints are not closed at it.
 
-    Returns
-    -------
-    MobilityReport
-        Rank is a statement on this pose: at a singular pose it counts freedoms that exist only there.
-
-    Raises
-    ------
-    GeometryError
-        If there is no pose, or the joints are not closed at it.
-
-    Examples
-    --------
     A parallelogram with a third parallel bar turns, although the count says it is a structure.
 
     >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph, Revolute
@@ -200,14 +166,16 @@ def mobility_report(mechanism: Mechanism, pose: ArrayLike | None = None) -> Mobi
     given = mechanism.pose if pose is None else pose
     if given is None:
         raise GeometryError("the rank belongs to a pose, and this mechanism has none; give an assembled pose")
-    try:
-        pose_array = np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise GeometryError(f"pose = {given!r} is no array of numbers; give (x, y, theta) of every link") from error
+    pose_array = finite_array("pose", given)
     links = mechanism.graph.links
-    if pose_array.shape != (links, 3) or not np.isfinite(pose_array).all():
-        raise GeometryError(f"pose must hold finite (x, y, theta) for {links} links; its shape is {pose_array.shape}")
-    _check_centres(mechanism, pose_array)
+    if pose_array.shape != (links, 3):
+        raise GeometryError(f"pose must hold (x, y, theta) for {links} links; its shape is {pose_array.shape}")
+    for joint in mechanism.joints:
+        d = _seen(joint, pose_array).d
+        if isinstance(joint, Gear | Cam) and d.x == d.y == 0.0:
+            raise GeometryError(
+                f"the centres of {joint.kind} {joint.a}-{joint.b} coincide at this pose; they have no line of centres"
+            )
     Lc = characteristic_length(mechanism)
     violation = float(np.abs(residual(mechanism.joints, pose_array)).max(initial=0.0))
     if violation > _ASSEMBLED * Lc:
@@ -216,16 +184,6 @@ def mobility_report(mechanism: Mechanism, pose: ArrayLike | None = None) -> Mobi
             "give an assembled pose"
         )
     return _report(mechanism, pose_array, Lc, violation)
-
-
-def _check_centres(mechanism: Mechanism, pose: Array) -> None:
-    """Refuse gears and cams without a line of centres."""
-    for joint in mechanism.joints:
-        d = _seen(joint, pose).d
-        if isinstance(joint, Gear | Cam) and d.x == d.y == 0.0:
-            raise GeometryError(
-                f"the centres of {joint.kind} {joint.a}-{joint.b} coincide at this pose; they have no line of centres"
-            )
 
 
 def _report(mechanism: Mechanism, pose: Array, Lc: float, violation: float) -> MobilityReport:

@@ -19,7 +19,6 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import work
 from graphsynth.mechanism.joints import JointGeometry, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
-from graphsynth.mechanism.rotatability import start_angle
 from graphsynth.structure.graph import MechanismGraph
 
 Pose = tuple[float, float, float]
@@ -61,12 +60,7 @@ class Constructors:
         Returns
         -------
         Mechanism
-            Driven at the crank.
-
-        Raises
-        ------
-        GeometryError
-            A length that is not positive, or four that cannot be assembled.
+            Driven at the crank; `GeometryError` for four lengths that cannot be assembled.
 
         Examples
         --------
@@ -100,19 +94,14 @@ class Constructors:
         rod_point : (x, y), optional
             A point "P" of the rod, x counted from the crank pin towards the slider, y to the left of that.
         crank_angle : float or str, optional
-            Where the motion starts, radians or "30 deg".  By default 0, or the middle of the angles that are reached.
+            As in `four_bar`.
         branch : {+1, -1}
             +1: the slider lies to the right of the crank pin.
 
         Returns
         -------
         Mechanism
-            Driven at the crank; the slider's pin is the point "C".
-
-        Raises
-        ------
-        GeometryError
-            A length that is not positive, or a rod that is too short.
+            Driven at the crank; the slider's pin is the point "C".  `GeometryError` for a rod that is too short.
 
         Examples
         --------
@@ -135,7 +124,12 @@ class Constructors:
         if (reach := rod * rod - (offset - A.imag) ** 2) < 0.0:
             raise GeometryError(f"at {phi:g} rad the rod of {rod:g} does not reach the line; give another crank_angle")
         B = complex(A.real + sign("branch", branch) * math.sqrt(reach), offset)
-        joints = [*_arms(crank, rod), Prismatic(0, 3, (0.0, offset))]
+        joints = [
+            Revolute(0, 1),
+            Revolute(1, 2, (crank, 0.0)),
+            Revolute(2, 3, (rod, 0.0)),
+            Prismatic(0, 3, (0.0, offset)),
+        ]
         pose = ((0.0, 0.0, 0.0), (0.0, 0.0, phi), _at(A, B), (B.real, B.imag, 0.0))
         points: dict[str, Any] = {"C": (3, (0.0, 0.0))}
         if rod_point is not None:
@@ -178,12 +172,7 @@ class Constructors:
         Returns
         -------
         Mechanism
-            Driven at the crank.
-
-        Raises
-        ------
-        GeometryError
-            Another kind, a length that is not positive, lengths that cannot be assembled.
+            Driven at the crank; `GeometryError` for lengths that cannot be assembled.
 
         Examples
         --------
@@ -245,11 +234,8 @@ class Constructors:
         Returns
         -------
         Mechanism
-
-        Raises
-        ------
-        GeometryError
-            A name that is not among the points, a link without two points, a driver that is no joint, no mobility.
+            `GeometryError` for a name that is not among the points, a link without two points, a driver that is no
+            joint.
 
         Examples
         --------
@@ -265,7 +251,14 @@ class Constructors:
             drawn.slide(name, _names(f"slide of {name}", line, places))
         for pair in cylinders:
             drawn.cylinder(_names("cylinder", pair, places))
-        joints = [*drawn.revolutes(), *drawn.prismatics]
+        for (a, one), (b, other) in combinations(enumerate(drawn.links), 2):
+            if len(set(one) & set(other)) > 1:
+                raise GeometryError(f"links {a} and {b} share two points, so they are one link; give them as one")
+        joints: list[JointGeometry] = []
+        for name, place in places.items():
+            first, *others = drawn.at(name) or [0]
+            joints += [Revolute(first, other, place, place) for other in others]
+        joints += drawn.prismatics
         graph = MechanismGraph(len(drawn.links), [(j.a, j.b) for j in joints], frame=0)
         given = [driver] if driver is None or isinstance(driver, str) or _is_pair(driver) else list(driver)
         drivers = [Driver(*drawn.driven(each, joints)) for each in given]
@@ -290,12 +283,8 @@ class Constructors:
         Returns
         -------
         Mechanism
-            Links in the order of the sketch, the frame moved to the front; lengths in pixels, y up.
-
-        Raises
-        ------
-        GeometryError
-            A sketch without a frame, or one that is not read.
+            Links in the order of the sketch, the frame moved to the front; lengths in pixels, y up.  `GeometryError`
+            for a sketch without a frame, or one that is not read.
 
         Examples
         --------
@@ -338,12 +327,7 @@ class Constructors:
         Returns
         -------
         Mechanism
-            Found by the search, it makes a full rotation (estimated).
-
-        Raises
-        ------
-        GeometryError
-            No frame, as many places as joints are not given, nothing found.
+            Found by the search, it makes a full rotation (estimated); `GeometryError` if nothing is found.
 
         Examples
         --------
@@ -374,11 +358,6 @@ def _at(start: complex, end: complex) -> Pose:
     return start.real, start.imag, cmath.phase(end - start)
 
 
-def _arms(crank: float, coupler: float, last: float = 0.0) -> list[JointGeometry]:
-    """Revolute joints of frame, crank, coupler and link 3."""
-    return [Revolute(0, 1), Revolute(1, 2, (crank, 0.0)), Revolute(2, 3, (coupler, 0.0), (last, 0.0))]
-
-
 def meeting(A: complex, a: float, B: complex, b: float, branch: int = 1, what: str = "sides") -> complex:
     """Return where circles about A and B meet, left (+1) or right (-1) of the way from A to B."""
     d = abs(B - A)
@@ -403,11 +382,18 @@ def _four_bar(
             f"the longest link, {longest:g}, is longer than the other three together, {total - longest:g}: "
             "the four-bar cannot be assembled; give other lengths"
         )
-    phi = start_angle(l1, l2, l3, l4) if crank_angle is None else angle("crank_angle", crank_angle)
+    if crank_angle is not None:
+        phi = angle("crank_angle", crank_angle)
+    elif abs(l3 - l4) < abs(l1 - l2) < l3 + l4:
+        phi = 0.0
+    else:
+        # the middle of the angles reached in (0, pi), which end where the pin is farthest from the pivot, and nearest
+        cosines = ((l1 * l1 + l2 * l2 - reach * reach) / (2.0 * l1 * l2) for reach in (abs(l3 - l4), l3 + l4))
+        phi = 0.5 * sum(math.acos(min(1.0, max(-1.0, cosine))) for cosine in cosines)
     A, D = cmath.rect(l2, phi), complex(l1, 0.0)
     B = meeting(A, l3, D, l4, branch, "coupler and rocker")
-    joints = [*_arms(l2, l3, l4), Revolute(0, 3, (l1, 0.0))]
-    return joints, ((0.0, 0.0, 0.0), (0.0, 0.0, phi), _at(A, B), _at(D, B))
+    pins = (Revolute(0, 1), Revolute(1, 2, (l2, 0.0)), Revolute(2, 3, (l3, 0.0), (l4, 0.0)), Revolute(0, 3, (l1, 0.0)))
+    return list(pins), ((0.0, 0.0, 0.0), (0.0, 0.0, phi), _at(A, B), _at(D, B))
 
 
 def _is_pair(value: Any) -> bool:
@@ -462,17 +448,6 @@ class _Drawn:
         self.links.append(block)
         turn, place = cmath.phase(Q - P), self.places[at]
         self.prismatics.append(Prismatic(guide, len(self.links) - 1, place, place, turn, turn))
-
-    def revolutes(self) -> list[JointGeometry]:
-        """Revolute joints at every point of two links or more."""
-        for (a, one), (b, other) in combinations(enumerate(self.links), 2):
-            if len(set(one) & set(other)) > 1:
-                raise GeometryError(f"links {a} and {b} share two points, so they are one link; give them as one")
-        found: list[JointGeometry] = []
-        for name, place in self.places.items():
-            first, *others = self.at(name) or [0]
-            found += [Revolute(first, other, place, place) for other in others]
-        return found
 
     def driven(self, given: Any, joints: Sequence[JointGeometry]) -> tuple[int, int]:
         """Return base and link of a driver."""

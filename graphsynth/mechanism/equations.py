@@ -134,10 +134,6 @@ def derivatives(at: Seen, rows: Sequence[Gradient]) -> list[tuple[list[Number | 
             continue
         x, y = at.plane.parts(by_d)
         turn_a, turn_b = (at.plane.dot(by_d, at.plane.left(arm)) for arm in (at.arm_a, at.arm_b))
-        found.append(
-            (
-                [-x, -y, -turn_a if by_a is None else by_a - turn_a],
-                [x, y, turn_b if by_b is None else by_b + turn_b],
-            )
-        )
+        own = [-x, -y, -turn_a if by_a is None else by_a - turn_a]
+        found.append((own, [x, y, turn_b if by_b is None else by_b + turn_b]))
     return found

@@ -20,16 +20,7 @@ from graphsynth.mechanism.laws import LAWS, Driver, Linear
 from graphsynth.mechanism.model import Mechanism, TracePoint
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = [
-    "JSON_MAX",
-    "TOML_MAX",
-    "from_dict",
-    "from_json",
-    "from_toml",
-    "to_dict",
-    "to_json",
-    "to_toml",
-]
+__all__ = ["JSON_MAX", "TOML_MAX", "from_dict", "from_json", "from_toml", "to_dict", "to_json", "to_toml"]
 
 FORMAT = "graphsynth mechanism"
 VERSION = 1
@@ -62,9 +53,14 @@ def to_dict(mechanism: Mechanism) -> dict[str, Any]:
     if mechanism.pose is not None:
         data["pose"] = [list(row) for row in mechanism.pose]
     data["joints"] = [{"kind": joint.kind, **_plain(joint)} for joint in mechanism.joints]
-    data["drivers"] = [
-        {"base": driver.base, "link": driver.link, "law": _law_dict(driver)} for driver in mechanism.drivers
-    ]
+    data["drivers"] = []
+    for driver in mechanism.drivers:
+        law, kind = driver.law, getattr(driver.law, "kind", None)
+        if not isinstance(kind, str) or type(law) is not LAWS.get(kind):
+            raise GeometryError(
+                f"the law {law!r} of driver {driver.base}-{driver.link} cannot be written; use a Table of its values"
+            )
+        data["drivers"].append({"base": driver.base, "link": driver.link, "law": {"kind": kind, **_plain(law)}})
     data["points"] = {name: {"link": p.link, "at": list(p.at)} for name, p in mechanism.points.items()}
     return data
 
@@ -72,16 +68,6 @@ def to_dict(mechanism: Mechanism) -> dict[str, Any]:
 def _plain(value: Any) -> dict[str, Any]:
     found = {item.name: getattr(value, item.name) for item in fields(value)}
     return {name: list(part) if isinstance(part, tuple) else part for name, part in found.items()}
-
-
-def _law_dict(driver: Driver) -> dict[str, Any]:
-    law = driver.law
-    kind = getattr(law, "kind", None)
-    if not isinstance(kind, str) or type(law) is not LAWS.get(kind):
-        raise GeometryError(
-            f"the law {law!r} of driver {driver.base}-{driver.link} cannot be written; use a Table of its values"
-        )
-    return {"kind": kind, **_plain(law)}
 
 
 @checked
@@ -155,11 +141,6 @@ def from_json(text: str | bytes) -> Mechanism:
     Returns
     -------
     Mechanism
-
-    Raises
-    ------
-    FormatError
-        For anything that is not JSON of a mechanism, with the line or key.
     """
     return from_dict(json_value(_decoded(text, JSON_MAX, "JSON")))
 
@@ -175,11 +156,6 @@ def from_toml(text: str | bytes) -> Mechanism:
     Returns
     -------
     Mechanism
-
-    Raises
-    ------
-    FormatError
-        For anything that is not TOML of a mechanism, with the line or key.
     """
     return from_dict(toml_tables(_decoded(text, TOML_MAX, "TOML")))
 
@@ -195,11 +171,6 @@ def from_dict(data: Any) -> Mechanism:
     Returns
     -------
     Mechanism
-
-    Raises
-    ------
-    FormatError
-        For anything that is not a mechanism, with the key.
     """
     try:
         return _mechanism(data)
@@ -225,7 +196,14 @@ def _mechanism(data: Any) -> Mechanism:
     named = table.get("points", {})
     if not isinstance(named, dict):
         raise FormatError("expected a table of points", "points")
-    points = {_name(name): _point(entry, f"points.{name[:24]}") for name, entry in named.items()}
+    points = {}
+    for name, entry in named.items():
+        try:
+            name.encode()
+        except UnicodeEncodeError:
+            raise FormatError(f"the name {name[:24]!r} holds half a character", "points") from None
+        own = _table(entry, f"points.{name[:24]}", {"link", "at"}, {"link", "at"})
+        points[name] = TracePoint(own["link"], own["at"])
     pose = table.get("pose")
     if pose is not None:
         pose = tuple(tuple(_list(row, f"pose[{k}]")) for k, row in _entries(pose, "pose", graph.links))
@@ -243,15 +221,6 @@ def _build(make: Callable[[], _T], place: str) -> _T:
 def _shown(value: Any) -> str:
     text = repr(value) if isinstance(value, str | int | float) else type(value).__name__
     return text if len(text) <= 40 else f"{text[:36]} ..."
-
-
-def _name(name: str) -> str:
-    """Return the name of a point, if it can be written."""
-    try:
-        name.encode()
-    except UnicodeEncodeError:
-        raise FormatError(f"the name {name[:24]!r} holds half a character", "points") from None
-    return name
 
 
 def _entries(value: Any, place: str, most: int) -> Iterator[tuple[int, Any]]:
@@ -305,8 +274,3 @@ def _driver(value: Any, place: str) -> Driver:
             needed = ", ".join(item.name for item in fields(made))
             raise FormatError(f"a law of this kind needs {needed}", f"{place}.law") from error
     return _build(lambda: Driver(table["base"], table["link"], law), place)
-
-
-def _point(value: Any, place: str) -> TracePoint:
-    table = _table(value, place, {"link", "at"}, {"link", "at"})
-    return TracePoint(table["link"], table["at"])

@@ -13,27 +13,14 @@ from enum import IntEnum
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import (
-    check_fields,
-    check_sizes,
-    choice,
-    finite,
-    finite_array,
-    positive,
-    sign,
-    unit_vector,
-    whole,
-)
+from graphsynth.core import checks
 from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.rotatability import FullTurn, four_bar_rotation
-
-if TYPE_CHECKING:
-    from graphsynth.structure.graph import MechanismGraph
+from graphsynth.structure.graph import MechanismGraph
 
 Array = NDArray[np.float64]
 _BESIDE = 1e-140
@@ -63,33 +50,20 @@ class AssemblyStatus(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class FourBarPositions:
-    """Positions, tilt and derivatives with respect to the crank angle; NaN wherever `assembled` is False.
+    """Positions, tilt and derivatives with respect to the crank angle, shape (...), vectors (..., 3).
 
-    Attributes
-    ----------
-    f : ndarray, shape (...)
-        Crank angles, radians.
-    A, B, M : ndarray, shape (..., 3)
-        Crank pin, bearing centre, tracing point; unit of the link lengths.
-    status : ndarray of int8, shape (...)
-        `AssemblyStatus` of every angle.
-    theta, sin_theta, cos_theta : ndarray, shape (...)
-        Signed tilt of the coupler at B (radians) and its sine and cosine, computed without an inverse function.
-    dA, dB, dM : ndarray, shape (..., 3)
-        Analytical derivatives d/df; NaN also in a limit position (`AssemblyStatus.LIMIT`).
-    dtheta : ndarray, shape (...)
-        Derivative of the tilt.
+    NaN wherever `assembled` is False; derivatives also in a limit position (`AssemblyStatus.LIMIT`).
     """
 
-    f: Array
-    A: Array
-    B: Array
-    M: Array
-    status: NDArray[np.int8]
-    theta: Array
+    f: Array  # crank angles, radians
+    A: Array  # crank pin, in the unit of the link lengths
+    B: Array  # bearing centre
+    M: Array  # tracing point
+    status: NDArray[np.int8]  # `AssemblyStatus` of every angle
+    theta: Array  # signed tilt of the coupler at B, radians; its sine and cosine are found without an inverse function
     sin_theta: Array
     cos_theta: Array
-    dA: Array
+    dA: Array  # analytical derivatives d/df
     dB: Array
     dM: Array
     dtheta: Array
@@ -177,16 +151,13 @@ class TiltedFourBar:
     convention: str = "spec"
 
     def __post_init__(self) -> None:
-        for name in ("l1", "l2", "l3", "l4"):
-            object.__setattr__(self, name, positive(name, getattr(self, name)))
-        for name in ("k", "alpha"):
-            object.__setattr__(self, name, finite(name, getattr(self, name)))
-        check_fields(self, ("l1", "l2", "l3", "l4"))
-        check_sizes("the tracing point", {"1 + |k|": 1.0 + abs(self.k)})
-        object.__setattr__(self, "sgn", sign("sgn", self.sgn))
-        object.__setattr__(self, "axis", unit_vector("axis", self.axis))
-        choice("rod", self.rod, ("rigid", "deck"))
-        choice("convention", self.convention, ("spec", "deck"))
+        own = dict.fromkeys(("l1", "l2", "l3", "l4"), checks.positive) | {"k": checks.finite, "alpha": checks.finite}
+        for name, check in {**own, "sgn": checks.sign, "axis": checks.unit_vector}.items():
+            object.__setattr__(self, name, check(name, getattr(self, name)))
+        checks.check_fields(self, ("l1", "l2", "l3", "l4"))
+        checks.check_sizes("the tracing point", {"1 + |k|": 1.0 + abs(self.k)})
+        checks.choice("rod", self.rod, ("rigid", "deck"))
+        checks.choice("convention", self.convention, ("spec", "deck"))
 
     @property
     def _angle(self) -> float:
@@ -276,7 +247,7 @@ class TiltedFourBar:
         GeometryError
             If ``f`` holds a NaN or an infinity.
         """
-        f = finite_array("f", f)
+        f = checks.finite_array("f", f)
         A, dA, s3, near, far, dx = self._closure(f)
         az, dy = A[..., 2], A[..., 1]
         D = np.hypot(dx, dy)
@@ -294,11 +265,23 @@ class TiltedFourBar:
         yB = self.sgn * 0.5 * root / safe
         B = np.stack([self.l1 + xB * ex + yB * ey, xB * ey - yB * ex, np.where(assembled, 0.0, np.nan)], axis=-1)
         B = np.where(assembled[..., None], B, np.nan)
-        dB = self._rocker_velocity(A, dA, B, s3, root)
-        theta, sine, cosine, dtheta = self._tilt(az, dA[..., 2], s3)
+        # B' = w x (B - C) from the derivative of |B - A|^2 = s3^2; NaN in a limit position, where root = 0
+        ba = B[..., :2] - A[..., :2]
+        stretch = -az * dA[..., 2] if self.rod == "rigid" else 0.0  # s3 s3'
+        moment = stretch + ba[..., 0] * dA[..., 0] + ba[..., 1] * dA[..., 1]
+        w = moment / np.where(root > 0.0, -0.5 * self.sgn * root, np.nan)  # cross(B - C, B - A)
+        dB = np.stack([-w * B[..., 1], w * (B[..., 0] - self.l1), np.where(np.isnan(w), np.nan, 0.0)], axis=-1)
+        if self.rod == "rigid":
+            sine, cosine = az / self.l3, s3 / self.l3
+            with np.errstate(divide="ignore", invalid="ignore"):
+                dtheta = np.where(s3 > 0.0, dA[..., 2] / s3, np.nan)
+        else:
+            length = np.hypot(self.l3, az)
+            sine, cosine, dtheta = az / length, self.l3 / length, dA[..., 2] * self.l3 / (length * length)
         M, dM = (1.0 + self.k) * B - self.k * A, (1.0 + self.k) * dB - self.k * dA
         hide = np.where(assembled, 0.0, np.nan)
-        return FourBarPositions(f, A, B, M, status, theta + hide, sine + hide, cosine + hide, dA, dB, dM, dtheta + hide)
+        tilt = np.arctan2(az, s3) + hide, sine + hide, cosine + hide
+        return FourBarPositions(f, A, B, M, status, *tilt, dA, dB, dM, dtheta + hide)
 
     def _status(self, D: Array, az: Array, s3: Array, near: Array, far: Array) -> NDArray[np.int8]:
         status = np.zeros(D.shape, dtype=np.int8)
@@ -310,25 +293,6 @@ class TiltedFourBar:
         if self.rod == "rigid":
             status[np.abs(az) > self.l3] = AssemblyStatus.TILT_EXCEEDS_ROD
         return status
-
-    def _rocker_velocity(self, A: Array, dA: Array, B: Array, s3: Array, root: Array) -> Array:
-        """B' = w x (B - C) from the derivative of |B - A|^2 = s3^2; NaN in a limit position, where root = 0."""
-        ba = B[..., :2] - A[..., :2]
-        stretch = -A[..., 2] * dA[..., 2] if self.rod == "rigid" else 0.0  # s3 s3'
-        moment = stretch + ba[..., 0] * dA[..., 0] + ba[..., 1] * dA[..., 1]
-        divisor = np.where(root > 0.0, -0.5 * self.sgn * root, np.nan)  # cross(B - C, B - A)
-        w = moment / divisor
-        return np.stack([-w * B[..., 1], w * (B[..., 0] - self.l1), np.where(np.isnan(w), np.nan, 0.0)], axis=-1)
-
-    def _tilt(self, az: Array, daz: Array, s3: Array) -> tuple[Array, Array, Array, Array]:
-        if self.rod == "rigid":
-            sine, cosine = az / self.l3, s3 / self.l3
-            with np.errstate(divide="ignore", invalid="ignore"):
-                rate = np.where(s3 > 0.0, daz / s3, np.nan)
-        else:
-            length = np.hypot(self.l3, az)
-            sine, cosine, rate = az / length, self.l3 / length, daz * self.l3 / (length * length)
-        return np.arctan2(az, s3), sine, cosine, rate
 
     def full_turn(self) -> FullTurn:
         """Say whether the crank can make a full turn, with limit angles or change points if it cannot.
@@ -343,7 +307,7 @@ class TiltedFourBar:
         l1, l2, l3, l4 = (Fraction(length) for length in (self.l1, self.l2, self.l3, self.l4))
         kind, touches, bounds = four_bar_rotation(l1 * l1, l2, l3, l4)
         if kind == "never assembled":
-            return FullTurn(False, kind, (), (), "exact", "the linkage cannot be assembled at any crank angle")
+            return FullTurn(kind, (), (), "exact", "the linkage cannot be assembled at any crank angle")
         r = self.rotation  # about e_z, or a half turn about an axis in the plane: f is shifted or reversed
         phase, sense = math.atan2(r[1, 0], r[0, 0]), math.copysign(1.0, r[2, 2])
         changes = [angle for angle, met in zip((0.0, math.pi), touches) if met]
@@ -353,17 +317,14 @@ class TiltedFourBar:
             angle = 2.0 * math.atan2(math.sqrt(half), math.sqrt(1 - half))
             limits += [angle, -angle] if 0 < half < 1 else [angle]
         at, met = (tuple(sorted(sense * (angle - phase) % math.tau for angle in part)) for part in (limits, changes))
-        if kind == "immovable":
-            text = f"nothing moves: the linkage can only lie stretched, at {_degrees(at[:1])} degrees"
-            return FullTurn(False, kind, at, (), "exact", text)
-        if at:
-            text = f"the crank cannot make a full turn: dead points at {_degrees(at)} degrees"
-            return FullTurn(False, "limited", at, met, "exact", text)
-        if met:
-            text = f"the crank passes every angle, but the branches meet at the change points {_degrees(met)} degrees"
-            return FullTurn(False, "change point", (), met, "exact", text)
-        text = "the crank makes a full turn without dead points or change points"
-        return FullTurn(True, "full turn", (), (), "exact", text)
+        texts = {
+            "immovable": f"nothing moves: the linkage can only lie stretched, at {_degrees(at[:1])} degrees",
+            "limited": f"the crank cannot make a full turn: dead points at {_degrees(at)} degrees",
+            "change point": "the crank passes every angle, but the branches meet at the change points "
+            f"{_degrees(met)} degrees",
+            "full turn": "the crank makes a full turn without dead points or change points",
+        }
+        return FullTurn(kind, at, () if kind == "immovable" else met, "exact", texts[kind])
 
     def _margins(self, f: Array) -> Array:
         """Smallest of the three quantities that must stay positive, relative to the square of the largest length."""
@@ -391,10 +352,10 @@ class TiltedFourBar:
         rounding = 64 * np.finfo(float).eps
         if abs(best[1]) <= rounding:
             text = "the largest margin is at the rounding level: immovable or never assembled, not decided"
-            return FullTurn(False, "immovable", (best[0],), (), "estimated", text)
+            return FullTurn("immovable", (best[0],), (), "estimated", text)
         if best[1] < 0.0:
             text = "the linkage cannot be assembled at any sampled crank angle"
-            return FullTurn(False, "never assembled", (), (), "estimated", text)
+            return FullTurn("never assembled", (), (), "estimated", text)
         limits = tuple(
             float(brentq(self._margin, f0, f1, xtol=1e-14)) % math.tau
             for (f0, v0), (f1, v1) in pairwise(nodes)
@@ -402,13 +363,13 @@ class TiltedFourBar:
         )
         if limits:
             text = f"the crank cannot make a full turn: dead points near {_degrees(limits)} degrees"
-            return FullTurn(False, "limited", limits, (), "estimated", text)
+            return FullTurn("limited", limits, (), "estimated", text)
         if worst <= rounding:
             touch = tuple(f for f, value in nodes if value == worst)
             text = "the smallest margin is at the rounding level: change point or dead point, not decided"
-            return FullTurn(False, "change point", (), touch, "estimated", text)
+            return FullTurn("change point", (), touch, "estimated", text)
         text = f"the crank makes a full turn; smallest relative margin {worst:.3g}"
-        return FullTurn(True, "full turn", (), (), "estimated", text)
+        return FullTurn("full turn", (), (), "estimated", text)
 
     def straightness(
         self, start: float = 0.5 * math.pi, stop: float = 1.5 * math.pi, samples: int = 721
@@ -422,8 +383,8 @@ class TiltedFourBar:
         """
         from scipy.optimize import minimize_scalar
 
-        start, stop = finite("start", start), finite("stop", stop)
-        f = np.linspace(start, stop, whole("samples", samples, 2))
+        start, stop = checks.finite("start", start), checks.finite("stop", stop)
+        f = np.linspace(start, stop, checks.whole("samples", samples, 2))
         path = self.positions(f)
         if not path.assembled.all():
             raise GeometryError(
@@ -437,27 +398,24 @@ class TiltedFourBar:
         normal = np.array([first[1] - last[1], last[0] - first[0]]) / chord
         normal = -normal if normal[1] < 0.0 else normal  # positive means upwards, whichever way M runs
 
-        def offset(angle: float) -> float:
-            return float((self.positions([angle]).M[0, :2] - first) @ normal)
-
         def extreme(direction: int) -> tuple[float, float]:
-            signed = direction * ((path.M[:, :2] - first) @ normal)
-            k = int(np.argmax(signed))
+            def below(M: Array) -> Array:
+                return np.asarray(-direction * ((M[:, :2] - first) @ normal))
+
+            values = below(path.M)
+            k = int(np.argmin(values))
             ends = tuple(sorted((f[max(k - 1, 0)], f[min(k + 1, samples - 1)])))
             found = minimize_scalar(
-                lambda x: -direction * offset(x), bounds=ends, method="bounded", options={"xatol": 1e-12}
+                lambda x: below(self.positions([x]).M)[0], bounds=ends, method="bounded", options={"xatol": 1e-12}
             )
-            if -found.fun > signed[k]:
-                return float(found.x), -direction * float(found.fun)
-            return float(f[k]), direction * float(signed[k])
+            at, value = (found.x, found.fun) if found.fun < values[k] else (f[k], values[k])
+            return float(at), -direction * float(value)
 
         (f_low, low), (f_high, high) = extreme(-1), extreme(1)
         return Straightness(chord, low, high, f_low, f_high, float(np.abs(path.M[:, 2]).max()))
 
     def graph(self) -> MechanismGraph:
         """Structural graph: a four-bar chain with joints 0-1, 1-2, 2-3, 0-3 and link 0 as the frame."""
-        from graphsynth.structure.graph import MechanismGraph
-
         return MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
 
 

@@ -14,11 +14,15 @@ from __future__ import annotations
 
 import math
 from cmath import rect
+from collections.abc import Callable
+from inspect import getdoc
+from typing import TypeVar
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.constructors import meeting
 from graphsynth.mechanism.model import Mechanism
 
+F = TypeVar("F", bound=Callable[..., Mechanism])
 __all__ = [
     "chebyshev_lambda",
     "excavator_arm",
@@ -35,6 +39,12 @@ __all__ = [
 ]
 
 
+def _classic(function: F) -> F:
+    """Say in the docstring what every function here returns."""
+    function.__doc__ = f"{getdoc(function)}\n\nReturns\n-------\nMechanism\n    With a driver and a pose."
+    return function
+
+
 def _places(text: str = "", **points: complex) -> dict[str, tuple[float, float]]:
     """Coordinates of points, from a text of names and numbers, or as complex numbers."""
     words = text.split()
@@ -42,58 +52,47 @@ def _places(text: str = "", **points: complex) -> dict[str, tuple[float, float]]
     return found | {name: (z.real, z.imag) for name, z in points.items()}
 
 
+@_classic
 def chebyshev_lambda() -> Mechanism:
     """Chebyshev's lambda linkage 2 : 1 : 2.5 : 2.5; "P" draws a nearly straight line over half a turn, 4 cranks long.
 
     Source: after P. L. Chebyshev (papers from 1854 on, this linkage 1878); Artobolevsky, volume 1; what the proportions
     give is computed in docs/explanation/bearing-jamming.md.
-
-    Returns
-    -------
-    Mechanism
     """
     return Mechanism.four_bar(2.0, 1.0, 2.5, 2.5, coupler_point=(5.0, 0.0))
 
 
+@_classic
 def watt_straight_line() -> Mechanism:
     """Watt's straight-line linkage: two equal levers and a link whose middle "P" draws a slender figure of eight.
 
     Source: J. Watt, British patent 1432 (1784); Kempe (1877).  Levers 5, link 2, drawn in the middle of its stroke.
-
-    Returns
-    -------
-    Mechanism
     """
     places = _places("A -5 1 B 0 1 C 0 -1 D 5 -1 P 0 0")
     return Mechanism.from_points(places, ["AB", "BPC", "CD"], "AD", "AB")
 
 
+@_classic
 def watt_six_bar() -> Mechanism:
     """Watt's six-bar, its two ternary links jointed: a crank-rocker whose rocker swings a second one further.
 
     Source: the chain of Watt's engine (1784), as the type Watt II in Norton, chapter 2.
-
-    Returns
-    -------
-    Mechanism
     """
     return Mechanism.six_bar("watt", (4.0, 1.0, 4.0, 3.0), joint=(2.0, 1.0), link=3.0, output=3.0, pivot=(7.0, 0.0))
 
 
+@_classic
 def stephenson_six_bar() -> Mechanism:
     """Stephenson's six-bar, its two ternary links apart: the coupler of a crank-rocker drives a second rocker.
 
     Source: the chain of Stephenson's valve gear (1842), as the type Stephenson III in Norton, chapter 2.
-
-    Returns
-    -------
-    Mechanism
     """
     return Mechanism.six_bar(
         "stephenson", (4.0, 1.0, 3.5, 3.0), joint=(2.0, 1.0), link=4.0, output=3.0, pivot=(6.0, -1.0)
     )
 
 
+@_classic
 def peaucellier(long: float = 5.0, short: float = 3.0, crank: float = 1.5) -> Mechanism:
     """Peaucellier's cell: its point "P" draws an exact straight line, for crank and distance of the pivots are equal.
 
@@ -103,16 +102,7 @@ def peaucellier(long: float = 5.0, short: float = 3.0, crank: float = 1.5) -> Me
     Parameters
     ----------
     long, short, crank : float
-        Sides of the cell, and the crank about the second pivot at (crank, 0).
-
-    Returns
-    -------
-    Mechanism
-
-    Raises
-    ------
-    GeometryError
-        Sides with which the cell cannot be drawn.
+        Sides of the cell, and the crank about the second pivot at (crank, 0); `GeometryError` if they do not fit.
     """
     if not 0.0 < long - short < 2.0 * crank < long + short:
         raise GeometryError(
@@ -125,6 +115,7 @@ def peaucellier(long: float = 5.0, short: float = 3.0, crank: float = 1.5) -> Me
     return Mechanism.from_points(places, links, "OQ", "QR", trace="P")
 
 
+@_classic
 def scott_russell(length: float = 2.0) -> Mechanism:
     """Scott Russell's linkage: a rod twice as long as the crank, its end "P" on an exact line through the crank's axis.
 
@@ -135,16 +126,13 @@ def scott_russell(length: float = 2.0) -> Mechanism:
     ----------
     length : float
         Of the rod; the crank is half as long and jointed to its middle.
-
-    Returns
-    -------
-    Mechanism
     """
     B = rect(0.5 * length, math.radians(40.0))
     places = _places(O=0j, B=B, C=2.0 * B.real, P=2j * B.imag, E=3.0 * length)
     return Mechanism.from_points(places, ["OB", "PBC"], "OE", "OB", slides={"C": "OE"})
 
 
+@_classic
 def pantograph(scale: float = 2.0) -> Mechanism:
     """Pantograph: "P" draws what the slide on (1, 0)-(1, 2) leads "T" along, ``scale`` times as large from (0, 0).
 
@@ -154,16 +142,7 @@ def pantograph(scale: float = 2.0) -> Mechanism:
     Parameters
     ----------
     scale : float
-        Above 1.
-
-    Returns
-    -------
-    Mechanism
-
-    Raises
-    ------
-    GeometryError
-        Another scale.
+        Above 1, else `GeometryError`.
     """
     if not (math.isfinite(scale) and scale > 1.0):
         raise GeometryError(f"scale = {scale:g} must be above 1 and finite; give how many times larger P draws")
@@ -174,6 +153,7 @@ def pantograph(scale: float = 2.0) -> Mechanism:
     return Mechanism.from_points(places, ["ODB", "BEP", "DT", "TE"], "OUV", (0, 5), slides={"T": "UV"}, trace="T")
 
 
+@_classic
 def whitworth_quick_return(ratio: float = 2.0) -> Mechanism:
     """Whitworth's quick return: the crank drives a slotted link that turns fully, slow half a turn and fast the other.
 
@@ -184,16 +164,8 @@ def whitworth_quick_return(ratio: float = 2.0) -> Mechanism:
     Parameters
     ----------
     ratio : float
-        Time of the slow half turn over that of the fast one, above 1: ``cos(pi / (1 + ratio)) = e``.
-
-    Returns
-    -------
-    Mechanism
-
-    Raises
-    ------
-    GeometryError
-        Another ratio.
+        Time of the slow half turn over that of the fast one, above 1, else `GeometryError`:
+        ``cos(pi / (1 + ratio)) = e``.
     """
     if not (math.isfinite(ratio) and ratio > 1.0):
         raise GeometryError(f"ratio = {ratio:g} must be above 1 and finite; give the time ratio")
@@ -203,6 +175,7 @@ def whitworth_quick_return(ratio: float = 2.0) -> Mechanism:
     return Mechanism.from_points(places, ["QA", "BOS", "BC"], "OQT", "QA", slides={"A": "OS", "C": "OT"})
 
 
+@_classic
 def toggle_press(link: float = 1.0) -> Mechanism:
     """Toggle press: a crank stretches two equal links, and presses the ram "R" with a force that grows without bound.
 
@@ -213,10 +186,6 @@ def toggle_press(link: float = 1.0) -> Mechanism:
     ----------
     link : float
         Length of both links of the toggle.
-
-    Returns
-    -------
-    Mechanism
     """
     K = rect(link, math.radians(-80.0))
     Q = complex(1.6 * link, -0.6 * link)
@@ -225,14 +194,11 @@ def toggle_press(link: float = 1.0) -> Mechanism:
     return Mechanism.from_points(places, ["QC", "CK", "OK", "KR"], "OQG", "QC", slides={"R": "OG"}, trace="R")
 
 
+@_classic
 def klann() -> Mechanism:
     """Klann's walking leg: a six-bar of Stephenson's chain whose foot "P" steps once for a turn of the crank.
 
     Source: after J. C. Klann, US patent 6260862 (2001).
-
-    Returns
-    -------
-    Mechanism
     """
     places = _places(
         "A 1.366 1.366 B 1.009 0.574 O 1.599 0.75 M 1.331 0.75 E 0.741 0.75 D 0.232 0.866 H 0.866 1.366 P 0 0"
@@ -240,15 +206,12 @@ def klann() -> Mechanism:
     return Mechanism.from_points(places, ["OM", "MED", "BE", "AH", "DHP"], "OAB", "OM")
 
 
+@_classic
 def jansen() -> Mechanism:
     """Jansen's walking leg: eight links with his "holy numbers"; its foot "P" steps once for a turn of the crank.
 
     Source: T. Jansen, The Great Pretender (2007); a = 38, b = 41.5, c = 39.3, d = 40.1, e = 55.8, f = 39.4, g = 36.7,
     h = 65.7, i = 49, j = 50, k = 61.9, l = 7.8, m = 15.
-
-    Returns
-    -------
-    Mechanism
     """
     numbers = "38 41.5 39.3 40.1 55.8 39.4 36.7 65.7 49 50 61.9 7.8 15"
     a, b, c, d, e, f, g, h, i, j, k, low, m = map(float, numbers.split())
@@ -263,15 +226,12 @@ def jansen() -> Mechanism:
     return Mechanism.from_points(places, ["OA", "AC", "BCD", "AE", "BE", "DF", "EFP"], "OB", "OA")
 
 
+@_classic
 def excavator_arm() -> Mechanism:
     """Excavator arm: boom, stick and bucket, each moved by a hydraulic cylinder; three drivers, in metres.
 
     Source: the usual arrangement of a backhoe; round lengths of a machine of about 20 tonnes, of no particular maker.
     The bucket with its tip "P" is turned through a four-bar.
-
-    Returns
-    -------
-    Mechanism
     """
     places = _places(
         "A 0 1.8 B 0.6 1.4 C 2.6 4.6 D 5.4 5 E 3 5.3 F 5.09 5.515 G 6.6 3 H 5.95 5 K 6.394 3.343 "

@@ -3,9 +3,10 @@
 Every point and direction is given in the frame of its own link; the frame link's own frame is the fixed one.
 Complex notation below: link k carries the point p to ``r_k + exp(i theta_k) p``.
 
-A new kind of joint is a class here, among `KINDS` and in `JointGeometry`, with ``values`` and ``gradients``; its
-equations for the kernels stand in ``ROWS`` of `graphsynth.kinematics.engine.program`, its symbol in
-`graphsynth.drawing.symbols`, its reactions in `graphsynth.dynamics.reactions`.
+A new kind of joint is a class here, among `KINDS` and in `JointGeometry`: ``values`` are the left sides of its
+equations in the arithmetic of what is `Seen`, ``gradients`` their derivatives.  Its equations for the kernels stand in
+``ROWS`` of `graphsynth.kinematics.engine.program`, its symbol in `graphsynth.drawing.symbols`, its reactions in
+`graphsynth.dynamics.reactions`.
 """
 
 from __future__ import annotations
@@ -49,14 +50,6 @@ class PlanarJoint:
             if check is not None:
                 value = check(f"{item.name} of joint {self.a}-{self.b}", getattr(self, item.name))
                 object.__setattr__(self, item.name, value)
-
-    def values(self, at: Seen) -> list[Any]:
-        """Left sides of the equations, in the arithmetic of ``at``."""
-        raise NotImplementedError
-
-    def gradients(self, at: Seen) -> list[Gradient]:
-        """Return the derivatives of the equations."""
-        raise NotImplementedError
 
     def turns(self) -> list[tuple[float, ...]]:
         """Return what a whole turn of the angle in each equation adds to it, in turns; empty where there is none."""
@@ -231,8 +224,14 @@ class Cam(PlanarJoint):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        name = f"of cam {self.a}-{self.b}"
-        object.__setattr__(self, "harmonics", _harmonics(self.harmonics, name))
+        name, given = f"of cam {self.a}-{self.b}", self.harmonics
+        try:
+            if len(given) > _HARMONICS_MAX:
+                raise GeometryError(f"harmonics {name}: {len(given)} are given, at most {_HARMONICS_MAX} are taken")
+            read = tuple(point(f"harmonic {k} {name}", pair) for k, pair in enumerate(given, 1))
+        except TypeError as error:
+            raise GeometryError(f"harmonics {name} = {given!r} are no list of pairs (c_k, s_k)") from error
+        object.__setattr__(self, "harmonics", read)
         least = self._least_radius()
         if not least > 0.0:
             raise GeometryError(
@@ -289,15 +288,6 @@ class Cam(PlanarJoint):
             first += k * (s * cosine - c * sine)
             second -= k * k * (c * cosine + s * sine)
         return value, first, second
-
-
-def _harmonics(given: Any, name: str) -> tuple[Point, ...]:
-    try:
-        if len(given) > _HARMONICS_MAX:
-            raise GeometryError(f"harmonics {name}: {len(given)} are given, at most {_HARMONICS_MAX} are taken")
-        return tuple(point(f"harmonic {k} {name}", pair) for k, pair in enumerate(given, 1))
-    except TypeError as error:
-        raise GeometryError(f"harmonics {name} = {given!r} are no list of pairs (c_k, s_k)") from error
 
 
 def _across(at: Seen, angle: float) -> Gradient:

@@ -39,8 +39,8 @@ class Linear:
     kind: ClassVar[str] = "linear"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rate", finite("rate", self.rate))
-        object.__setattr__(self, "offset", finite("offset", self.offset))
+        for name in ("rate", "offset"):
+            object.__setattr__(self, name, finite(name, getattr(self, name)))
 
     def __call__(self, u: ArrayLike) -> tuple[Array, Array, Array]:
         """Coordinate and derivatives."""
@@ -87,8 +87,7 @@ class Polynomial:
     kind: ClassVar[str] = "polynomial"
 
     def __post_init__(self) -> None:
-        values = _numbers("coefficients", self.coefficients, 1)
-        object.__setattr__(self, "coefficients", values)
+        object.__setattr__(self, "coefficients", _numbers("coefficients", self.coefficients, 1))
 
     def __call__(self, u: ArrayLike) -> tuple[Array, Array, Array]:
         """Coordinate and derivatives."""
@@ -108,10 +107,7 @@ class Polynomial:
 class Table:
     """Values at increasing inputs, joined by a cubic spline (natural ends); NaN outside the table.
 
-    Raises
-    ------
-    GeometryError
-        Fewer than two inputs, inputs that do not increase, numbers that are not finite, lists of different lengths.
+    `GeometryError` for fewer than two inputs, inputs that do not increase, lists of different lengths.
     """
 
     inputs: tuple[float, ...]
@@ -171,11 +167,6 @@ class Driver:
         ``theta_link - theta_base`` of a revolute joint, the displacement along the line of a prismatic joint.
     law : Law
         Coordinate as a function of the input; the input itself by default.
-
-    Raises
-    ------
-    GeometryError
-        Links that are no numbers, a law that cannot be called.
     """
 
     base: int

@@ -86,7 +86,12 @@ class Mechanism(Constructors, Shown):
         object.__setattr__(self, "points", {name: self._checked_point(name, p) for name, p in self.points.items()})
         if self.pose is not None:
             object.__setattr__(self, "pose", self._checked_pose(self.pose))
-        self._check_links()
+        for link, degree in enumerate(self.graph.degrees):  # a binary link of zero length would have no direction
+            own = [joint for joint in self.joints if link in (joint.a, joint.b)]
+            ends = [joint.at_a if joint.a == link else joint.at_b for joint in own]
+            revolute = all(isinstance(joint, Revolute) for joint in own)
+            if degree == 2 and link != self.frame and revolute and ends[0] == ends[1]:
+                raise GeometryError(f"link {link} has length 0 between its two joints; give it a positive length")
 
     def __hash__(self) -> int:
         return hash((self.graph, self.joints, self.drivers))
@@ -133,16 +138,6 @@ class Mechanism(Constructors, Shown):
         if rows[self.frame] != (0.0, 0.0, 0.0):
             raise GeometryError(f"the frame, link {self.frame}, stays at (0, 0, 0); its pose is {rows[self.frame]}")
         return tuple((row[0], row[1], row[2]) for row in rows)
-
-    def _check_links(self) -> None:
-        """No moving binary R-R link of zero length: its direction would be undefined."""
-        for link, degree in enumerate(self.graph.degrees):
-            if degree != 2 or link == self.frame:
-                continue
-            own = [joint for joint in self.joints if link in (joint.a, joint.b)]
-            ends = [joint.at_a if joint.a == link else joint.at_b for joint in own]
-            if all(isinstance(joint, Revolute) for joint in own) and ends[0] == ends[1]:
-                raise GeometryError(f"link {link} has length 0 between its two joints; give it a positive length")
 
     @property
     def frame(self) -> int:

@@ -7,7 +7,6 @@ between ``|g - a|`` and ``g + a``, and the bounds are ``|b - c|`` and ``b + c`` 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -18,29 +17,23 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class FullTurn:
-    """Whether a crank turns fully.
+    """Whether a crank turns fully: one of `KINDS`, and the result in one sentence.
 
-    Attributes
-    ----------
-    possible : bool
-        True if the crank passes every angle on one branch.
-    kind : {"full turn", "change point", "limited", "immovable", "never assembled"}
-        "change point": the branches meet but the crank can pass; the branch after it is ambiguous.  "immovable": the
-        linkage can only lie stretched, at one angle, which is its limit angle.
-    limit_angles, change_angles : tuple of float
-        Crank angles (radians, in [0, 2 pi)) of the dead points and of the change points.
-    method : str
-        "exact" (rational arithmetic on the given lengths) or "estimated" (sampled and refined).
-    statement : str
-        The result in one sentence.
+    The angles (radians, in [0, 2 pi)) are those of the dead points and of the change points, behind which the branch is
+    ambiguous; the limit angle of an immovable linkage is the one at which it lies stretched.  ``method`` is "exact"
+    (rational arithmetic on the given lengths) or "estimated" (sampled and refined).
     """
 
-    possible: bool
     kind: str
     limit_angles: tuple[float, ...]
     change_angles: tuple[float, ...]
     method: str
     statement: str
+
+    @property
+    def possible(self) -> bool:
+        """Whether the crank passes every angle on one branch."""
+        return self.kind == "full turn"
 
 
 #: Whether the crank turns.  "change point": it passes every angle, but the assembly modes meet.  "limited": some angles
@@ -72,12 +65,9 @@ class FourBarRotation(NamedTuple):
 
 
 def rotation_kind(near_least: Any, far_most: Any, near_most: Any, far_least: Any) -> NDArray[np.int8]:
-    """Place in `KINDS`, from the signs of the nearest or farthest reach minus the least or most that can be spanned.
+    """Place in `KINDS`, from the exact nearest or farthest reach minus the least or most that can be spanned.
 
-    Parameters
-    ----------
-    near_least, far_most, near_most, far_least : number or array of numbers
-        Differences, or their signs; exact.
+    The four differences, or their signs, are numbers or arrays of numbers.
     """
     cases = [
         (near_most > 0) | (far_least < 0),
@@ -92,23 +82,16 @@ def rotation_kind(near_least: Any, far_most: Any, near_most: Any, far_least: Any
 def four_bar_rotation(square: Fraction, crank: Fraction, coupler: Fraction, rocker: Fraction) -> FourBarRotation:
     """Decide whether the crank turns; ``square`` is that of the frame, whose length may be irrational.
 
-    Examples
-    --------
     >>> four_bar_rotation(Fraction(4), Fraction(1), Fraction(5, 2), Fraction(5, 2)).kind
     'full turn'
     >>> four_bar_rotation(Fraction(4), Fraction(2), Fraction(1), Fraction(1)).limits
     (('stretched', Fraction(2, 1)),)
     """
     least, most = abs(rocker - coupler), rocker + coupler
-
-    def near(bound: Fraction) -> int:
-        """Sign of ``|frame - crank| - bound`` for a bound that is not negative."""
-        return max(_order(square, crank + bound), -_order(square, crank - bound))
-
-    def far(bound: Fraction) -> int:
-        return _order(square, bound - crank)
-
-    signs = near(least), far(most), near(most), far(least)
+    # signs of |frame - crank| - bound and of frame + crank - bound for bounds that are not negative
+    near = [max(_order(square, crank + bound), -_order(square, crank - bound)) for bound in (least, most)]
+    far = [_order(square, bound - crank) for bound in (least, most)]
+    signs = near[0], far[1], near[1], far[0]
     blocked = ("stretched", most, signs[1] > 0), ("folded", least, signs[0] < 0)
     return FourBarRotation(
         KINDS[int(rotation_kind(*signs))],
@@ -131,8 +114,6 @@ def grashof_type(lengths: NDArray[Any]) -> NDArray[np.int8]:
     shortest link turns against all others.  Where the longest link is as long as the others together, they can only lie
     stretched along it.
 
-    Examples
-    --------
     >>> [TYPES[k] for k in grashof_type(np.array([[4, 2, 5, 5], [4, 2, 3, 5], [4, 3, 2, 2], [1, 1, 1, 9]]))]
     ['crank-rocker', 'change point', 'triple rocker', 'never assembled']
     """
@@ -150,18 +131,7 @@ def grashof_type(lengths: NDArray[Any]) -> NDArray[np.int8]:
 def type_of(*lengths: Fraction) -> str:
     """Type of one four-bar: frame, crank, coupler, rocker.
 
-    Examples
-    --------
     >>> type_of(Fraction(3), Fraction(1), Fraction(1), Fraction(1))  # it can only lie stretched
     'immovable'
     """
     return TYPES[int(grashof_type(np.array([lengths], dtype=object))[0])]
-
-
-def start_angle(l1: float, l2: float, l3: float, l4: float) -> float:
-    """Crank angle to start from: 0 if it is reached, else the middle of the reached angles in (0, pi)."""
-    if abs(l3 - l4) < abs(l1 - l2) < l3 + l4:
-        return 0.0
-    # cosines of the angles at which the crank pin is farthest from the rocker's pivot, and nearest to it
-    cosines = ((l1 * l1 + l2 * l2 - reach * reach) / (2.0 * l1 * l2) for reach in (abs(l3 - l4), l3 + l4))
-    return 0.5 * sum(math.acos(min(1.0, max(-1.0, cosine))) for cosine in cosines)

@@ -33,19 +33,10 @@ class CouplerCurve(NamedTuple):
 def closure_equations(mechanism: Mechanism) -> list[sympy.Expr]:
     """Return the equations of all joints as expressions that vanish, for export to other programs.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
+    They are in the symbols ``x_k``, ``y_k``, ``theta_k`` of the moving links k; two for a joint of mobility 1, one for
+    a pin in a slot, a gear pair (up to whole turns of its line of centres) or a cam, in the order of
+    ``mechanism.joints``.  Numbers are those given, as fractions (exact).
 
-    Returns
-    -------
-    list of sympy.Expr
-        In the symbols ``x_k``, ``y_k``, ``theta_k`` of the moving links k; two for a joint of mobility 1, one for a pin
-        in a slot, a gear pair (up to whole turns of its line of centres) or a cam, in the order of
-        ``mechanism.joints``.  Numbers are those given, as fractions (exact).
-
-    Examples
-    --------
     >>> from graphsynth import Mechanism
     >>> Mechanism.four_bar(2, 1, 2.5, 2.5).closure_equations()[:2]
     [x_1, y_1]
@@ -83,36 +74,16 @@ def _exact(joint: JointGeometry) -> JointGeometry:
 
 
 def coupler_curve(mechanism: Mechanism, name_or_link: str | int, at: tuple[float, float] | None = None) -> CouplerCurve:
-    """Return the equation of the curve of a coupler point, with its degree and circularity (exact).
+    """Return the equation of the curve of a named point, or of a point (x, y) of a link in its frame (exact).
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-        One in which two points of the link are held, each on a circle (by a link that turns about the frame) or on a
-        straight line (by a slider on the frame, or a slot in it): four-bar, slider-crank, elliptic trammel.
-    name_or_link : str or int
-        A named point, or a link.
-    at : (x, y), optional
-        The point of the link, in its frame.
+    Two points of the link must be held, each on a circle (by a link that turns about the frame) or on a straight line
+    (by a slider on the frame, or a slot in it): four-bar, slider-crank, elliptic trammel; `GeometryError` for another
+    mechanism.  The curve is the whole one, of both assembly modes; numbers are taken as the fractions they are.
 
-    Returns
-    -------
-    CouplerCurve
-        Of the whole curve, both assembly modes.  The numbers of the mechanism are taken as the fractions they are.
-
-    Raises
-    ------
-    GeometryError
-        Another kind of mechanism, or a point that does not exist.
-
-    Notes
-    -----
     With ``A = P - R(theta) a`` each condition is linear in ``cos theta`` and ``sin theta``; Cramer's rule and
     ``cos^2 + sin^2 = 1`` eliminate the angle.  For a four-bar it is Roberts' tricircular sextic: S. Roberts, On
     three-bar motion in plane space, Proc. London Math. Soc. 7 (1875) 14-23.
 
-    Examples
-    --------
     >>> from graphsynth import Mechanism
     >>> curve = Mechanism.four_bar(2, 1, 2.5, 2.5, coupler_point=(5, 0)).coupler_curve("P")
     >>> curve.degree, curve.circularity
@@ -170,7 +141,11 @@ def _held(
                 radius2 = sum((_number(p) - _number(q)) ** 2 for p, q in zip(at, on_other))
                 return (own, "circle"), (*map(_number, on_frame), radius2 ** _number(0.5))
             if isinstance(second, Prismatic):
-                return (own, "line"), _slider_line(second, frame, at)
+                # through the guide's line, shifted by the place of the point across the slide
+                turns = (second.angle_a, second.angle_b) if second.a == frame else (second.angle_b, second.angle_a)
+                (nx, ny, d), (mx, my, _) = _line(on_frame, turns[0]), _line((0.0, 0.0), turns[1])
+                dx, dy = (_number(p) - _number(q) for p, q in zip(at, on_other))
+                return (own, "line"), (nx, ny, d + mx * dx + my * dy)
     raise GeometryError(f"joint {joint.a}-{joint.b} holds no point of link {link} on a circle or a line of the frame")
 
 
@@ -182,13 +157,3 @@ def _line(at: tuple[float, float], angle: float) -> tuple[Any, Any, Any]:
 
     nx, ny = plain(-math.sin(angle)), plain(math.cos(angle))
     return nx, ny, nx * _number(at[0]) + ny * _number(at[1])
-
-
-def _slider_line(joint: Prismatic, frame: int, at: tuple[float, float]) -> tuple[Any, Any, Any]:
-    """Line of a point of a slider: through the guide's, shifted by the place of the point across the slide."""
-    first = joint.a == frame
-    guide, block = (joint.at_a, joint.at_b) if first else (joint.at_b, joint.at_a)
-    on_frame, on_block = (joint.angle_a, joint.angle_b) if first else (joint.angle_b, joint.angle_a)
-    nx, ny, d = _line(guide, on_frame)
-    mx, my, _ = _line((0.0, 0.0), on_block)
-    return nx, ny, d + mx * (_number(at[0]) - _number(block[0])) + my * (_number(at[1]) - _number(block[1]))

@@ -23,10 +23,7 @@ def ready(strategy: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
 
 
 def check_range(name: str, low: int, high: int, least: int, most: int) -> None:
-    """Refuse sizes that are not ordered or beyond what the strategy can draw.
-
-    >>> check_range("links", 4, 8, 4, 10)
-    """
+    """Refuse sizes that are not ordered or beyond what the strategy can draw."""
     for word, value in (("smallest", low), ("largest", high)):
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
             raise SpecError(f"{word} number of {name} is {value!r}; give a whole number from {least} to {most}")

@@ -12,30 +12,14 @@ from graphsynth.testing.extra import st
 _PRINTABLE = st.characters(exclude_categories=("C", "Z"), include_characters=" ")
 
 
-def toml_text(tables: Mapping[str, Any]) -> str:
-    """Write nested tables of strings, numbers, booleans and lists as TOML.
-
-    >>> print(toml_text({"scene": {"name": "x", "run": {"steps": [1, 2.5]}}}))
-    [scene]
-    name = "x"
-    <BLANKLINE>
-    [scene.run]
-    steps = [1, 2.5]
-    <BLANKLINE>
-    """
-    return "\n".join(_tables(tables, ()))
-
-
-def _tables(tables: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
+def toml_text(tables: Mapping[str, Any], path: tuple[str, ...] = ()) -> str:
+    """Write nested tables of strings, numbers, booleans and lists as TOML; ``path`` is the name of the whole."""
     plain = {key: value for key, value in tables.items() if not isinstance(value, Mapping)}
-    found = []
+    found = ""
     if path and (plain or not tables):
-        lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in plain.items()]
-        found.append("\n".join([f"[{'.'.join(path)}]", *lines]) + "\n")
-    for key, value in tables.items():
-        if isinstance(value, Mapping):
-            found += _tables(value, (*path, key))
-    return found
+        lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in plain.items()]
+        found = "".join([f"[{'.'.join(path)}]\n", *lines, "\n"])
+    return found + "".join(toml_text(value, (*path, key)) for key, value in tables.items() if key not in plain)
 
 
 def _lambda_linkage(draw: st.DrawFn) -> dict[str, Any]:

@@ -25,16 +25,10 @@ CLASSES = (*(kind for kind in TYPES if kind != "never assembled"), "never assemb
 
 @dataclass(frozen=True)
 class FourBarLengths:
-    """Lengths of a four-bar in the order of the loop, exact, and its class.
+    """Lengths of a four-bar in the order of the loop, exact, and its class, one of ``CLASSES``.
 
-    Attributes
-    ----------
-    ground, crank, coupler, rocker : Fraction
-        Positive.
-    type : str
-        One of ``CLASSES``: Grashof's rule with the shortest link, or "triple rocker" (not Grashof), "change point"
-        (equality), "immovable" (the longest is as long as the others together: it can only lie stretched), "never
-        assembled" (it is longer).
+    That is Grashof's rule with the shortest link, or "triple rocker" (not Grashof), "change point" (equality),
+    "immovable" (the longest is as long as the others together: it can only lie stretched), "never assembled".
     """
 
     ground: Fraction
@@ -57,24 +51,24 @@ def _of_class(draw: st.DrawFn, kind: str, scale: int) -> FourBarLengths:
     """Lengths built so that they have the class, as whole numbers over ``scale``."""
     part = st.integers(1, 20 * scale)
     near = st.just(1) | part  # one unit away from a change of the class
-    if kind in _SHORT:
-        # shortest s; the two middle ones s + x, s + y; longest s + x + y - d with 1 <= d: s + l < p + q
-        s, x, y = draw(part), draw(part), draw(part)
-        longest = s + x + y - min(draw(near), min(x, y))
-        middle = draw(st.permutations((s + x, s + y, longest)))
-        lengths = [*middle[: _SHORT[kind]], s, *middle[_SHORT[kind] :]]
-    elif kind == "change point":
-        s, x, y = draw(part), draw(st.integers(0, 20 * scale)), draw(st.integers(0, 20 * scale))
-        lengths = list(draw(st.permutations((s, s + x, s + y, s + x + y))))
-    elif kind == "triple rocker":
-        # longest above p + q - s, below p + q + s
-        s, x, y = draw(st.integers(2, 20 * scale)), draw(st.integers(0, 20 * scale)), draw(st.integers(0, 20 * scale))
-        longest = s + x + y + min(draw(near), 2 * s - 1)
-        lengths = list(draw(st.permutations((s, s + x, s + y, longest))))
+    more = part if kind in _SHORT else st.integers(0, 20 * scale)
+    if kind in ("immovable", "never assembled"):
+        three = [draw(part) for _ in range(3)]
+        lengths = [*three, sum(three) + (0 if kind == "immovable" else draw(near))]
     else:
-        a, b, c = draw(part), draw(part), draw(part)
-        more = 0 if kind == "immovable" else draw(near)
-        lengths = list(draw(st.permutations((a, b, c, a + b + c + more))))
+        # shortest s; the two middle ones s + x, s + y; the longest below their sum less s, that sum, or up to 2 s above
+        s, x, y = draw(st.integers(2, 20 * scale) if kind == "triple rocker" else part), draw(more), draw(more)
+        above = 0
+        if kind in _SHORT:
+            above = -min(draw(near), x, y)
+        elif kind == "triple rocker":
+            above = min(draw(near), 2 * s - 1)
+        lengths = [s, s + x, s + y, s + x + y + above]
+    if kind in _SHORT:
+        middle = draw(st.permutations(lengths[1:]))
+        lengths = [*middle[: _SHORT[kind]], lengths[0], *middle[_SHORT[kind] :]]
+    else:
+        lengths = list(draw(st.permutations(lengths)))
     ground, crank, coupler, rocker = (Fraction(length, scale) for length in lengths)
     assume(type_of(ground, crank, coupler, rocker) == kind)
     return FourBarLengths(ground, crank, coupler, rocker, kind)
@@ -86,7 +80,7 @@ def four_bars(*types: str, scale: int = 20) -> st.SearchStrategy[FourBarLengths]
     Parameters
     ----------
     *types : str
-        Of ``CLASSES``; all but "never assembled" by default.
+        Of ``CLASSES``, others are a `SpecError`; all but "never assembled" by default.
     scale : int
         The lengths are multiples of ``1 / scale``.
 
@@ -94,11 +88,6 @@ def four_bars(*types: str, scale: int = 20) -> st.SearchStrategy[FourBarLengths]
     -------
     SearchStrategy
         Of `FourBarLengths`; the class is exact.
-
-    Raises
-    ------
-    SpecError
-        An unknown class, or a scale that is not positive.
 
     Examples
     --------
@@ -135,7 +124,8 @@ def _mechanisms(draw: st.DrawFn, of: st.SearchStrategy[MechanismGraph], prismati
     turns = [0.0 if k == graph.frame else draw(_TURN) for k in range(graph.links)]
     joints: list[Any] = []
     for k, (joint, place) in enumerate(zip(graph.joints, places)):
-        a, b = (_seen_from(place, turns[link]) for link in (joint.a, joint.b))
+        seen = [complex(*place) * cmath.exp(-1j * turns[link]) for link in (joint.a, joint.b)]
+        a, b = ((point.real, point.imag) for point in seen)
         if k == sliding:
             angle = draw(_ANGLE)
             joints.append(Prismatic(joint.a, joint.b, a, b, angle - turns[joint.a], angle - turns[joint.b]))
@@ -145,12 +135,6 @@ def _mechanisms(draw: st.DrawFn, of: st.SearchStrategy[MechanismGraph], prismati
     frame, link = (joint.a, joint.b) if joint.a == graph.frame else (joint.b, joint.a)
     pose = tuple((0.0, 0.0, angle) for angle in turns)
     return Mechanism(graph, tuple(joints), (Driver(frame, link),), pose=pose)
-
-
-def _seen_from(place: tuple[float, float], turn: float) -> tuple[float, float]:
-    """Coordinates of a point in a frame at the origin that is turned by ``turn``."""
-    c, s = math.cos(turn), math.sin(turn)
-    return c * place[0] + s * place[1], -s * place[0] + c * place[1]
 
 
 def mechanisms(min_links: int = 4, max_links: int = 8, *, prismatic: bool = False) -> st.SearchStrategy[Mechanism]:
@@ -172,20 +156,6 @@ def mechanisms(min_links: int = 4, max_links: int = 8, *, prismatic: bool = Fals
     SearchStrategy
         Every graph of `mechanism_graphs`, driven by any of its links on the frame; joints on different points of a
         grid of 1/8 in a square of side 4, often in line; link frames at the origin and turned at random.
-
-    Raises
-    ------
-    SpecError
-        Sizes out of range.
-
-    Examples
-    --------
-    >>> from hypothesis import given, settings
-    >>> @settings(max_examples=5)
-    ... @given(mechanisms(4, 4))
-    ... def four_links(m):
-    ...     assert m.graph.links == 4
-    >>> four_links()
     """
     check_range("links", min_links, max_links, 4, 10)
     of = mechanism_graphs(min_links, max_links)
@@ -197,9 +167,6 @@ def _assembled(bar: FourBarLengths) -> tuple[Mechanism, str]:
     graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     moving = Revolute(0, 1), Revolute(1, 2, (crank, 0.0)), Revolute(2, 3, (coupler, 0.0), (rocker, 0.0))
     return Mechanism(graph, (*moving, Revolute(0, 3, (ground, 0.0))), (Driver(0, 1),)), bar.type
-
-
-_BORDERLINE = ("change point", "immovable", "never assembled")
 
 
 def four_bar_mechanisms(*types: str) -> st.SearchStrategy[tuple[Mechanism, str]]:
@@ -216,21 +183,8 @@ def four_bar_mechanisms(*types: str) -> st.SearchStrategy[tuple[Mechanism, str]]
     SearchStrategy
         Pairs of mechanism and class; link 1 is the crank and driven, the frame's second joint lies on +x.
 
-    Raises
-    ------
-    SpecError
-        An unknown class.
-
-    Examples
-    --------
-    >>> from hypothesis import given, settings
-    >>> @settings(max_examples=5)
-    ... @given(four_bar_mechanisms("double crank"))
-    ... def is_double_crank(found):
-    ...     assert found[1] == "double crank"
-    >>> is_double_crank()
     """
-    return four_bars(*types or (kind for kind in CLASSES if kind not in _BORDERLINE)).map(_assembled)
+    return four_bars(*types or (*_SHORT, "triple rocker")).map(_assembled)
 
 
 Pose = tuple[float, float, float]
@@ -270,15 +224,6 @@ def platforms(*, degenerate: bool = True) -> st.SearchStrategy[ParallelPlatform]
     -------
     SearchStrategy
         Of `ParallelPlatform`; coordinates within 2, lengths 0.05 to 3.
-
-    Examples
-    --------
-    >>> from hypothesis import given, settings
-    >>> @settings(max_examples=5)
-    ... @given(platforms())
-    ... def three_legs(platform):
-    ...     assert len(platform.b) == 3
-    >>> three_legs()
     """
     return _platforms(degenerate)
 
@@ -327,14 +272,5 @@ def platform_poses(
     -------
     hypothesis strategy
         Of triples ``(ParallelPlatform, Pose, mode)``.
-
-    Examples
-    --------
-    >>> from hypothesis import given, settings
-    >>> @settings(max_examples=5)
-    ... @given(platform_poses(reached=True))
-    ... def legs_reach(found):
-    ...     assert found[0].inverse(*found[1:]).reachable
-    >>> legs_reach()
     """
     return _platform_poses(degenerate, reached)

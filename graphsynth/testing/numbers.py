@@ -43,14 +43,6 @@ def finite_numbers() -> st.SearchStrategy[float]:
     )
 
 
-def _neighbours(low: float, steps: int) -> tuple[float, float]:
-    """Bounds that are some doubles apart, finite."""
-    high = low
-    for _ in range(steps):
-        high = math.nextafter(high, math.inf)
-    return (low, high) if math.isfinite(high) else (math.nextafter(low, 0.0), low)
-
-
 @st.composite
 def _bounds(draw: st.DrawFn, empty: bool, unbounded: bool) -> tuple[float, float]:
     kinds = ["point", "bounded", "narrow"] + ["below", "above", "entire"] * unbounded + ["empty"] * empty
@@ -61,7 +53,10 @@ def _bounds(draw: st.DrawFn, empty: bool, unbounded: bool) -> tuple[float, float
     if kind == "point":
         return low, low
     if kind == "narrow":
-        return _neighbours(low, draw(st.integers(1, 3)))
+        high = low
+        for _ in range(draw(st.integers(1, 3))):
+            high = math.nextafter(high, math.inf)
+        return (low, high) if math.isfinite(high) else (math.nextafter(low, 0.0), low)
     return (-math.inf if kind in ("below", "entire") else low), (math.inf if kind in ("above", "entire") else high)
 
 
@@ -80,7 +75,7 @@ def intervals(
     Parameters
     ----------
     shape : int or tuple of int
-        Of the array; a single interval by default.
+        Of the array, else a `SpecError`; a single interval by default.
     empty, unbounded : bool
         Whether empty and unbounded ones are drawn.
 
@@ -88,11 +83,6 @@ def intervals(
     -------
     SearchStrategy
         Of `Interval`, made from float bounds.
-
-    Raises
-    ------
-    SpecError
-        A shape that is none.
 
     Examples
     --------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from functools import cache
+from typing import Any
 
 from graphsynth.core.errors import SpecError
 from graphsynth.structure.connectivity import components_of
@@ -13,20 +14,11 @@ from graphsynth.testing.extra import check_range, ready, st
 
 #: Largest chains that are listed in a moment: 230 of one degree of freedom.
 MOST_LINKS = 10
-
-
 _SPACES = st.sampled_from((3, 2, 4, 5, 6))
 
 
-@cache
-def _below(number: int) -> st.SearchStrategy[int]:
-    """Whole numbers from 0, kept: making and checking a strategy takes longer than drawing from it."""
-    return st.integers(0, number - 1)
-
-
-@cache
-def _mobilities(space: int) -> st.SearchStrategy[int]:
-    return st.integers(1, space - 1)
+#: Whole numbers between bounds, kept: making and checking a strategy takes longer than drawing from it.
+_between = cache(st.integers)
 
 
 @cache
@@ -36,7 +28,7 @@ def _pairs(links: int) -> st.SearchStrategy[list[tuple[int, int]]]:
 
 @cache
 def _frames(links: int) -> st.SearchStrategy[int | None]:
-    return st.none() | _below(links)
+    return st.none() | _between(0, links - 1)
 
 
 @st.composite
@@ -46,8 +38,8 @@ def _graphs(
     links, space = draw(sizes), draw(spaces)
     chosen = set(draw(_pairs(links))) if links > 1 else set()
     if connected:
-        chosen |= {(draw(_below(b)), b) for b in range(1, links)}
-    joints = [(a, b, draw(_mobilities(space))) for a, b in sorted(chosen)]
+        chosen |= {(draw(_between(0, b - 1)), b) for b in range(1, links)}
+    joints = [(a, b, draw(_between(1, space - 1))) for a, b in sorted(chosen)]
     return MechanismGraph(links, joints, frame=draw(_frames(links)), space=space)
 
 
@@ -61,7 +53,7 @@ def graphs(
     Parameters
     ----------
     min_links, max_links : int
-        Sizes, 1 to 60.
+        Sizes, 1 to 60; others are a `SpecError`.
     space : int, optional
         Mobility of a free link, 2 to 6; any of them by default.
     connected : bool
@@ -71,11 +63,6 @@ def graphs(
     -------
     SearchStrategy
         Shrinks to a single link.
-
-    Raises
-    ------
-    SpecError
-        Sizes or a space out of range.
 
     Examples
     --------
@@ -114,7 +101,7 @@ def chains(
     Parameters
     ----------
     min_links, max_links : int
-        Sizes, 4 to 10; those of the wrong parity are left out.
+        Sizes, 4 to 10; those of the wrong parity are left out, and nothing between them is a `SpecError`.
     mobility : int
         Degrees of freedom W, 1 to 4.
     fractionated : bool
@@ -126,11 +113,6 @@ def chains(
     -------
     SearchStrategy
         Shrinks to the first chain of the smallest size.  Exact: drawn from the complete list.
-
-    Raises
-    ------
-    SpecError
-        Sizes out of range, or no chain between them.
 
     Examples
     --------
@@ -147,16 +129,13 @@ def chains(
             f"no chain of mobility {mobility} has {min_links} to {max_links} links; "
             f"give sizes from {mobility + 3}, every other one"
         )
-    return st.deferred(lambda: _prepared(sizes, mobility, fractionated, relabel))
 
+    def prepared() -> st.SearchStrategy[MechanismGraph]:
+        for links in sizes:  # listed before the first draw, which hypothesis times
+            _listed(links, mobility, fractionated)
+        return _chains(sizes, mobility, fractionated, relabel)
 
-def _prepared(
-    sizes: tuple[int, ...], mobility: int, fractionated: bool, relabel: bool
-) -> st.SearchStrategy[MechanismGraph]:
-    """List the chains before the first draw, which hypothesis times."""
-    for links in sizes:
-        _listed(links, mobility, fractionated)
-    return _chains(sizes, mobility, fractionated, relabel)
+    return st.deferred(prepared)
 
 
 @st.composite
@@ -208,19 +187,13 @@ def _values(graph: MechanismGraph) -> dict[str, int]:
 @st.composite
 def _specs(draw: st.DrawFn, of: st.SearchStrategy[MechanismGraph], feasible: bool) -> StructuralSpec:
     values = _values(draw(of))
-    question: dict[str, int | tuple[int | None, int | None]] = {"W": values["W"], "n": values["n"], "p2": values["p2"]}
+    question: dict[str, Any] = {"W": values["W"], "n": values["n"], "p2": values["p2"]}
     for symbol in draw(st.sets(st.sampled_from(_FREE), max_size=5)):
         value = values[symbol]
         below, above = draw(st.tuples(st.integers(0, 3), st.integers(0, 3)))
         least = 1 if symbol in ("p", "t0") else 0
         low, high = max(least, value - below), value + above
-        kind = draw(st.sampled_from(("fixed", "between", "most", "least")))
-        bounds: dict[str, tuple[int | None, int | None]] = {
-            "between": (low, high),
-            "most": (None, high),
-            "least": (low, None),
-        }
-        question[symbol] = bounds.get(kind, value)
+        question[symbol] = draw(st.sampled_from((value, (low, high), (None, high), (low, None))))
     if not feasible:
         symbol = draw(st.sampled_from(_FREE))
         question[symbol] = values[symbol] + draw(st.integers(-1, 3)) if values[symbol] > 1 else values[symbol] + 1
@@ -242,20 +215,6 @@ def specs(min_links: int = 4, max_links: int = 8, *, feasible: bool = True) -> s
     -------
     SearchStrategy
         Mobility, moving links and joints of mobility 2 are always given, so that the answers are finite.
-
-    Raises
-    ------
-    SpecError
-        Sizes out of range.
-
-    Examples
-    --------
-    >>> from hypothesis import given, settings
-    >>> @settings(max_examples=5)
-    ... @given(specs())
-    ... def a_mechanism_answers_it(spec):
-    ...     assert spec.solve()
-    >>> a_mechanism_answers_it()
     """
     check_range("links", min_links, max_links, 4, 10)
     of = mechanism_graphs(min_links, max_links)

@@ -32,6 +32,7 @@ _MATHEMATICS = (
 )
 #: What code of kernels may call.
 ALLOWED = frozenset(_RUNTIME.split() + _MATHEMATICS.split())
+_BUILD = (sys.executable, "-m", "graphsynth.core.native.build")
 _ENVIRONMENT = {"NUMBA_OPT": "0", "PYTHONHASHSEED": "0", "GRAPHSYNTH_NATIVE": "0", "NUMBA_DISABLE_INTEL_SVML": "1"}
 
 
@@ -45,17 +46,8 @@ class Entry(NamedTuple):
     slots_out: int
 
 
-class Lowered(NamedTuple):
-    """All kernels as one module of LLVM code, not optimised."""
-
-    code: bytes
-    entries: list[Entry]
-    named: list[tuple[str, str]]
-    digests: dict[str, str]  # of these kernels and of those that they call
-
-
-def lower(signatures: list[Signature]) -> Lowered:
-    """Let numba type and lower the kernels."""
+def lower(signatures: list[Signature], levels: int) -> tuple[bytes, str]:
+    """Let numba lower the kernels, and what they call, as one module of LLVM code, not optimised; and their table."""
     import llvmlite.binding as ll
     from llvmlite import ir
     from numba.core.registry import cpu_target
@@ -76,10 +68,19 @@ def lower(signatures: list[Signature]) -> Lowered:
     entries: list[Entry] = []
     calls = ir.Module("entries")
     for signature in signatures:
-        kernel = _found(signature.kernel)
+        place, _, own = signature.kernel.rpartition(".")
+        try:
+            kernel = getattr(import_module(place), own)
+        except (ImportError, AttributeError):
+            name = signature.kernel
+            raise SystemExit(
+                f"{LIST.name} names {name}, which is not there: correct the line, or take it out"
+            ) from None
         try:
             types = parse(signature.types)
-            compiled = _compiled(kernel, types)
+            kernel.dispatcher.compile(types)
+            compiled = kernel.dispatcher.overloads[types]
+            compiled.library._ensure_finalized()
         except Exception as error:
             error.add_note(f"The list has {signature.kernel}({signature.types}).")
             raise
@@ -93,7 +94,8 @@ def lower(signatures: list[Signature]) -> Lowered:
     merged = ll.parse_assembly(str(create_nrt_module(context)[0]))
     for name in sorted({function.name for module in modules for function in module.functions}):
         if name.startswith("__excinfo_unwrap_args"):  # would make Python objects of what an exception tells
-            _write_nothing(ir.Function(calls, ir.FunctionType(ir.PointerType(), [ir.PointerType()]), name))
+            nothing = ir.Function(calls, ir.FunctionType(ir.PointerType(), [ir.PointerType()]), name)
+            ir.IRBuilder(nothing.append_basic_block()).ret(ir.Constant(nothing.ftype.return_type, None))
     for module in modules:
         for function in module.functions:
             if not function.is_declaration:
@@ -108,7 +110,7 @@ def lower(signatures: list[Signature]) -> Lowered:
         name: kernel for name, kernel in kernels().items() if kernel.compiled or inlined <= kernel.targetoptions.items()
     }
     digests = {name: kernel.digest for name, kernel in parts.items()}
-    return Lowered(merged.as_bitcode(), entries, named, digests)
+    return merged.as_bitcode(), table(entries, named, digests, levels)
 
 
 def _collect_modules() -> list[Any]:
@@ -123,31 +125,11 @@ def _collect_modules() -> list[Any]:
         library._finalized = True
         modules.append(library._final_module)
 
-    def without_place(convention: Any, kind: Any, arguments: Any, loc: Any, name: Any) -> Any:
-        return told(convention, kind, arguments, None, name)
-
     CPUCodeLibrary.finalize = finalize
     JITCodeLibrary.get_pointer_to_function = lambda library, name: 0
     JITCPUCodegen.set_env = lambda codegen, name, env: None
-    CPUCallConv.build_excinfo_struct = without_place
+    CPUCallConv.build_excinfo_struct = lambda own, kind, values, loc, name: told(own, kind, values, None, name)
     return modules
-
-
-def _found(name: str) -> Any:
-    """Return a kernel by its name."""
-    module, _, function = name.rpartition(".")
-    try:
-        return getattr(import_module(module), function)
-    except (ImportError, AttributeError):
-        raise SystemExit(f"{LIST.name} names {name}, which is not there: correct the line, or take it out") from None
-
-
-def _compiled(kernel: Any, types: tuple[Any, ...]) -> Any:
-    """Let numba lower a kernel; what it calls comes along."""
-    kernel.dispatcher.compile(types)
-    compiled = kernel.dispatcher.overloads[types]
-    compiled.library._ensure_finalized()
-    return compiled
 
 
 def _write_entry(kernel: Any, name: str) -> tuple[int, int]:
@@ -182,13 +164,6 @@ def _write_entry(kernel: Any, name: str) -> tuple[int, int]:
         count += 1
     builder.ret(code)
     return len(kinds), count
-
-
-def _write_nothing(function: Any) -> None:
-    """Let a function return a null pointer."""
-    from llvmlite import ir
-
-    ir.IRBuilder(function.append_basic_block()).ret(ir.Constant(function.ftype.return_type, None))
 
 
 def emit(code: bytes, triple: str, processor: str, level: int) -> bytes:
@@ -231,16 +206,15 @@ def emit(code: bytes, triple: str, processor: str, level: int) -> bytes:
     return bytes(machine.emit_object(module))
 
 
-def table(lowered: Lowered, levels: int) -> str:
+def table(entries: list[Entry], named: list[tuple[str, str]], digests: dict[str, str], levels: int) -> str:
     """Return the table of kernels in C."""
-    entries = lowered.entries
     names = [[f"entry_{k}_{level}" for level in range(levels)] for k in range(len(entries))]
     sizes = {
         "MAX_IN": max(entry.slots_in for entry in entries) + 2,
         "MAX_OUT": max(entry.slots_out for entry in entries) + 1,
         "MAX_ARRAYS": max(entry.types.count("A") for entry in entries) + 1,
     }
-    rows: dict[str, list[int]] = {name: [] for name in sorted(lowered.digests)}
+    rows: dict[str, list[int]] = {name: [] for name in sorted(digests)}
     for k, entry in enumerate(entries):
         rows[entry.signature.kernel].append(k)
     overloads = (
@@ -251,13 +225,13 @@ def table(lowered: Lowered, levels: int) -> str:
         f"enum {{ {', '.join(f'{name} = {size}' for name, size in sizes.items())}, KERNELS = {len(rows)} }};",
         *(f"extern int32_t {name}(const uint64_t *, uint64_t *, void **);" for code in names for name in code),
         "static Named named[] = {",
-        *(f'{{"{name}", "{fields}", NULL}},' for name, fields in [*lowered.named, ("", "")]),
+        *(f'{{"{name}", "{fields}", NULL}},' for name, fields in [*named, ("", "")]),
         "};",
         "static Overload overloads[] = {",
         *overloads,
         "};",
         "static const Kernel kernels[] = {",
-        *(f'{{"{name}", "{lowered.digests[name]}", {min(k, default=0)}, {len(k)}}},' for name, k in rows.items()),
+        *(f'{{"{name}", "{digests[name]}", {min(k, default=0)}, {len(k)}}},' for name, k in rows.items()),
         "};",
         "",
     ]
@@ -266,55 +240,25 @@ def table(lowered: Lowered, levels: int) -> str:
 
 def build(wanted: str, path: Path) -> None:
     """Build the library for a kind of machine."""
-    lowered = lower(sorted(set(read_list())))
     machine, _, system = wanted.partition("-")
     triple = {"linux-gnu": "unknown-linux-gnu", "macos": "apple-macosx11.0", "windows-gnu": "pc-windows-gnu"}[system]
     processors = LEVELS.get(machine, ("",))
+    code, header = lower(sorted(set(read_list())), len(processors))
     with TemporaryDirectory() as name, ThreadPoolExecutor(2) as pool:
         folder = Path(name)
-        (folder / "kernels.bc").write_bytes(lowered.code)
-        (folder / "table.h").write_text(table(lowered, len(processors)))
-        objects = [
-            [
-                sys.executable,
-                "-m",
-                "graphsynth.core.native.build",
-                "--emit",
-                str(folder),
-                f"{machine}-{triple}",
-                processor,
-                str(k),
-            ]
-            for k, processor in enumerate(processors)
-        ]
-        list(pool.map(lambda command: subprocess.run(command, check=True), objects))
+        (folder / "kernels.bc").write_bytes(code)
+        (folder / "table.h").write_text(header)
+        emit_one = [*_BUILD, "--emit", str(folder), f"{machine}-{triple}"]
+        own = [[*emit_one, processor, str(k)] for k, processor in enumerate(processors)]
+        list(pool.map(lambda command: subprocess.run(command, check=True), own))
         place = f"{wanted}.2.17" if system == "linux-gnu" else wanted
-        command = [
-            sys.executable,
-            "-m",
-            "ziglang",
-            "cc",
-            "-target",
-            place,
-            "-std=c11",
-            "-O2",
-            "-shared",
-            "-fPIC",
-            "-fvisibility=hidden",
-            "-fno-sanitize=all",
-            f"-DLEVELS={len(processors)}",
-            "-I",
-            ".",
-            "-Wl,--gc-sections,--build-id=none",
-            "-s",
-            "-o",
-            "out.so",
-            "runtime.c",
-            *(f"{k}.o" for k in range(len(processors))),
-            "-lm",
-        ]
+        objects = " ".join(f"{k}.o" for k in range(len(processors)))
+        options = (
+            f"cc -target {place} -std=c11 -O2 -shared -fPIC -fvisibility=hidden -fno-sanitize=all "
+            f"-DLEVELS={len(processors)} -I . -Wl,--gc-sections,--build-id=none -s -o out.so runtime.c {objects} -lm"
+        )
         (folder / "runtime.c").write_bytes((FOLDER / "runtime.c").read_bytes())
-        subprocess.run(command, cwd=folder, check=True)
+        subprocess.run([sys.executable, "-m", "ziglang", *options.split()], cwd=folder, check=True)
         path.write_bytes((folder / "out.so").read_bytes())
 
 
@@ -331,11 +275,7 @@ def main() -> None:
         (Path(folder) / f"{level}.o").write_bytes(emit(code, triple, processor, int(level)))
         return
     if any(os.environ.get(name) != value for name, value in _ENVIRONMENT.items()):
-        os.execve(
-            sys.executable,
-            [sys.executable, "-m", "graphsynth.core.native.build", *sys.argv[1:]],
-            os.environ | _ENVIRONMENT,
-        )
+        os.execve(sys.executable, [*_BUILD, *sys.argv[1:]], os.environ | _ENVIRONMENT)
     build(options.target, options.output or FOLDER / f"{options.target}.so")
 
 

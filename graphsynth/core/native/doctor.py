@@ -39,19 +39,19 @@ def kernels() -> dict[str, Any]:
 
 def examine() -> list[Finding]:
     """Look at all kernels of the package; in a session also at what it has compiled so far."""
-    return [_examined(name, kernel) for name, kernel in kernels().items()]
-
-
-def _examined(name: str, kernel: Any) -> Finding:
     from graphsynth.core.compilation import kept
 
-    entry = kernel.entry()
-    if entry is None:
-        why = "not in the library" if library.contents() else f"no library: {library.reason}"
-    elif entry[1] != kernel.digest:
-        why = "their sources have changed since the library was made"
-    elif kernel.compiled:
-        why = "called with types that are not in the library"
-    else:
-        return Finding(name, LIBRARY if entry[2] else INSIDE, "", sum(calls for _, calls in entry[2]))
-    return Finding(name, KEPT if kept(kernel) else MEMORY if kernel.compiled else COMPILED, why, 0)
+    found = []
+    for name, kernel in kernels().items():
+        entry = kernel.entry()
+        if entry is None:
+            why = "not in the library" if library.contents() else f"no library: {library.reason}"
+        elif entry[1] != kernel.digest:
+            why = "their sources have changed since the library was made"
+        elif kernel.compiled:
+            why = "called with types that are not in the library"
+        else:
+            found.append(Finding(name, LIBRARY if entry[2] else INSIDE, "", sum(calls for _, calls in entry[2])))
+            continue
+        found.append(Finding(name, KEPT if kept(kernel) else MEMORY if kernel.compiled else COMPILED, why, 0))
+    return found

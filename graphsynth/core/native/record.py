@@ -69,22 +69,18 @@ def united(signatures: set[Signature]) -> set[Signature]:
     return found
 
 
-def _commands() -> list[list[str]]:
-    """Return the commands of the README, the shipped scenes and the tests that run the documentation."""
+def main(arguments: list[str]) -> None:
+    """Run the commands of the README, the shipped scenes and the documentation's tests, or one; write the list."""
     program, tests = [sys.executable, "-m", "graphsynth"], [sys.executable, "-m", "pytest", "-n", "0", "-q", "-m", ""]
     readme = re.findall(r"^\$ graphsynth (.*)$", (_ROOT / "README.md").read_text("utf-8"), re.MULTILINE)
     scenes = [f"run {path.stem}" for path in sorted((_ROOT / "catalog" / "scenes").glob("*.toml"))]
     pages = [str(_ROOT / "tests" / name) for name in ("test_docs.py", "test_doc_commands.py")]
-    return [*([*program, *line.split()] for line in [*readme, *scenes]), [*tests, f"--rootdir={_ROOT}", *pages]]
-
-
-def main(arguments: list[str]) -> None:
-    """Run the commands, and write the list."""
+    commands = [*([*program, *line.split()] for line in [*readme, *scenes]), [*tests, f"--rootdir={_ROOT}", *pages]]
     with TemporaryDirectory() as folder:
         calls = Path(folder) / "calls"
         calls.touch()
         environment = os.environ | {VARIABLE: str(calls), "GRAPHSYNTH_NATIVE": "0", "PYTHONPATH": str(_ROOT)}
-        for command in [arguments] if arguments else _commands():
+        for command in [arguments] if arguments else commands:
             print(*command, file=sys.stderr)  # noqa: T201
             subprocess.run(command, cwd=folder, env=environment, stdout=subprocess.DEVNULL, check=True)
         lines = calls.read_text("utf-8").splitlines()

@@ -109,6 +109,8 @@ def _arguments(tokens: list[str]) -> list[tuple[str, Any]]:
 
 
 def _argument(token: str, tokens: list[str]) -> Any:
+    from ast import literal_eval
+
     from numba import types
     from numba.np.numpy_support import from_dtype
     from numpy import dtype
@@ -125,16 +127,10 @@ def _argument(token: str, tokens: list[str]) -> Any:
     if token == "none":
         return types.none
     if token.startswith("="):
-        return types.Omitted(_literal(token[1:]))
+        return types.Omitted(literal_eval(token[1:]))
     number, _, rest = token.partition("[")
     kind = types.boolean if number == "b1" else from_dtype(dtype(number))
     return types.Array(kind, int(rest[0]), rest[1], readonly=rest[2] == "r") if rest else kind
-
-
-def _literal(text: str) -> Any:
-    from ast import literal_eval
-
-    return literal_eval(text)
 
 
 def code_of(kind: Any, named: Callable[[str, str], int]) -> str:

@@ -20,16 +20,9 @@ _COMPILATION = Path(__file__).parents[1] / "compilation.py"  # no code of its ow
 
 @cache
 def source_digest(module: Path, root: Path = _ROOT) -> str:
-    """Digest of a source file and of all modules of the package that it imports, directly or through others.
+    """Digest of a source file and of all modules of the package, in ``root``, that it imports, directly or not.
 
     Comments and docstrings do not count.
-
-    Parameters
-    ----------
-    module : Path
-        The source file.
-    root : Path, optional
-        Folder that holds the package.
     """
     digest = sha256()
     for path in sorted(sources(module, root), key=str):
@@ -51,18 +44,13 @@ def sources(module: Path, root: Path = _ROOT) -> set[Path]:
 
 @cache
 def _read_source(path: Path, root: Path) -> tuple[str, list[Path]]:
-    """Return a source file without comments and docstrings, and the modules of the package that it imports."""
+    """Return a source file without comments and docstrings, and the files of the package that it imports."""
     text = _BLANK.sub("\n", _UNREAD.sub(r"\1", path.read_text("utf-8")))
-    return text, _imported(text, root)
-
-
-def _imported(source: str, root: Path) -> list[Path]:
-    """Source files of the package that a module names in its import lines."""
     paths = []
-    for name, parts in _IMPORT.findall(source):
+    for name, parts in _IMPORT.findall(text):
         base = root.joinpath(*name.split("."))
         modules = [base / f"{part}.py" for part in re.findall(r"\w+", parts)]
         package = base / "__init__.py"
         found = [path if path.is_file() else package for path in modules] or [package]
         paths += [path for path in (base.with_suffix(".py"), *found) if path.is_file() and path != _COMPILATION]
-    return paths
+    return text, paths
