@@ -38,9 +38,9 @@ def test_tracks_of_other_lengths_and_places_that_do_not_exist_are_refused():
         linkage_animation(sketch, {"A": [0.0, math.nan]})
 
 
-def test_the_lambda_linkage_says_where_it_jams():
+def test_the_lambda_linkage_says_where_it_binds():
     svg = lambda_animation(LambdaLinkage(2.0, 1.0, 2.5, 2.5), lambda f: f < math.pi, frames=12)
-    shown = re.search(r'B jams</text><animate attributeName="display"[^>]*values="([^"]*)"', svg)[1].split(";")
+    shown = re.search(r'B binds</text><animate attributeName="display"[^>]*values="([^"]*)"', svg)[1].split(";")
     assert shown == ["inline"] * 6 + ["none"] * 7
 
 

@@ -115,10 +115,10 @@ def test_lambda_run_reproduces_the_published_values(tmp_path: Path) -> None:
     assert math.isclose(margins["clearance left at the worst crank angle"], -0.03509927307354575852847, rel_tol=1e-12)
     assert math.isclose(margins["smallest clearance"], 0.06509927307354575852847, rel_tol=1e-13)
     assert math.isclose(margins["largest axis tilt"], 0.0151614793250201376610981, rel_tol=1e-13)
-    jam = next(t for t in report["tables"] if t.title.startswith("Jamming"))
+    jam = next(t for t in report["tables"] if t.title.startswith("Binding"))
     rows = {row[0]: row[1:] for row in jam.rows}
-    assert rows["jam arc 1"] == ("27.05922033° to 152.94077967°", "26.45190077° to 153.54809923°")
-    assert rows["jam arc 2"] == ("207.05922033° to 332.94077967°", "206.45190077° to 333.54809923°")
+    assert rows["interval of binding 1"] == ("27.05922033° to 152.94077967°", "26.45190077° to 153.54809923°")
+    assert rows["interval of binding 2"] == ("207.05922033° to 332.94077967°", "206.45190077° to 333.54809923°")
 
 
 def test_lambda_run_writes_a_whole_folder(tmp_path: Path) -> None:

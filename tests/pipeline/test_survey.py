@@ -205,8 +205,8 @@ def test_the_best_are_the_best_of_all_rows_whatever_is_certified() -> None:
         order, scores = brute_force(scene)
         survey = report["survey"]
         most = scene.mechanism.certify
-        assert survey.order.ranked == len(order)
-        assert survey.order.scores == pytest.approx(scores[:most], abs=1e-10)
+        assert survey.ranked == len(order)
+        assert survey.scores == pytest.approx(scores[:most], abs=1e-10)
         assert list(survey.chosen[:1]) == order[:1]
         assert list(survey.chosen) == order[:most]
         ranked += len(order) > most

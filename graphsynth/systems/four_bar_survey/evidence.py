@@ -39,7 +39,7 @@ def _box(context: Any) -> Any:
 
 
 def arc_ends(context: Any, effort: Effort) -> Problem:
-    """Measure the ends of the jam arcs."""
+    """Measure the ends of the intervals of binding."""
     from graphsynth.evidence.jamming import arc_problem
 
     return arc_problem(_box(context), context.scene.mechanism.bearing.condition, effort)

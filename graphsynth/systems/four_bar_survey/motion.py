@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.jamming.bearing.bearing import Bearing
-from graphsynth.kinematics.engine.batch import simulate_batch
+from graphsynth.kinematics.engine.batch import BatchMotion, simulate_batch
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.joints import COLUMNS
 from graphsynth.mechanism.model import Mechanism
@@ -28,10 +28,10 @@ _MEETING = 1e-12
 class Moved:
     """What motion says of sets (estimated: floating point at the sampled crank angles), arrays of shape (n,).
 
-    `kind`: as found, place in `KINDS`; `transmission`: smallest transmission angle over a full turn, radians, NaN where
-    the crank does not turn fully (the samples contain both positions in which crank and frame are in line, where it is
-    smallest: no sampling error); `swing`: range of the rocker's angle over the turn, radians, 2 pi if it turns fully,
-    NaN as above; `positions`: computed.
+    `kind`: as found, place in `KINDS`; `transmission`: smallest transmission angle over a full rotation, radians, NaN
+    where there is none (the samples contain both positions in which crank and frame are in line, where it is smallest:
+    no sampling error); `swing`: range of the rocker's angle, radians, 2 pi if it turns fully, NaN as above;
+    `positions`: computed.
     """
 
     kind: NDArray[np.int8]
@@ -44,22 +44,20 @@ class Moved:
 _FOUR_BAR = Mechanism.four_bar(2.0, 1.0, 2.5, 2.5)
 
 
-def _dimensions(lengths: Array, turned: Array | None = None) -> Array:
-    """Dimension sets of the four-bar; `turned` turns the line of the frame about the crank's pivot, radians."""
+def _driven(angles: ArrayLike, sizes: Array, turned: Array | float = 0.0, keep: tuple[int, ...] = ()) -> BatchMotion:
+    """Drive sets (frame, crank, coupler, rocker) to crank angles; `turned` turns the line of the frame, radians."""
     place = {joint.pair: k for k, joint in enumerate(_FOUR_BAR.joints)}
-    found = np.repeat(_FOUR_BAR.dimensions[None], len(lengths), axis=0)
-    g, a, b, c = lengths.T
+    found = np.repeat(_FOUR_BAR.dimensions[None], len(sizes), axis=0)
+    g, a, b, c = sizes.T
     found[:, place[1, 2], 0], found[:, place[2, 3], 0], found[:, place[2, 3], COLUMNS.index("bx")] = a, b, c
-    found[:, place[0, 3], 0] = g if turned is None else g * np.cos(turned)
-    if turned is not None:
-        found[:, place[0, 3], 1] = g * np.sin(turned)
-    return found
+    found[:, place[0, 3], 0], found[:, place[0, 3], 1] = g * np.cos(turned), g * np.sin(turned)
+    return simulate_batch(_FOUR_BAR, angles, found, modes={0: 1}, rates=False, keep=keep)
 
 
 def move(lengths: Ints, positions: int) -> Moved:
-    """Move sets (frame, crank, coupler, rocker) through a turn of the crank, and find out how far each can turn.
+    """Move sets (frame, crank, coupler, rocker) through a rotation of the crank, and find out how far each can turn.
 
-    The number of positions per turn is even.
+    The number of positions per rotation is even.
 
     Examples
     --------
@@ -76,7 +74,7 @@ def move(lengths: Ints, positions: int) -> Moved:
 def _move(lengths: Ints, positions: int) -> Moved:
     sizes = lengths.astype(np.float64)
     turn = np.linspace(0.0, math.tau, positions + 1)
-    batch = simulate_batch(_FOUR_BAR, turn, _dimensions(sizes), modes={0: 1}, rates=False, keep=[3])
+    batch = _driven(turn, sizes, keep=(3,))
     done = batch.completed
     sine2 = np.where(done, batch.margins[..., 0].min(axis=1), np.nan)
     meets = np.where(done, sine2 <= _MEETING, False)
@@ -85,66 +83,30 @@ def _move(lengths: Ints, positions: int) -> Moved:
     kind[meets] = KINDS.index("change point")
     kind[(batch.reached > 0) & ~done] = KINDS.index("limited")
     left = np.flatnonzero(batch.reached == 0)
-    elsewhere, at_pi = _assembled_elsewhere(sizes[left])
-    kind[left[elsewhere]] = KINDS.index("limited")
+    # a crank that is assembled anywhere is so at 0, at pi, or where coupler and rocker are at right angles
+    g, a, b, c = sizes[left].T
+    square = np.clip((g * g + a * a - b * b - c * c) / (2.0 * g * a), -1.0, 1.0)
+    across, ahead = _driven([0.0], sizes[left], -np.arccos(square)), _driven([math.pi], sizes[left])
+    kind[left[across.completed | ahead.completed]] = KINDS.index("limited")
+    at_pi = ahead.completed & (ahead.margins[:, 0, 0] <= _MEETING)
     begins = np.flatnonzero((batch.reached > 0) & ~done & (batch.margins[:, 0, 0] <= _MEETING))
     for stretched, angle in ((begins, 0.0), (left[at_pi], math.pi)):
-        kind[stretched[~_assembled_beside(sizes[stretched], angle)]] = KINDS.index("immovable")
+        # beside it the pin comes nearer or goes farther by less than the dyad can give: g a (1 - cos) <= b c / 2
+        g, a, b, c = sizes[stretched].T
+        beside = angle + np.minimum(0.5, np.sqrt(b * c / (g * a)))
+        kind[stretched[~_driven([0.0], sizes[stretched], -beside).completed]] = KINDS.index("immovable")
     g, a, b, c = lengths.T
     folded = np.flatnonzero((g == a) & (b == c))  # kites: at angle 0 the pin is on the pivot, the dyad is free to turn
-    kind[folded[_assembled_between(sizes[folded], turn)]] = KINDS.index("change point")
+    kind[folded[_driven(turn[1:-1], sizes[folded]).completed]] = KINDS.index("change point")
     turns = done & ~meets
     transmission = np.where(turns, np.arcsin(np.sqrt(np.clip(sine2, 0.0, 1.0))), np.nan)
     swing = np.full(len(lengths), np.nan)
-    swing[turns] = _swing(batch.frames[turns, :, 0])
-    return Moved(kind, transmission, swing, int(batch.reached.sum()) + 2 * len(left))
-
-
-def _assembled_elsewhere(sizes: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Whether sets that cannot be assembled at crank angle 0 can be anywhere else; whether modes meet at pi.
-
-    Tried are pi, and the angle at which coupler and rocker are at right angles: a crank that is assembled anywhere is
-    assembled at one of the three.
-    """
-    if not len(sizes):
-        return np.zeros(0, dtype=np.bool_), np.zeros(0, dtype=np.bool_)
-    g, a, b, c = sizes.T
-    square = np.clip((g * g + a * a - b * b - c * c) / (2.0 * g * a), -1.0, 1.0)
-    across = simulate_batch(
-        _FOUR_BAR, [0.0], _dimensions(sizes, -np.arccos(square)), modes={0: 1}, rates=False, keep=[]
-    )
-    ahead = simulate_batch(_FOUR_BAR, [math.pi], _dimensions(sizes), modes={0: 1}, rates=False, keep=[])
-    return across.completed | ahead.completed, ahead.completed & (ahead.margins[:, 0, 0] <= _MEETING)
-
-
-def _assembled_beside(sizes: Array, angle: float) -> NDArray[np.bool_]:
-    """Whether sets whose dyad is in line at a crank angle can be assembled beside it too.
-
-    Tried is an angle at which the pin comes nearer or goes farther by less than the dyad can give, if it can give at
-    all: ``g a (1 - cos) <= b c / 2``.
-    """
-    if not len(sizes):
-        return np.zeros(0, dtype=np.bool_)
-    g, a, b, c = sizes.T
-    beside = np.minimum(0.5, np.sqrt(b * c / (g * a)))
-    turned = _dimensions(sizes, -(angle + beside))
-    return simulate_batch(_FOUR_BAR, [0.0], turned, modes={0: 1}, rates=False, keep=[]).completed
-
-
-def _assembled_between(sizes: Array, turn: Array) -> NDArray[np.bool_]:
-    """Whether sets that are not determined at crank angle 0 pass all other angles."""
-    if not len(sizes):
-        return np.zeros(0, dtype=np.bool_)
-    batch = simulate_batch(_FOUR_BAR, turn[1:-1], _dimensions(sizes), modes={0: 1}, rates=False, keep=[])
-    return batch.completed
-
-
-def _swing(frames: Array) -> Array:
-    """Range of the angle of a link over closed turns, shape (n,), the extremes by parabolas through three samples."""
+    # range of the rocker's angle, unless that turns fully; the extremes by parabolas through three samples
+    frames = batch.frames[turns, :, 0]
     angle = np.unwrap(np.arctan2(frames[..., 3], frames[..., 2]), axis=1)
-    turns = np.abs(angle[:, -1] - angle[:, 0]) > math.pi
-    range_ = _extreme(angle[:, :-1]) + _extreme(-angle[:, :-1])
-    return np.where(turns, math.tau, range_)
+    whole = np.abs(angle[:, -1] - angle[:, 0]) > math.pi
+    swing[turns] = np.where(whole, math.tau, _extreme(angle[:, :-1]) + _extreme(-angle[:, :-1]))
+    return Moved(kind, transmission, swing, int(batch.reached.sum()) + 2 * len(left))
 
 
 def _extreme(values: Array) -> Array:
@@ -161,9 +123,9 @@ def _extreme(values: Array) -> Array:
 class Jamming:
     """What the bearing between coupler and rocker does, by set (estimated: closed forms in floating point).
 
-    `tilt`: largest tilt of the coupler over the turn, radians; `part`: of the turn in which the bearing jams, 0 to 1;
-    `axis_tilt`: largest tilt of the motor axis for which the whole turn is free, radians, pi/2 if every tilt is;
-    `clearance`: smallest radial clearance for which the whole turn is free, mm.
+    `tilt`: largest tilt of the coupler over the rotation, radians; `part`: of the rotation in which the bearing binds,
+    0 to 1; `axis_tilt`: largest tilt of the motor axis for which all of it is free, radians, pi/2 if every tilt is;
+    `clearance`: smallest radial clearance for which all of it is free, mm.
     """
 
     tilt: Array
@@ -184,21 +146,17 @@ def close_form(table: SurveyTable, lengths: NDArray[np.int64]) -> Jamming:
     ratios, which = np.unique(lengths[:, 1] / lengths[:, 2], return_inverse=True)
     sine = np.minimum(unit.pin_height * ratios, 1.0)
     critical = bearing.critical_tilt(own.condition)
-    touches_only = bool(critical.reason)
-    if critical.sine is None or touches_only:  # a clearance is never negative here: free at any tilt
+    if critical.sine is None or critical.reason:  # a clearance is never negative here: free at any tilt
         part, axis = np.zeros(len(ratios)), np.full(len(ratios), 0.5 * math.pi)
     else:
-        part = _jammed_part(critical.sine, unit.pin_height * ratios)
+        # two intervals of 2 arccos kappa each, kappa the critical sine over the largest (16 units are touching)
+        height = unit.pin_height * ratios
+        with np.errstate(divide="ignore", invalid="ignore"):
+            kappa = np.where(height > 0.0, critical.sine / height, np.inf)
+        part = np.where(kappa < 1.0 - 16 * 2.0**-52, 2.0 / math.pi * np.arccos(np.minimum(kappa, 1.0)), 0.0)
         axis = _largest_axis_tilt(critical.sine / ratios, unit.axis)
     clearance = _smallest_clearance(sine, bearing.Rb, bearing.h, own.condition)
     return Jamming(np.arcsin(sine)[which], part[which], axis[which], clearance[which])
-
-
-def _jammed_part(critical: float, height: Array) -> Array:
-    """Two arcs of ``2 arccos kappa`` each, kappa the critical sine over the largest (16 units are touching)."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        kappa = np.where(height > 0.0, critical / height, np.inf)
-    return np.where(kappa < 1.0 - 16 * 2.0**-52, 2.0 / math.pi * np.arccos(np.minimum(kappa, 1.0)), 0.0)
 
 
 def _largest_axis_tilt(q: Array, axis: tuple[float, float, float]) -> Array:

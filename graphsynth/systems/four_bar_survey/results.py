@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from base64 import b64decode
 from collections import Counter
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,29 +25,18 @@ from graphsynth.systems.four_bar_survey.stages import (
     front_of,
     lattice_of,
     objectives_of,
-    unpacked,
 )
 
 if TYPE_CHECKING:
     from graphsynth.jamming.bearing.parameters import ToleranceBox
 
 _PIECE = 20  # certificates made in one go
-
-
-@dataclass(frozen=True, slots=True)
-class Order:
-    """What `ranking_of` would say of all sets that pass, as far as it is used.
-
-    `ranked`: sets that pass and have all objectives; `front`: those that no other one beats in every objective,
-    ascending; `best`: the first sets of the order; of these `scores`, the weighted mean of the objectives, each scaled
-    to 0 (worst of all that pass) .. 1 (best of all), and `places`: by objective, how many of all that pass are better.
-    """
-
-    ranked: int = 0
-    front: tuple[int, ...] = ()
-    best: tuple[int, ...] = ()
-    scores: tuple[float, ...] = ()
-    places: tuple[tuple[int, ...], ...] = ()
+_CLASS_COLUMNS = ("type (exact)", "crank (exact)", "crank (found in motion)", "sets", "agree")
+_CLASS_NOTE = (
+    "Type and kind are decided in exact arithmetic (Grashof's rule, exact); the motion is that of the engine in "
+    "floating point at the sampled crank angles, which contain both positions in line with the frame."
+)
+_PROOF_NOTE = "For a full rotation and every combination of the tolerances, with outward rounding."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +46,11 @@ class Survey:
     `sets`, `positions`, `passing`: dimension sets and crank positions computed, sets that keep the limits; `classes`:
     (type, kind, kind found), places in `TYPES` and `KINDS`, to the number of sets; `maps`: columns by pair of frame and
     coupler; `failed`: shards that failed, with the reason.
+
+    What `ranking_of` would say of all sets that pass: `ranked` have all objectives; no other set beats those of `front`
+    in every objective; `chosen`: the best, the best first, as many as are certified; their `scores`, the weighted mean
+    of the objectives, each scaled to 0 (worst of all that pass) .. 1 (best of all), and `places`: by objective, how
+    many of all that pass are better.
     """
 
     lattice: Lattice
@@ -65,18 +60,12 @@ class Survey:
     classes: dict[tuple[int, int, int], int]
     rejected: dict[str, int]
     maps: dict[str, list[Any]]
-    order: Order
     failed: tuple[str, ...]
-
-    @property
-    def front(self) -> tuple[int, ...]:
-        """Sets that pass and that no other set beats in every objective."""
-        return self.order.front
-
-    @property
-    def chosen(self) -> tuple[int, ...]:
-        """The best sets of all that pass, the best first; as many as are certified."""
-        return self.order.best
+    ranked: int = 0
+    front: tuple[int, ...] = ()
+    chosen: tuple[int, ...] = ()
+    scores: tuple[float, ...] = ()
+    places: tuple[tuple[int, ...], ...] = ()
 
     @property
     def disagreements(self) -> int:
@@ -96,7 +85,7 @@ def gather(context: Context, outcomes: tuple[Outcome, ...]) -> Survey:
         rejected.update(shard["rejected"])
         for name, column in shard["maps"].items():
             maps.setdefault(name, []).extend(column)
-    return Survey(
+    survey = Survey(
         lattice_of(context),
         sum(shard["sets"] for shard in done),
         sum(shard["positions"] for shard in done),
@@ -104,18 +93,18 @@ def gather(context: Context, outcomes: tuple[Outcome, ...]) -> Survey:
         dict(classes),
         dict(rejected),
         maps,
-        order_of(context, done),
         tuple(f"{o.key}: {o.reason}" for o in outcomes if o.status == "failed"),
     )
+    return _ordered(context, survey, done)
 
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
     """What is proved about one set, with the tolerances of the scene.
 
-    `verdict`, `reason`: of `certify_jamming`; `free`: proved free, proved jammed (for all or for some), or None;
-    `assembles`: at how much of the turn the tilted linkage is proved to be assembled; bounds of the clearance left at
-    the worst angle (mm), and of the critical tilt (radians).
+    `verdict`, `reason`: of `certify_jamming`; `free`: proved free, proved binding (for all or for some), or None;
+    `assembles`: at how much of the rotation the tilted linkage is proved to be assembled; `clearance_left`: bounds of
+    it at the worst angle, mm.
     """
 
     number: int
@@ -124,11 +113,10 @@ class Certificate:
     assembles: str
     reason: str
     clearance_left: tuple[float, float]
-    critical_tilt: tuple[float, float]
 
 
 def certify(context: Context, survey: Survey) -> tuple[Certificate, ...]:
-    """Prove for the best sets whether the bearing jams, in pieces on the executor."""
+    """Prove for the best sets whether the bearing binds, in pieces on the executor."""
     pieces = [survey.chosen[k : k + _PIECE] for k in range(0, len(survey.chosen), _PIECE)]
     work = partial(_prove, replace(context, executor=None), survey.lattice)
     return tuple(proof for piece in in_order(context.executor, work, pieces) for proof in piece)
@@ -150,7 +138,6 @@ def _prove(context: Context, lattice: Lattice, sets: tuple[int, ...]) -> list[Ce
                 found.assembles,
                 found.reason,
                 (found.clearance_left.lo, found.clearance_left.hi),
-                (found.critical_tilt.lo, found.critical_tilt.hi),
             )
         )
     return proofs
@@ -220,30 +207,9 @@ def _summary(context: Context, survey: Survey, certificates: tuple[Certificate, 
         ("of these, on the Pareto front", len(survey.front)),
         ("certified", len(survey.chosen)),
     )
-    turn = context.scene.mechanism.positions
-    note = f"{turn} crank positions a turn; the front is that of all sets, not only of the certified ones."
+    positions = context.scene.mechanism.positions
+    note = f"{positions} crank positions a rotation; the front is that of all sets, not only of the certified ones."
     return table("The survey", ("", ""), rows, note, *findings(survey, certificates))
-
-
-def _class_table(survey: Survey) -> Table:
-    """Exact type and kind against the kind found in motion."""
-    rows = (
-        (TYPES[type_], KINDS[kind], KINDS[found], count, "yes" if kind == found else "NO")
-        for (type_, kind, found), count in sorted(survey.classes.items())
-    )
-    note = (
-        "Type and kind are decided in exact arithmetic (Grashof's rule, exact); the motion is that of the engine in "
-        "floating point at the sampled crank angles, which contain both positions in line with the frame."
-    )
-    columns = ("type (exact)", "crank (exact)", "crank (found in motion)", "sets", "agree")
-    return table("Grashof's classes, proved and found", columns, rows, note)
-
-
-def _proof_table(certificates: tuple[Certificate, ...]) -> Table:
-    counts = Counter((proof.verdict, proof.assembles, proof.reason) for proof in certificates)
-    rows = ((count, *what) for what, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])))
-    note = "For the whole turn and every combination of the tolerances, with outward rounding."
-    return table("What is proved about the best sets", ("sets", "verdict", "assembled", "reason"), rows, note)
 
 
 def assess(
@@ -251,12 +217,18 @@ def assess(
 ) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
     """Give one record per certified set, and the tables of the survey, the first with its answer."""
     records = _records(context, survey, certificates)
+    classes = (
+        (TYPES[type_], KINDS[kind], KINDS[found], count, "yes" if kind == found else "NO")
+        for (type_, kind, found), count in sorted(survey.classes.items())
+    )
     limits = ((count, reason) for reason, count in (*survey.rejected.items(), ("none", survey.passing)))
+    counts = Counter((proof.verdict, proof.assembles, proof.reason) for proof in certificates)
+    proved = ((count, *what) for what, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])))
     tables = [
         _summary(context, survey, certificates),
-        _class_table(survey),
+        table("Grashof's classes, proved and found", _CLASS_COLUMNS, classes, _CLASS_NOTE),
         table("Rejected sets, by limit", ("sets", "first limit missed"), limits),
-        _proof_table(certificates),
+        table("What is proved about the best sets", ("sets", "verdict", "assembled", "reason"), proved, _PROOF_NOTE),
     ]
     if survey.failed:
         title = f"Shards that failed: {len(survey.failed)}"
@@ -273,24 +245,25 @@ def findings(survey: Survey, certificates: tuple[Certificate, ...]) -> tuple[Fin
         Finding("of the best proved free", True if proved[True] else None, _number(proved[True])),
     ]
     if proved[False]:
-        found.append(Finding("of the best proved to jam within the tolerances", False, _number(proved[False])))
+        found.append(Finding("of the best proved to bind within the tolerances", False, _number(proved[False])))
     if proved[None]:
         found.append(Finding("of the best undecided", None, _number(proved[None])))
     if survey.failed:
         found.append(Finding("shards failed", False, _number(len(survey.failed))))
-    return (*found, *_edge(survey), _rejected(survey), _motion(survey))
+    return (*found, *_edge(survey), *_sentences(survey))
 
 
 def _edge(survey: Survey) -> list[Finding]:
-    """Warn if the best set is at the edge of the lattice."""
-    if not survey.chosen:
-        return []
-    lengths = survey.lattice.lengths(np.array(survey.chosen[:1]))[0].tolist()
-    edges = edges_of(survey.lattice, lengths)
-    if not edges:
-        return []
+    """Warn if lengths of the best set are the first or last of their ranges."""
+    lattice, edges = survey.lattice, []
+    for frame, _, coupler, rocker in lattice.lengths(np.array(survey.chosen[:1], dtype=np.int64)).tolist():
+        lengths = (("frame", frame), ("coupler", coupler), ("rocker", rocker))
+        for (name, length), span in zip(lengths, (lattice.frame, lattice.coupler, lattice.rocker)):
+            if len(span) > 1 and length in (span[0], span[-1]):
+                end = "shortest" if length == span[0] else "longest"
+                edges.append(f"{name} {float(length * lattice.unit):.12g} is the {end}")
     words = f"The best set is on the edge of the lattice ({', '.join(edges)} of its range)"
-    return [Finding(f"{words}: better ones may lie beyond; widen the range.", False)]
+    return [Finding(f"{words}: better ones may lie beyond; widen the range.", False)] if edges else []
 
 
 def _number(count: int) -> str:
@@ -298,40 +271,40 @@ def _number(count: int) -> str:
     return f"{count:,}".replace(",", "\u202f")
 
 
-def _rejected(survey: Survey) -> Finding:
+def _sentences(survey: Survey) -> tuple[Finding, Finding]:
+    """Say what was rejected; compare the motion with the exact class, and say what rests on floating point."""
     counts = sorted(survey.rejected.items(), key=lambda item: (-item[1], item[0]))
     reasons = "; ".join(f"{_number(count)} because {reason}" for reason, count in counts if count)
     total = sum(survey.rejected.values())
     share = f"{100.0 * survey.passing / survey.sets:.3g} %" if survey.sets else "none"
-    return Finding(
-        f"Of {_number(survey.sets)} sets {_number(survey.passing)} ({share}) keep all limits. "
-        f"Rejected: {_number(total)}{': ' + reasons if reasons else ''} (each counted at the first limit it misses)."
-    )
-
-
-def _motion(survey: Survey) -> Finding:
-    """Compare the motion with the exact class, and say what rests on floating point."""
     agree = survey.disagreements == 0
     words = (
         "in every set the computed motion agrees with the exact class"
         if agree
         else f"in {_number(survey.disagreements)} sets the computed motion disagrees with the exact class"
     )
-    return Finding(
-        f"Whether a crank turns is decided exactly; {words}. The bearing is certified for the "
-        f"{_number(len(survey.chosen))} best, tolerances included; for the others it is estimated in closed form.",
-        None if agree else False,
+    return (
+        Finding(
+            f"Of {_number(survey.sets)} sets {_number(survey.passing)} ({share}) keep all limits. "
+            f"Rejected: {_number(total)}{': ' + reasons if reasons else ''} "
+            "(each counted at the first limit it misses)."
+        ),
+        Finding(
+            f"Whether a crank turns is decided exactly; {words}. The bearing is certified for the "
+            f"{_number(len(survey.chosen))} best, tolerances included; for the others it is estimated in closed form.",
+            None if agree else False,
+        ),
     )
 
 
-def order_of(context: Context, done: list[Any]) -> Order:
+def _ordered(context: Context, survey: Survey, done: list[Any]) -> Survey:
     """Order the sets of all shards."""
     objectives = objectives_of(context)
-    rows = [unpacked(shard["losses"], 1 + len(objectives)) for shard in done]
-    table = np.concatenate(rows) if rows else np.empty((0, 1 + len(objectives)))
+    rows = np.frombuffer(b"".join(b64decode(shard["losses"]) for shard in done), dtype="<f8")
+    table = rows.reshape(-1, 1 + len(objectives))
     table = table[np.isfinite(table).all(axis=1)]
     if not len(table):
-        return Order()
+        return survey
     sets, losses = table[:, 0].astype(np.int64), table[:, 1:]
     leading = np.flatnonzero(np.isin(sets, [number for shard in done for number in shard["front"]]))
     front = leading[front_of(losses[leading])]
@@ -343,46 +316,28 @@ def order_of(context: Context, done: list[Any]) -> Order:
     behind[front] = False
     best = np.lexsort((sets, -scores, behind))[: context.scene.mechanism.certify]
     places = [np.searchsorted(np.sort(column), column[best]).tolist() for column in losses.T]
-    return Order(
-        len(sets),
-        tuple(np.sort(sets[front]).tolist()),
-        tuple(sets[best].tolist()),
-        tuple(scores[best].tolist()),
-        tuple(zip(*places, strict=True)),
+    return replace(
+        survey,
+        ranked=len(sets),
+        front=tuple(np.sort(sets[front]).tolist()),
+        chosen=tuple(sets[best].tolist()),
+        scores=tuple(scores[best].tolist()),
+        places=tuple(zip(*places, strict=True)),
     )
 
 
 def rank(context: Context, survey: Any, records: tuple[Record, ...]) -> Ranking:
     """Give the certified sets with their places among all sets that pass: they do not depend on how many there are."""
-    objectives, order = objectives_of(context), survey.order
+    objectives = objectives_of(context)
     margins = [{margin.name: margin.value for margin in record.margins} for record in records]
-    front = set(order.front)
+    front = set(survey.front)
     return Ranking(
         objectives,
         tuple(record.number for record in records),
-        order.scores,
-        tuple(record.number for record, number in zip(records, order.best, strict=True) if number in front),
+        survey.scores,
+        tuple(record.number for record, number in zip(records, survey.chosen, strict=True) if number in front),
         tuple(tuple(own.get(o.quantity, math.nan) for o in objectives) for own in margins),
-        places=order.places,
-        ranked=order.ranked,
-        front_size=len(order.front),
+        places=survey.places,
+        ranked=survey.ranked,
+        front_size=len(survey.front),
     )
-
-
-def edges_of(lattice: Lattice, lengths: list[int]) -> list[str]:
-    """Say which lengths of a set (frame, crank, coupler, rocker) are the first or last of their ranges.
-
-    Examples
-    --------
-    >>> from fractions import Fraction
-    >>> edges_of(Lattice(Fraction(1, 2), 2, range(3, 9), range(4, 6), range(4, 5)), [8, 2, 4, 4])
-    ['frame 4 is the longest', 'coupler 2 is the shortest']
-    """
-    found = []
-    for name, span, length in zip(
-        ("frame", "coupler", "rocker"), (lattice.frame, lattice.coupler, lattice.rocker), (lengths[0], *lengths[2:])
-    ):
-        if len(span) > 1 and length in (span[0], span[-1]):
-            end = "shortest" if length == span[0] else "longest"
-            found.append(f"{name} {float(length * lattice.unit):.12g} is the {end}")
-    return found

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from base64 import b64decode, b64encode
+from base64 import b64encode
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -89,7 +90,9 @@ def lattice_of(context: Context) -> Lattice:
                 "let last be first plus a whole number of steps"
             )
         ranges.append((first, step, int(count) + 1))
-    unit = _common([crank, *(value for first, step, _ in ranges for value in (first, step))])
+    values = [crank, *(value for first, step, _ in ranges for value in (first, step))]
+    below = math.lcm(*(value.denominator for value in values))
+    unit = Fraction(math.gcd(*(int(value * below) for value in values)), below)
     longest = max(crank, *(first + step * (count - 1) for first, step, count in ranges)) / unit
     if longest > LONGEST:
         raise place.error(
@@ -119,12 +122,6 @@ def exactly(context: Context, *path: str) -> Fraction:
     if number is not None and (field.unit.to_si(float(number)) if field.si else float(number)) == value:
         return number
     return Fraction(field.unit.from_si(value) if field.si else value if field.unit.text else repr(float(value)))
-
-
-def _common(values: list[Fraction]) -> Fraction:
-    """Return the largest number that all values are whole multiples of."""
-    below = math.lcm(*(value.denominator for value in values))
-    return Fraction(math.gcd(*(int(value * below) for value in values)), below)
 
 
 def classify(lengths: Ints) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
@@ -240,33 +237,32 @@ def _kept(table: SurveyTable, done: Evaluated) -> dict[str, NDArray[np.bool_]]:
         "the crank does not turn fully": done.kind == KINDS.index("full turn"),
         f"not {' or '.join(table.limits.types)}": np.isin(done.type, [TYPES.index(t) for t in table.limits.types]),
         "the transmission angle is too small": done.rounded("transmission angle") >= least,
-        "the bearing jams at the tilt of the scene": (done.jamming.part == 0.0) | (not table.limits.free),
+        "the bearing binds at the tilt of the scene": (done.jamming.part == 0.0) | (not table.limits.free),
     }
 
 
 def evaluate(context: Context, shard: Shard) -> tuple[Evaluated, dict[str, Any]]:
-    """Evaluate a shard; give its sets for the rows, and what the survey keeps of it."""
-    table: SurveyTable = context.scene.mechanism
+    """Evaluate a shard; give its sets for the rows, and what the survey keeps of it.
+
+    `classes`: rows (exact type, exact kind, kind found in motion, count); `front`: the sets of the shard's own Pareto
+    front; `losses`: by what the sets that pass are ranked, rows of numbers bit by bit.
+    """
     lattice = lattice_of(context)
     done = evaluate_sets(context, lattice, np.arange(shard.start, shard.stop))
+    classes = Counter(zip(done.type.tolist(), done.kind.tolist(), done.moved.kind.tolist()))
+    passing = np.flatnonzero(done.passes)
+    losses = losses_of(objectives_of(context), done, passing)
     return done, {
         "start": shard.start,
         "sets": len(done.sets),
         "positions": int(done.moved.positions),
-        "classes": _classes(done),
-        "rejected": _rejected(table, done),
+        "classes": [[*what, count] for what, count in sorted(classes.items())],
+        "rejected": _rejected(context.scene.mechanism, done),
         "maps": _maps(lattice, done),
-        **ranked_by(context, done),
+        "passing": len(passing),
+        "front": done.sets[passing[front_of(losses)]].tolist(),
+        "losses": b64encode(np.column_stack([done.sets[passing], losses]).astype("<f8").tobytes()).decode(),
     }
-
-
-def _classes(done: Evaluated) -> list[list[int]]:
-    """Count sets by exact type, exact kind and kind found in motion: rows (type, kind, found, count)."""
-    code = (done.type.astype(np.int64) * len(KINDS) + done.kind) * len(KINDS) + done.moved.kind
-    values, counts = np.unique(code, return_counts=True)
-    rest, found = np.divmod(values, len(KINDS))
-    types, kinds = np.divmod(rest, len(KINDS))
-    return np.stack([types, kinds, found, counts], axis=1).tolist()  # type: ignore[no-any-return]
 
 
 def _rejected(table: SurveyTable, done: Evaluated) -> dict[str, int]:
@@ -296,33 +292,6 @@ def _maps(lattice: Lattice, done: Evaluated) -> dict[str, list[Any]]:
         "turning": turns.sum(axis=1)[kept].tolist(),
         **{name: np.round(values[kept], 6).tolist() for name, values in by_pair.items()},
     }
-
-
-def ranked_by(context: Context, done: Evaluated) -> dict[str, Any]:
-    """Keep what the sets that pass are ranked by, and which of them are on the Pareto front of this shard."""
-    passing = np.flatnonzero(done.passes)
-    losses = losses_of(objectives_of(context), done, passing)
-    return {
-        "passing": len(passing),
-        "front": done.sets[passing[front_of(losses)]].tolist(),
-        "losses": packed(np.column_stack([done.sets[passing], losses])),
-    }
-
-
-def packed(rows: Array) -> str:
-    """Return rows of numbers as text, bit by bit, at 11 characters a number."""
-    return b64encode(rows.astype("<f8").tobytes()).decode()
-
-
-def unpacked(text: str, columns: int) -> Array:
-    """Return the rows of `packed`.
-
-    Examples
-    --------
-    >>> unpacked(packed(np.array([[1.0, 0.1]])), 2).tolist()
-    [[1.0, 0.1]]
-    """
-    return np.frombuffer(b64decode(text), dtype="<f8").reshape(-1, columns)
 
 
 def losses_of(objectives: tuple[Objective, ...], done: Evaluated, which: NDArray[np.intp]) -> Array:

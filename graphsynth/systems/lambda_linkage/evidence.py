@@ -17,7 +17,7 @@ def _box(context: Any) -> Any:
 
 
 def _worst(context: Any) -> tuple[Any, str]:
-    """Bearing of the scene, and the sine of the largest tilt of a turn."""
+    """Bearing of the scene, and the sine of the largest tilt of a rotation."""
     linkage, bearing = _box(context).nominal()
     return bearing, repr(linkage.largest_tilt[1])
 
@@ -37,7 +37,7 @@ def areas(context: Any, effort: Effort) -> Problem:
 
 
 def arc_ends(context: Any, effort: Effort) -> Problem:
-    """Measure the ends of the jam arcs, without tolerances."""
+    """Measure the ends of the intervals of binding, without tolerances."""
     from graphsynth.evidence.jamming import arc_problem
 
     return arc_problem(_box(context), context.scene.mechanism.bearing.condition, effort)
@@ -56,7 +56,7 @@ def coupled_joints(context: Any, effort: Effort) -> Problem:
 
 
 def positions(context: Any, effort: Effort) -> Problem:
-    """Measure the planar linkage over a turn, by closed form, engine and proof."""
+    """Measure the planar linkage over a rotation, by closed form, engine and proof."""
     from graphsynth.evidence.position import four_bar, position_problem
 
     linkage, _ = _box(context).nominal()

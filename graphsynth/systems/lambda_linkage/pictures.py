@@ -19,7 +19,6 @@ from graphsynth.systems.lambda_linkage.system import LambdaTable
 if TYPE_CHECKING:
     from graphsynth.drawing.plots import Band, Chart, Line
     from graphsynth.jamming.assess import JammingReport
-    from graphsynth.jamming.bearing.arcs import JamArc
     from graphsynth.mechanism.four_bar import FourBarPositions, TiltedFourBar
     from graphsynth.systems.lambda_linkage.stages import LambdaMotion
 
@@ -80,7 +79,7 @@ def _background(
 ) -> tuple[Sketch, complex, complex]:
     """Draw what does not move: ground, crank circle, path of M; return the corners of the picture too."""
     turn = _turn(linkage)
-    A, B, M = (_plane(points) for points in (turn.A, turn.B, turn.M))
+    A, B, M = ((points[:, 0] + 1j * points[:, 1]).tolist() for points in (turn.A, turn.B, turn.M))
     O, C = 0j, complex(linkage.l1, 0.0)
     lower, upper = _corners([p for p in (O, C, *A, *B, *M) if cmath.isfinite(p)])
     # a linkage that cannot be assembled anywhere has no height
@@ -91,7 +90,8 @@ def _background(
     sketch.ground(C)
     sketch.trace(M, "a", 2.2, closed=True)
     if stroke is not None:
-        sketch.trace(_plane(linkage.positions(np.linspace(*stroke, 121)).M), "c", 4.2)
+        path = linkage.positions(np.linspace(*stroke, 121)).M
+        sketch.trace((path[:, 0] + 1j * path[:, 1]).tolist(), "c", 4.2)
     return sketch, lower, upper
 
 
@@ -103,11 +103,11 @@ def lambda_animation(
     width: float = 420.0,
     seconds: float = 6.0,
 ) -> str:
-    """Return a turn of the crank as one ``<svg>`` that moves by itself; it says where the bearing at B jams.
+    """Return a rotation of the crank as one ``<svg>`` that moves by itself; it says where the bearing at B binds.
 
-    `jams`: tells of a crank angle whether the bearing jams there. `frames`: crank angles shown; of a linkage without a
-    full turn those at which it is assembled. `width`: pixels. `seconds`: time of a turn. Raises `GeometryError` if the
-    linkage cannot be assembled at any of them.
+    `jams`: tells of a crank angle whether the bearing binds there. `frames`: crank angles shown; of a linkage without a
+    full rotation those at which it is assembled. `width`: pixels. `seconds`: time of a rotation. Raises
+    `GeometryError` if the linkage cannot be assembled at any of them.
     """
     from graphsynth.drawing.moving import Bar, linkage_animation
 
@@ -121,7 +121,7 @@ def lambda_animation(
         name: (points[good, 0] + 1j * points[good, 1]) for name, points in (("A", turn.A), ("B", turn.B), ("M", turn.M))
     }
     stuck = [jams is not None and jams(float(angle)) for angle in f]
-    notes = {"B jams": stuck, "B is free": [not s for s in stuck]} if jams is not None else {}
+    notes = {"B binds": stuck, "B is free": [not s for s in stuck]} if jams is not None else {}
     return linkage_animation(
         _background(linkage, width, "Lambda linkage in motion", STROKE)[0],
         {"O": 0j, "C": complex(linkage.l1, 0.0), **tracks},
@@ -139,20 +139,6 @@ def _corners(points: Sequence[complex]) -> tuple[complex, complex]:
     return complex(min(x), min(y)), complex(max(x), max(y))
 
 
-def _plane(points: Array) -> list[complex]:
-    """Project positions of shape (n, 3) on the plane of the linkage."""
-    return [complex(x, y) for x, y in points[:, :2].tolist()]
-
-
-def _exaggeration(linkage: TiltedFourBar) -> float:
-    """Return the factor 1, 2, 5, 10, ... that makes the largest height of the crank pin about 0.6 of the crank."""
-    if linkage.pin_height <= 0.0:
-        return 1.0
-    wanted = 0.6 * linkage.l2 / linkage.pin_height
-    decade = 10.0 ** math.floor(math.log10(wanted)) if wanted >= 1.0 else 1.0
-    return max(1.0, *(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= wanted * 1.001))
-
-
 def lambda_sketch_3d(
     linkage: TiltedFourBar, f: float, *, exaggeration: float | None = None, width: float = 520.0
 ) -> Sketch:
@@ -163,7 +149,11 @@ def lambda_sketch_3d(
     pixels. An orthographic projection; dashed lines drop from A and M to the plane of the frame. Raises
     `GeometryError`: a factor that is not positive, or an angle at which the linkage cannot be assembled.
     """
-    k = _exaggeration(linkage) if exaggeration is None else exaggeration
+    k = exaggeration
+    if k is None:  # the largest height of the crank pin becomes about 0.6 of the crank
+        wanted = 0.6 * linkage.l2 / linkage.pin_height if linkage.pin_height > 0.0 else 1.0
+        decade = 10.0 ** math.floor(math.log10(wanted)) if wanted >= 1.0 else 1.0
+        k = max(1.0, *(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= wanted * 1.001))
     if not (math.isfinite(k) and k > 0.0):
         raise GeometryError(f"exaggeration = {k} must be positive and finite")
     here = linkage.positions(f)
@@ -176,7 +166,12 @@ def lambda_sketch_3d(
         [np.cos(t) * linkage.rotation[:, 0] + np.sin(t) * linkage.rotation[:, 1] for t in turn.f]
     )
     path = turn.M[turn.assembled]
-    corners = _ground_plane(np.concatenate([circle, path, turn.B[turn.assembled], [O, C]]))
+    # corners of a rectangle in the plane of the frame around the plan of all points
+    plan = np.concatenate([circle, path, turn.B[turn.assembled], [O, C]])[:, :2]
+    low, high = plan.min(axis=0), plan.max(axis=0)
+    edge = 0.06 * (high - low).max()
+    (x0, y0), (x1, y1) = low - edge, high + edge
+    corners = np.array([[x0, y0, 0.0], [x1, y0, 0.0], [x1, y1, 0.0], [x0, y1, 0.0]])
     axis = view.normal(linkage.rotation[:, 2])
     long = 1.8 * linkage.l2
     ends = [view(O), view(O) + view.raw(axis * long), view(O) + view.raw(np.array([0.0, 0.0, long]))]
@@ -225,7 +220,6 @@ class _View:
         return self.raw(np.asarray(point) * [1.0, 1.0, self.factor])
 
     def all(self, points: Array) -> list[complex]:
-        """Project many points; NaN stays NaN."""
         return [self(point) for point in points]
 
     def normal(self, axis: Array) -> Array:
@@ -238,18 +232,10 @@ def _flat(points: Array) -> Array:
     return np.asarray(points) * [1.0, 1.0, 0.0]
 
 
-def _ground_plane(points: Array) -> Array:
-    """Corners of a rectangle in the plane of the frame around the plan of all points."""
-    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-    edge = 0.06 * (high - low).max()
-    (x0, y0), (x1, y1) = low - edge, high + edge
-    return np.array([[x0, y0, 0.0], [x1, y0, 0.0], [x1, y1, 0.0], [x0, y1, 0.0]])
-
-
 def lambda_tilt_chart(linkage: TiltedFourBar, *, bands: Sequence[Band] = (), levels: Sequence[Line] = ()) -> Chart:
-    """Tilt of the coupler at the bearing B over a turn of the crank, in milliradians; a gap where not assembled.
+    """Tilt of the coupler at the bearing B over a rotation of the crank, in milliradians; a gap where not assembled.
 
-    `bands`: shaded ranges of crank angle, for example jam arcs. `levels`: thresholds.
+    `bands`: shaded ranges of crank angle, for example intervals of binding. `levels`: thresholds.
     """
     from graphsynth.drawing.plots import Chart, Line
 
@@ -261,84 +247,82 @@ def lambda_tilt_chart(linkage: TiltedFourBar, *, bands: Sequence[Band] = (), lev
 _SHOWN = 6  # crank angles drawn one by one
 
 
-def _first(attempts: tuple[Attempt, ...]) -> Attempt | None:
-    return next((a for a in attempts if not a.failed), None)
+def _of_scene(
+    context: Context, motions: tuple[Attempt, ...], assessments: tuple[Attempt, ...]
+) -> tuple[LambdaMotion | None, JammingReport | None]:
+    """Return the first motion that was computed, and the first assessment under the condition of the scene."""
+    table = context.scene.mechanism
+    assert isinstance(table, LambdaTable)
+    motion, reports = (next((a.value for a in some if not a.failed), None) for some in (motions, assessments))
+    return motion, reports[table.bearing.condition] if reports else None
 
 
 def sketches(context: Context, motions: tuple[Attempt, ...], assessments: tuple[Attempt, ...]) -> tuple[Picture, ...]:
-    """Draw the linkage with the path of M, then at six crank angles; a bearing that jams has a coloured ring."""
-    moved, assessed = _first(motions), _first(assessments)
-    if moved is None:
+    """Draw the linkage with the path of M, then at six crank angles; a bearing that binds has a coloured ring."""
+    motion, report = _of_scene(context, motions, assessments)
+    if motion is None:
         return ()
-    motion: LambdaMotion = moved.value
-    arcs = assessed.value[_condition(context)].arcs.arcs if assessed else ()
     count = len(motion.tilted.f) - 1
     chosen = [round(i * count / _SHOWN) for i in range(_SHOWN)]
     shown = degrees(float(motion.tilted.f[chosen[1]]))
     caption = (
         f"Crank at {shown}. M traces the blue curve; the thick part is the nearly straight working stroke. "
-        "A ring around B marks a position in which the bearing jams."
+        "A ring around B marks a position in which the bearing binds."
     )
-    pictures = [Picture("The linkage and the path of M", _sketch(motion, chosen[1], 420, arcs, True), caption, "wide")]
-    pictures += _in_space(motion, chosen[1])
+    sketch = _sketch(motion, chosen[1], 420, report, True)
+    pictures = [Picture("The linkage and the path of M", sketch, caption, "wide")]
+    if motion.linkage.pin_height > 0.0 and motion.tilted.assembled[chosen[1]]:
+        caption = (
+            "The motor axis is tilted, so the crank pin A leaves the plane of the frame and the rod tilts in its "
+            "bearing at B. Heights are drawn larger by the factor written in the picture."
+        )
+        sketch = lambda_sketch_3d(motion.linkage, float(motion.tilted.f[chosen[1]])).svg()
+        pictures.append(Picture("In space", sketch, caption, "wide"))
     for i in chosen:
         angle = float(motion.tilted.f[i])
-        caption = f"The bearing at B {'jams' if _jams(arcs, angle) else 'is free'}."
-        sketch = _sketch(motion, i, 250, arcs, False)
+        caption = f"The bearing at B {'binds' if _binds(report, angle) else 'is free'}."
+        sketch = _sketch(motion, i, 250, report, False)
         pictures.append(Picture(f"Crank at {degrees(angle)}", sketch, caption, "small"))
     return tuple(pictures)
 
 
 def animations(context: Context, motions: tuple[Attempt, ...], assessments: tuple[Attempt, ...]) -> tuple[Picture, ...]:
-    """Show one turn of the crank; words say where the bearing jams."""
-    moved, assessed = _first(motions), _first(assessments)
-    if moved is None:
+    """Show one rotation of the crank; words say where the bearing binds."""
+    motion, report = _of_scene(context, motions, assessments)
+    if motion is None:
         return ()
-    arcs = assessed.value[_condition(context)].arcs.arcs if assessed else ()
-    svg = lambda_animation(moved.value.linkage, lambda angle: _jams(arcs, angle))
-    return (Picture("One turn of the crank", svg, "Blue: the path of M; green: its nearly straight part.", "wide"),)
+    svg = lambda_animation(motion.linkage, lambda angle: _binds(report, angle))
+    words = "Blue: the path of M; green: its nearly straight part."
+    return (Picture("One rotation of the crank", svg, words, "wide"),)
 
 
-def _in_space(motion: LambdaMotion, i: int) -> list[Picture]:
-    """Draw the tilted linkage in space, if it is tilted and assembled there."""
+def _binds(report: JammingReport | None, angle: float) -> bool:
+    return report is not None and any(arc.contains(angle) for arc in report.arcs.arcs)
+
+
+def _sketch(motion: LambdaMotion, i: int, width: float, report: JammingReport | None, labels: bool) -> str:
+    """Draw one position in the plane; a bearing that binds has a coloured ring."""
     angle = float(motion.tilted.f[i])
-    if motion.linkage.pin_height <= 0.0 or not motion.tilted.assembled[i]:
-        return []
-    caption = (
-        "The motor axis is tilted, so the crank pin A leaves the plane of the frame and the rod tilts in its "
-        "bearing at B. Heights are drawn larger by the factor written in the picture."
-    )
-    return [Picture("In space", lambda_sketch_3d(motion.linkage, angle).svg(), caption, "wide")]
-
-
-def _condition(context: Context) -> str:
-    table = context.scene.mechanism
-    assert isinstance(table, LambdaTable)
-    return table.bearing.condition
-
-
-def _jams(arcs: tuple[JamArc, ...], angle: float) -> bool:
-    return any(arc.contains(angle) for arc in arcs)
-
-
-def _sketch(motion: LambdaMotion, i: int, width: float, arcs: tuple[JamArc, ...], labels: bool) -> str:
-    """Draw one position in the plane; a bearing that jams has a coloured ring."""
-    angle = float(motion.tilted.f[i])
-    return lambda_sketch(motion.linkage, angle, width=width, labels=labels, ring=_jams(arcs, angle)).svg()
+    return lambda_sketch(motion.linkage, angle, width=width, labels=labels, ring=_binds(report, angle)).svg()
 
 
 def plots(context: Context, motions: tuple[Attempt, ...], assessments: tuple[Attempt, ...]) -> tuple[Picture, ...]:
-    """Plot the tilt of the coupler and the interference of the bearing over the crank angle, jam arcs shaded."""
-    assessed = _first(assessments)
-    if assessed is None:
+    """Plot tilt of the coupler and interference of the bearing over the crank angle, intervals of binding shaded."""
+    _, report = _of_scene(context, motions, assessments)
+    if report is None:
         return ()
-    from graphsynth.drawing.plots import Line
+    from graphsynth.drawing.plots import Band, Line
     from graphsynth.pipeline.display import TURN, chart, unit_in
 
-    condition = _condition(context)
-    report: JammingReport = assessed.value[condition]
-    table, bands, critical = report.table, _jam_bands(report), report.critical_tilt
-    shaded = f"Shaded: the bearing jams under condition {condition}."
+    condition = context.scene.mechanism.bearing.condition
+    table, critical = report.table, report.critical_tilt
+    shaded = f"Shaded: the bearing binds under condition {condition}."
+    bands: list[Band] = []
+    for arc in report.arcs.arcs:  # cut at a full rotation, the first one labelled
+        parts = [(arc.start, arc.stop)]
+        if arc.stop > math.tau:
+            parts = [(arc.start, math.tau), (0.0, arc.stop - math.tau)]
+        bands += [Band(start, stop, "" if bands or k else "binds") for k, (start, stop) in enumerate(parts)]
     levels = []
     if critical is not None:
         levels = [Line((), critical, "critical tilt", "soft", "--"), Line((), -critical, "", "soft", "--")]
@@ -355,17 +339,3 @@ def plots(context: Context, motions: tuple[Attempt, ...], assessments: tuple[Att
         chart("Tilt of the coupler at B", tilt, x, "tilt [mrad]", shaded, levels=levels, **more),
         chart("Interference of bearing and hole", gaps, x, "interference [mm]", words, levels=zero, **more),
     )
-
-
-def _jam_bands(report: JammingReport) -> list[Band]:
-    """Return the jam arcs, cut at a full rotation, the first one labelled."""
-    from graphsynth.drawing.plots import Band
-
-    spans = [_within_turn(arc.start, arc.stop) for arc in report.arcs.arcs]
-    pieces = [piece for span in spans for piece in span]
-    return [Band(start, stop, "jams" if i == 0 else "") for i, (start, stop) in enumerate(pieces)]
-
-
-def _within_turn(start: float, stop: float) -> list[tuple[float, float]]:
-    """Cut an arc that runs past a full rotation into pieces inside."""
-    return [(start, stop)] if stop <= math.tau else [(start, math.tau), (0.0, stop - math.tau)]

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import astuple, dataclass, replace
 from fractions import Fraction
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, Literal
 
 from graphsynth.pipeline.products import Attempt, Candidate, Finding, Quantity, Recognised, Record, Table, each
@@ -27,7 +28,7 @@ _C = Literal["A", "B"]
 
 @dataclass(frozen=True, slots=True)
 class LambdaMotion:
-    """One turn of the crank.
+    """One rotation of the crank.
 
     * `linkage`: with the tilted motor axis.
     * `planar`, `tilted`: motion without and with the tilt at the same crank angles, from 0 to 2 pi.
@@ -41,12 +42,6 @@ class LambdaMotion:
     residual: float
 
 
-def _table(context: Context) -> LambdaTable:
-    table = context.scene.mechanism
-    assert isinstance(table, LambdaTable)
-    return table
-
-
 def recognise(context: Context, candidates: tuple[Candidate, ...]) -> tuple[Recognised, ...]:
     """Mark the candidates whose canonical key is that of the four-bar with its frame."""
     from graphsynth.systems.lambda_linkage.model import LambdaLinkage
@@ -55,8 +50,8 @@ def recognise(context: Context, candidates: tuple[Candidate, ...]) -> tuple[Reco
 
 
 def kinematics(context: Context, recognised: tuple[Recognised, ...]) -> tuple[Attempt, ...]:
-    """Move every recognised candidate through one turn with the dimensions of the scene."""
-    return each((Attempt(r.candidate, r) for r in recognised if r.module), lambda _: _move(_table(context)))
+    """Move every recognised candidate through one rotation with the dimensions of the scene."""
+    return each((Attempt(r.candidate, r) for r in recognised if r.module), lambda _: _move(context.scene.mechanism))
 
 
 def _move(table: LambdaTable) -> LambdaMotion:
@@ -82,7 +77,8 @@ def jamming(context: Context, motions: tuple[Attempt, ...]) -> tuple[Attempt, ..
     from graphsynth.jamming.assess import assess_bearing
     from graphsynth.jamming.bearing.bearing import Bearing
 
-    table, box = _table(context), tolerance_box(context)
+    table: LambdaTable = context.scene.mechanism
+    box = tolerance_box(context)
     bearing = Bearing(table.bearing.radius_mm, table.bearing.height_mm, table.bearing.clearance_mm)
 
     def both(motion: LambdaMotion) -> dict[_C, JammingReport]:
@@ -95,7 +91,7 @@ def assess(
     context: Context, recognised: tuple[Recognised, ...], motions: tuple[Attempt, ...], assessments: tuple[Attempt, ...]
 ) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
     """Give one record per candidate and the tables of the first one assessed."""
-    condition = _table(context).bearing.condition
+    condition = context.scene.mechanism.bearing.condition
 
     limits: dict[_C, dict[str, CertifiedLimit]] = {}
 
@@ -111,24 +107,24 @@ def assess(
         return records, ()
     motion = next(m.value for m in motions if m.candidate.number == done.candidate.number)
     proved = _proof_table(context, done.value, limits)
-    found = _arc_findings(done.value[condition]) + _limit_findings(limits[condition])
-    jam = replace(_jam_table(context, done.value, limits), findings=found)
+    jam = replace(
+        _binding_table(context, done.value, limits), findings=_findings(done.value[condition], limits[condition])
+    )
     return records, (_motion_table(motion), jam, proved, _fit_table(context))
 
 
-def _arc_findings(report: JammingReport) -> tuple[Finding, ...]:
-    """Say at which crank angles the nominal bearing jams."""
-    arcs = report.arcs.arcs
-    if not arcs or sum(arc.length for arc in arcs) >= math.tau:
-        return ()
-    angles = " and ".join(f"{math.degrees(arc.start):.2f}° to {math.degrees(arc.stop):.2f}°" for arc in arcs)
-    return (Finding(f"With the nominal dimensions it binds at crank angles {angles} (estimated)."),)
+def _findings(report: JammingReport, limits: Mapping[str, CertifiedLimit]) -> tuple[Finding, ...]:
+    """Say where the nominal bearing binds, and which clearance is proved to be enough and which tilt harmless.
 
-
-def _limit_findings(limits: Mapping[str, CertifiedLimit]) -> tuple[Finding, ...]:
-    """Say which clearance is proved to be enough and which tilt harmless, rounded to the safe side."""
+    The proved numbers are rounded to the safe side.
+    """
     from graphsynth.intervals.reading import shortened
 
+    found = []
+    arcs = report.arcs.arcs
+    if arcs and sum(arc.length for arc in arcs) < math.tau:
+        angles = " and ".join(f"{math.degrees(arc.start):.2f}° to {math.degrees(arc.stop):.2f}°" for arc in arcs)
+        found.append(Finding(f"With the nominal dimensions it binds at crank angles {angles} (estimated)."))
     clearance, tilt = limits["smallest clearance"], limits["largest axis tilt"]
     words = []
     if clearance.works is not None:
@@ -136,7 +132,9 @@ def _limit_findings(limits: Mapping[str, CertifiedLimit]) -> tuple[Finding, ...]
     if tilt.works is not None:
         words.append(f"a tilt of the axis of {shortened(tilt.works, -1, 4)} {tilt.unit} is harmless")
     sentence = "; with the clearance given, ".join(words)
-    return (Finding(f"{sentence[:1].upper()}{sentence[1:]} (certified, without tolerances)."),) if words else ()
+    if words:
+        found.append(Finding(f"{sentence[:1].upper()}{sentence[1:]} (certified, without tolerances)."))
+    return tuple(found)
 
 
 def _nominal(context: Context, condition: _C) -> JamCertificate:
@@ -160,30 +158,30 @@ def _limits(context: Context, condition: _C) -> dict[str, CertifiedLimit]:
 def _margins(
     report: JammingReport, limits: Mapping[str, CertifiedLimit], proved: JamCertificate
 ) -> tuple[Quantity, ...]:
-    """Margins of the nominal dimensions, each with the proved bound of its error where there is one."""
+    """Margins of the nominal dimensions, with a bound of the error where two ends are proved; else estimated."""
     part = sum(arc.length for arc in report.arcs.arcs) / math.tau
     values: list[tuple[str, float | None, str, tuple[float | None, float | None]]] = [
         ("clearance left at the worst crank angle", -report.worst_interference, "mm", proved.clearance_left),
         ("largest tilt", report.largest_tilt, "rad", proved.largest_tilt),
         ("critical tilt", report.critical_tilt, "rad", proved.critical_tilt),
-        ("jammed part of the turn", part, "", (None, None)),
+        ("part of the rotation that binds", part, "", (None, None)),
     ]
-    names = (
+    for name, limit, unit in (
         ("smallest clearance", report.smallest_clearance, "mm"),
         ("largest axis tilt", report.largest_misalignment, "rad"),
-    )
-    for name, limit, unit in names:
+    ):
         values.append((name, limit.value if limit else None, unit, (limits[name].works, limits[name].fails)))
-    return tuple(_quantity(name, value, unit, ends) for name, value, unit, ends in values if value is not None)
-
-
-def _quantity(name: str, value: float, unit: str, ends: tuple[float | None, float | None]) -> Quantity:
-    """Return a value with the bound of its error from two proved ends; estimated without them."""
-    a, b = ends
-    if a is None or b is None or not (math.isfinite(a) and math.isfinite(b)):
-        return Quantity(name, value, unit)
-    error = max(abs(Fraction(value) - Fraction(a)), abs(Fraction(value) - Fraction(b)))
-    return Quantity(name, value, unit, "certified", math.nextafter(float(error), math.inf) if error else 0.0)
+    found = []
+    for name, value, unit, (a, b) in values:
+        if value is None:
+            continue
+        if a is None or b is None or not (math.isfinite(a) and math.isfinite(b)):
+            found.append(Quantity(name, value, unit))
+            continue
+        error = max(abs(Fraction(value) - Fraction(a)), abs(Fraction(value) - Fraction(b)))
+        bound = math.nextafter(float(error), math.inf) if error else 0.0
+        found.append(Quantity(name, value, unit, "certified", bound))
+    return tuple(found)
 
 
 def _proof_table(
@@ -196,7 +194,12 @@ def _proof_table(
         rows.append(("without tolerances", *(_nominal(context, c).statement for c in found)))
     rows += [(title, *(text(f) for f in found.values())) for title, text in _PROVED.items()]
     for name in ("smallest clearance", "largest axis tilt"):
-        rows.append((f"{name}: works, fails", *(_works(limits[c][name]) for c in found)))
+        ends = [limits[c][name] for c in found]
+        texts = (
+            end.reason if end.works is None or end.fails is None else f"{end.works!r}, {end.fails!r} {end.unit}"
+            for end in ends
+        )
+        rows.append((f"{name}: works, fails", *texts))
     box = tolerance_box(context)
     ranges = ", ".join(f"{name} {value}" for name, value in box.describe().items() if not box[name].is_point)
     given = "exact decimals" if box.exact_input else "some inputs are rounded numbers"
@@ -211,7 +214,7 @@ def _fit_table(context: Context) -> Table:
     from graphsynth.intervals.reading import shortened
     from graphsynth.jamming.bearing.fits import assess_fits
 
-    box, bearing = tolerance_box(context), _table(context).bearing
+    box, bearing = tolerance_box(context), context.scene.mechanism.bearing
     columns = ("fit", "radial clearance [mm]", "verdict", "clearance left for the worst pair [mm]")
     note = f"Certified for all parts: diameter {2 * bearing.radius_mm:g} mm, condition {bearing.condition}."
     try:
@@ -231,21 +234,10 @@ def _bounds(low: float, high: float) -> str:
 def _spans(spans: tuple[Span, ...]) -> str:
     """Spans in degrees, rounded into their inside."""
     if any(span.length >= math.tau for span in spans):
-        return "the whole turn"
+        return "a full rotation"
     ends = [span.degrees() for span in spans]
     texts = [f"{math.ceil(a * 1e8 + 1.0) / 1e8:.8f}° to {math.floor(b * 1e8 - 1.0) / 1e8:.8f}°" for a, b in ends]
     return ", ".join(texts) or "nowhere"
-
-
-def _total(spans: tuple[Span, ...]) -> str:
-    total = sum(span.length for span in spans)
-    return f"{math.degrees(total):.2g}° in {len(spans)} pieces" if spans else "nowhere"
-
-
-def _works(limit: CertifiedLimit) -> str:
-    if limit.works is None or limit.fails is None:
-        return limit.reason
-    return f"{limit.works!r}, {limit.fails!r} {limit.unit}"
 
 
 #: What a certificate proves: row of the table, and its text.
@@ -253,63 +245,58 @@ _PROVED: dict[str, Callable[[JamCertificate], str]] = {
     "largest interference, mm": lambda f: _bounds(f.largest_interference.lo, f.largest_interference.hi),
     "binds for certain": lambda f: _spans(f.arcs.inner),
     "free for certain": lambda f: _spans(f.arcs.free),
-    "neither is proved": lambda f: _total(f.arcs.undecided),
+    "neither is proved": lambda f: (
+        f"{math.degrees(sum(span.length for span in f.arcs.undecided)):.2g}° in {len(f.arcs.undecided)} pieces"
+        if f.arcs.undecided
+        else "nowhere"
+    ),
     "assembled": lambda f: f.assembles,
 }
 
 
-def _jam_table(
+def _binding_table(
     context: Context, reports: dict[_C, JammingReport], limits: dict[_C, dict[str, CertifiedLimit]]
 ) -> Table:
     """Lay the two contact conditions side by side."""
     margins = {c: {q.name: q.text for q in _margins(r, limits[c], _nominal(context, c))} for c, r in reports.items()}
     names = dict.fromkeys(name for values in margins.values() for name in values)
     rows = [("verdict", *(r.verdict.value for r in reports.values()))]
-    arcs = max(len(r.arcs.arcs) for r in reports.values())
-    rows += [(f"jam arc {i + 1}", *(_arc_text(r, i) for r in reports.values())) for i in range(arcs)]
+    spans = [
+        [f"{math.degrees(a.start):.8f}° to {math.degrees(a.stop):.8f}°" for a in r.arcs.arcs] for r in reports.values()
+    ]
+    rows += [(f"interval of binding {i + 1}", *texts) for i, texts in enumerate(zip_longest(*spans, fillvalue="none"))]
     rows += [(name, *(values.get(name, "no limit") for values in margins.values())) for name in names]
     columns = ("", *(f"condition {c} ({_CONDITIONS[c]})" for c in reports))
-    note = "Verdict certified; arcs and numbers are the nominal ones, their proved bounds stand in the next table."
-    return Table("Jamming of the bearing at B", columns, tuple(rows), note)
+    note = "Verdict certified; intervals and numbers are the nominal ones, their proved bounds are in the next table."
+    return Table("Binding of the bearing at B", columns, tuple(rows), note)
 
 
 _CONDITIONS: dict[_C, str] = {"A": "short bearing in a long hole", "B": "long shaft in a short hole"}
 
 
-def _arc_text(report: JammingReport, i: int) -> str:
-    if i >= len(report.arcs.arcs):
-        return "none"
-    arc = report.arcs.arcs[i]
-    return f"{math.degrees(arc.start):.8f}° to {math.degrees(arc.stop):.8f}°"
-
-
 def _motion_table(motion: LambdaMotion) -> Table:
-    """State what the motion is, with and without the tilt."""
+    """State what the motion is, with and without the tilt, and how long and straight the working stroke is."""
     import numpy as np
+
+    from graphsynth.core.errors import GeometryError
 
     turn = motion.linkage.full_turn()
     away = float(np.nanmax(np.abs(motion.tilted.M[..., 2])))
     shift = float(np.nanmax(np.hypot(*(motion.tilted.M - motion.planar.M)[..., :2].T)))
+    try:
+        straight = motion.linkage.straightness()
+        stroke = f"{straight.chord:.8g} long, {straight.deviation:.6g} wide"
+    except GeometryError as error:
+        stroke = f"none: {error}"
     rows = (
-        ("full turn", turn.statement, turn.method),
+        ("full rotation", turn.statement, turn.method),
         ("crank positions computed", str(len(motion.tilted.f)), "exact"),
-        ("straight stroke of M, crank 90° to 270°", _stroke(motion.linkage), "estimated"),
+        ("straight stroke of M, crank 90° to 270°", stroke, "estimated"),
         ("M leaves the plane by at most", f"{away:.8g}", "estimated, largest sample"),
         ("the tilt moves M in the plane by at most", f"{shift:.6g}", "estimated, largest sample"),
         ("relative error of the rod length", f"{motion.residual:.1e}", "estimated, largest sample"),
     )
     return Table("Motion", ("quantity", "value", "method"), rows, "Lengths in the unit of the link lengths.")
-
-
-def _stroke(linkage: TiltedFourBar) -> str:
-    """Say how long and how straight the working stroke is, or why there is none."""
-    from graphsynth.core.errors import GeometryError
-
-    try:
-        stroke = linkage.straightness()
-    except GeometryError as error:
-        return f"none: {error}"
-    return f"{stroke.chord:.8g} long, {stroke.deviation:.6g} wide"
 
 
 #: Key of ``[mechanism.tolerances]``: parameter of the box, and where its nominal value stands in the scene.
@@ -337,18 +324,25 @@ def tolerance_box(context: Context, tolerances: bool = True) -> ToleranceBox:
     """
     from graphsynth.core.errors import GeometryError
     from graphsynth.jamming.bearing.parameters import Range, ToleranceBox, spread
+    from graphsynth.pipeline.tables import exact_number, suggest, written
+    from graphsynth.pipeline.units import Unit
 
-    table = _table(context)
+    table: LambdaTable = context.scene.mechanism
     raw = context.scene.raw.get("mechanism", {})
     raw = raw if isinstance(raw, Mapping) else {}
     given: dict[str, Any] = {"azimuth": 0}
     for name, place in _TOLERANCES.values():
         if place:
             part = getattr(table, place[0])
-            given[name] = _exact(_inside(raw, *place), getattr(part, place[1].removesuffix("_rad")))
-    axis = [_exact(number, value) for number, value in zip(_axis(raw), table.tilt.axis)]
+            given[name] = _exact(written(raw.get(place[0], {}), place[1]), getattr(part, place[1].removesuffix("_rad")))
+    tilt = raw.get("tilt", {})
+    numbers = (tilt.get("axis") if isinstance(tilt, Mapping) else None) or [None] * 3
+    axis = [_exact(exact_number(number, Unit.parse("")), value) for number, value in zip(numbers, table.tilt.axis)]
     for key, size in table.tolerances.items() if tolerances else ():
-        name = _tolerance_name(context, key)
+        if key not in _TOLERANCES:
+            place = context.scene.place / "mechanism" / "tolerances"
+            raise place.error(f"has an unknown key {key!r}{suggest(key, _TOLERANCES)}", key)
+        name = _TOLERANCES[key][0]
         absolute, relative = _tolerance(context, key, size)
         given[name] = spread(Range.read(key, given[name]), absolute, relative)
     try:
@@ -359,42 +353,17 @@ def tolerance_box(context: Context, tolerances: bool = True) -> ToleranceBox:
 
 def _refused(context: Context, sentence: str) -> SceneError:
     """Return a sentence about a parameter of the box with the place and the key of its tolerance in the scene."""
-    place = context.scene.place / "mechanism"
+    place, tolerances = context.scene.place / "mechanism", context.scene.mechanism.tolerances
     for key, (name, _) in _TOLERANCES.items():
-        if sentence.startswith(f"{name} = ") and key in _table(context).tolerances:
-            size = _table(context).tolerances[key]
+        if sentence.startswith(f"{name} = ") and key in tolerances:
+            size = tolerances[key]
             return (place / "tolerances").error(f"has {key} = {size!r}, so that {sentence}", key)
     return place.error(f"gives what no bearing has: {sentence}")
-
-
-def _axis(raw: Mapping[str, Any]) -> list[Fraction | None]:
-    from graphsynth.pipeline.tables import exact_number
-    from graphsynth.pipeline.units import Unit
-
-    tilt = raw.get("tilt", {})
-    numbers = tilt.get("axis") if isinstance(tilt, Mapping) else None
-    return [exact_number(number, Unit.parse("")) for number in numbers or [None] * 3]
-
-
-def _inside(raw: Mapping[str, Any], table: str, key: str) -> Fraction | None:
-    from graphsynth.pipeline.tables import written
-
-    return written(raw.get(table, {}), key)
 
 
 def _exact(number: Fraction | None, value: float) -> Any:
     """Return the number that stands in the file, if it is the one that was read; else the double."""
     return number if number is not None and float(number) == value else value
-
-
-def _tolerance_name(context: Context, key: str) -> str:
-    from graphsynth.pipeline.tables import suggest
-
-    if key not in _TOLERANCES:
-        raise (context.scene.place / "mechanism" / "tolerances").error(
-            f"has an unknown key {key!r}{suggest(key, _TOLERANCES)}", key
-        )
-    return _TOLERANCES[key][0]
 
 
 def _tolerance(context: Context, key: str, size: Any) -> tuple[Fraction, Fraction]:

@@ -1,4 +1,4 @@
-"""``module = "lambda_linkage"``: Chebyshev's four-bar with a tilted motor axis and a bearing that may jam."""
+"""``module = "lambda_linkage"``: Chebyshev's four-bar with a tilted motor axis and a bearing that may bind."""
 
 from __future__ import annotations
 
