@@ -1,8 +1,7 @@
 """Methods of a `Motion`: its instantaneous kinematics, and what rooms above show and say of it.
 
-Poles, polodes, inflection and Bresse circles and mechanical advantage are computed over all samples.  Derivatives are
-by the input, as in the motion; what is geometry (poles, the inflection circle) does not depend on it.  Estimated:
-float64, NaN where the branch does not reach, infinite where a link does not turn.
+Derivatives are by the input, as in the motion; what is geometry (poles, the inflection circle) does not depend on it.
+Estimated: float64, NaN where the branch does not reach, infinite where a link does not turn.
 
 References
 ----------
@@ -48,21 +47,16 @@ class Circles(NamedTuple):
     pole: Array
 
 
-def _pole(place: list[Complex], turn: list[Array]) -> Complex:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(turn[1] == 0.0, complex(math.inf, math.inf), place[0] + 1j * place[1] / turn[1])
-
-
 def _points(z: Complex) -> Array:
     return np.column_stack([z.real, z.imag])
 
 
-def _circles(pole: Complex, across: Complex) -> Circles:
-    return Circles(_points(pole + 0.5 * across), np.abs(across), _points(pole))
-
-
 class MotionMethods(Shown):
-    """Methods that every `Motion` has."""
+    """Methods that every `Motion` has.
+
+    Where they take `link` and `base`, the motion of the link against the base is meant, the frame by default;
+    `GeometryError` for links that do not exist, or are the same.
+    """
 
     if TYPE_CHECKING:
         mechanism: Mechanism
@@ -80,8 +74,11 @@ class MotionMethods(Shown):
 
     # --- instantaneous kinematics
 
-    def _relative(self, link: int, base: int | None) -> tuple[list[Complex], list[Array], Complex]:
-        """Place of a link's origin in the frame of the base and its angle, both with two derivatives; its direction."""
+    def _relative(self, link: int, base: int | None) -> tuple[list[Complex], list[Array], Complex, Complex]:
+        """Place of a link's origin in the frame of the base and its angle, both with two derivatives; direction, pole.
+
+        The pole is ``I = r + i r' / theta'`` with the relative place r of the link's origin and its relative angle.
+        """
         mechanism = self.mechanism
         link = link_number("link", link)
         base = mechanism.frame if base is None else link_number("base", base)
@@ -96,150 +93,63 @@ class MotionMethods(Shown):
         back = np.exp(-1j * self.poses[:, base, 2])
         # derivatives of back * d, with back' = -i w back
         place = [back * d, back * (d1 - 1j * w * d), back * (d2 - 2j * w * d1 - (1j * a + w * w) * d)]
-        return place, [angle, rate, second], np.exp(1j * angle)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pole = np.where(rate == 0.0, complex(math.inf, math.inf), place[0] + 1j * place[1] / rate)
+        return place, [angle, rate, second], np.exp(1j * angle), pole
 
     def instant_centre(self, link: int, base: int | None = None) -> Array:
-        """Return the instant centre (velocity pole) of a link against another one, the frame by default.
+        """Return the instant centre (velocity pole) of a link, shape (n, 2), in the frame of the base.
 
-        Parameters
-        ----------
-        link, base : int
-
-        Returns
-        -------
-        ndarray, shape (n, 2)
-            In the frame of ``base``; infinite where the link only translates.
-
-        Raises
-        ------
-        GeometryError
-            Links that do not exist, or are the same.
-
-        Notes
-        -----
-        ``I = r + i r' / theta'`` with the relative place r of the link's origin and its relative angle theta.
+        Infinite where the link only translates.
         """
-        place, turn, _ = self._relative(link, base)
-        return _points(_pole(place, turn))
+        return _points(self._relative(link, base)[3])
 
     def polodes(self, link: int, base: int | None = None) -> Polodes:
-        """Return the polodes (centrodes) of a link against another one: its motion is the rolling of one on the other.
-
-        Parameters
-        ----------
-        link, base : int
-            The frame by default.
-
-        Returns
-        -------
-        Polodes
-
-        Raises
-        ------
-        GeometryError
-            Links that do not exist, or are the same.
-        """
-        place, turn, direction = self._relative(link, base)
-        pole = _pole(place, turn)
+        """Return the polodes (centrodes) of a link: its motion is the rolling of one on the other."""
+        place, _, direction, pole = self._relative(link, base)
         with np.errstate(invalid="ignore"):
             return Polodes(_points(pole), _points((pole - place[0]) / direction))
-
-    def _acceleration_at_pole(self, link: int, base: int | None) -> tuple[Complex, Complex, list[Array]]:
-        place, turn, _ = self._relative(link, base)
-        pole = _pole(place, turn)
-        with np.errstate(invalid="ignore"):
-            return pole, place[2] + (1j * turn[2] - turn[1] ** 2) * (pole - place[0]), turn
 
     def inflection_circle(self, link: int, base: int | None = None) -> Circles:
         """Return the inflection circle of a link: its points pass an inflection of their path, they run straight.
 
-        Parameters
-        ----------
-        link, base : int
-            The frame by default.
-
-        Returns
-        -------
-        Circles
-            Through the instant centre I; the other end of its diameter is the inflection pole ``I + a_I / theta'^2``,
-            with the acceleration a_I of the point of the link that lies at I.
-
-        Raises
-        ------
-        GeometryError
-            Links that do not exist, or are the same.
-
-        References
-        ----------
-        [Bottema & Roth 1979], chapter 8; [Hunt 1978].
+        It passes through the instant centre I; the other end of its diameter is the inflection pole
+        ``I + a_I / theta'^2``, with the acceleration a_I of the point of the link that lies at I.
         """
-        pole, a, turn = self._acceleration_at_pole(link, base)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return _circles(pole, a / turn[1] ** 2)
+        return self._circles(link, base, False)
 
     def bresse_circle(self, link: int, base: int | None = None) -> Circles:
         """Return the second circle of Bresse of a link: its points have no tangential acceleration.
 
         Together with the inflection circle, the first circle of Bresse, it passes through the instant centre and the
-        acceleration pole.  It depends on the angular acceleration, so on the input: it is that of a uniform input.
-
-        Parameters
-        ----------
-        link, base : int
-            The frame by default.
-
-        Returns
-        -------
-        Circles
-            Infinite where the angular acceleration is 0.
-
-        Raises
-        ------
-        GeometryError
-            Links that do not exist, or are the same.
+        acceleration pole.  It depends on the angular acceleration, so on the input: it is that of a uniform input,
+        infinite where the angular acceleration is 0.
         """
-        pole, a, turn = self._acceleration_at_pole(link, base)
+        return self._circles(link, base, True)
+
+    def _circles(self, link: int, base: int | None, second: bool) -> Circles:
+        """Return a circle of Bresse; its diameter follows from the acceleration at the pole."""
+        place, turn, _, pole = self._relative(link, base)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return _circles(pole, 1j * a / turn[2])
+            a = place[2] + (1j * turn[2] - turn[1] ** 2) * (pole - place[0])
+            across = 1j * a / turn[2] if second else a / turn[1] ** 2
+            return Circles(_points(pole + 0.5 * across), np.abs(across), _points(pole))
 
     def transmission_index(self) -> dict[int, Array]:
         """Return the transmission index of every dyad with two modes, by group: the sine of its transmission angle.
 
-        1 where force is handed on best, 0 in a dead-centre position.
-
-        Returns
-        -------
-        dict of int to ndarray, shape (n,)
-
-        References
-        ----------
-        Sutherland & Roth, A transmission index for spatial mechanisms, J. Eng. Ind. 95 (1973) 589-597, for planar
-        linkages.
+        1 where force is handed on best, 0 in a dead-centre position [Sutherland & Roth, J. Eng. Ind. 95 (1973)
+        589-597, for planar linkages].
         """
         return {group: np.sin(angle) for group, angle in self.transmission_angle().items()}
 
     def mechanical_advantage(self, link: int) -> Array:
-        """Return effort on a link of the frame over effort of the driver, without losses.
+        """Return effort on a link over effort of the driver, without losses, shape (n,) [Norton 2004, chapter 6].
 
-        Parameters
-        ----------
-        link : int
-            A link that turns about the frame, or slides on it.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            ``q' / s'``, rate of the driver over that of the link (virtual power); angles count in radians, so torque
-            over torque, or force over torque in units of 1 / length.  Infinite where the link rests.
-
-        Raises
-        ------
-        GeometryError
-            Several drivers, or a link that is not jointed to the frame.
-
-        References
-        ----------
-        [Norton 2004], chapter 6.
+        The link turns about the frame, or slides on it.  The ratio is ``q' / s'``, rate of the driver over that of the
+        link (virtual power); angles count in radians, so torque over torque, or force over torque in units of 1 /
+        length.  Infinite where the link rests.  `GeometryError` for several drivers, or a link that is not jointed to
+        the frame.
         """
         mechanism = self.mechanism
         if len(mechanism.drivers) != 1:
@@ -251,7 +161,7 @@ class MotionMethods(Shown):
     def _rate(self, base: int, link: int) -> Array:
         """Rate of the coordinate of a joint."""
         joint = self.mechanism.joint(base, link)
-        place, turn, direction = self._relative(link, base)
+        place, turn, direction, _ = self._relative(link, base)
         if not isinstance(joint, Prismatic):
             return turn[1]
         first = joint.a == base

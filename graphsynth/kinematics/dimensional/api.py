@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.checks import positive
+from graphsynth.core.checks import positive, whole
 from graphsynth.core.errors import GeometryError, GraphError
 from graphsynth.core.shown import Shown
 from graphsynth.kinematics.dimensional.design import Design, Drivers, choices
@@ -80,22 +80,22 @@ def search(
     share of the usual number of first candidates and of generations.
     """
     begun = _begin(problem, random, effort) if before is None else before
+    fit, count = problem.fit, 60  # generations at most: fewer where a motion costs more
+    if fit is not None:
+        count = 120 if before is None else 400 if fit.warped else 600
+    generations = max(2, round(effort * (count // 3 if problem.iterative else count)))
     history = [HistoryRow(attempt, 0, problem.evaluations, begun.cost)]
     start = begun.start if before is None else (0, 0, 0)
-    if problem.unknowns.size == 0:
+    if problem.size == 0:
         return replace(begun, history=tuple(history), start=start)
-    best, value, population = _evolve(
-        problem, begun.population, _generations(problem, before, effort), history, deadline, random
-    )
-    smooth = problem.fit is None or problem.fit.smooth
+    best, value, population = _evolve(problem, begun.population, generations, history, deadline, random)
+    smooth = fit is None or fit.smooth
     if not smooth and before is not None:
         box = problem.bounds()
         around = np.clip(best + random.normal(0.0, _AROUND, population.shape), box[:, 0], box[:, 1])
         around[0] = best
-        best, value, population = _evolve(
-            problem, around, _generations(problem, before, effort) // 2, history, deadline, random
-        )
-    if problem.fit is not None and smooth and EXACT < value < OUTSIDE:
+        best, value, population = _evolve(problem, around, generations // 2, history, deadline, random)
+    if fit is not None and smooth and EXACT < value < OUTSIDE:
         polished = _polish(problem, best)
         better = float(problem.evaluate(polished[None]).cost[0])
         if better < value:
@@ -106,24 +106,13 @@ def search(
 
 def _begin(problem: DimensionProblem, random: np.random.Generator, effort: float) -> SearchResult:
     """Make many candidates and keep the best as the first population."""
-    aimed, size = problem.fit is not None, problem.unknowns.size
+    aimed, size = problem.fit is not None, problem.size
     width = min(120, 15 * size) if aimed else min(60, 6 * size)
     first = problem.population(max(width, round(effort * (20 if aimed else 4) * width), 1), random)
     outcome = problem.evaluate(first)
     order = np.argsort(outcome.cost, kind="stable")[: max(width, 8)]
     start = (len(first), int((outcome.cost < 0.5 * INCOMPLETE).sum()), int((outcome.merit >= 1.0).sum()))
     return SearchResult(first[order[0]], float(outcome.cost[order[0]]), (), start, first[order])
-
-
-def _generations(problem: DimensionProblem, before: SearchResult | None, effort: float) -> int:
-    """Return the largest number of generations: fewer where a motion costs more."""
-    if problem.fit is None:
-        count = 60
-    elif before is None:
-        count = 120
-    else:
-        count = 400 if problem.fit.warped else 600
-    return max(2, round(effort * (count // 3 if problem.iterative else count)))
 
 
 def _evolve(
@@ -190,13 +179,6 @@ def _polish(problem: DimensionProblem, x: Array) -> Array:
         max_nfev=80,
     )
     return np.asarray(found.x)
-
-
-def verdict(cost: float) -> str:
-    """Words for a cost."""
-    if cost >= 0.5 * INCOMPLETE:
-        return "the range is not completed"
-    return "a bound is not kept" if cost > 0.5 * OUTSIDE else ""
 
 
 # --- `embody`
@@ -323,7 +305,16 @@ def embody(
     """
     begin = perf_counter()
     wanted = Goals() if goals is None else Goals(target=goals) if isinstance(goals, Target) else goals
-    _check(graph, wanted, seed, tries, seconds)
+    if not isinstance(graph, MechanismGraph):
+        raise GraphError(f"{graph!r} is not a MechanismGraph")
+    if not isinstance(wanted, Goals):
+        raise GeometryError(f"goals = {wanted!r} are not Goals")
+    if graph.space != 3 or not graph.is_connected:
+        raise GraphError("embodiment needs a connected graph of space 3 (planar mechanisms)")
+    whole("seed", seed, 0, 2**128)
+    whole("tries", tries, 1)
+    if seconds != math.inf:
+        positive("seconds", seconds)
     positive("effort", effort)
     order = choices(graph, driver)
     run = _Run(wanted, seed, begin, seconds, effort)
@@ -364,9 +355,41 @@ class _Run:
         else:
             self.ended = late or found.cost <= EXACT
 
-    def go_on(self) -> None:
-        """Continue the most promising searches to their end."""
-        for found, problem, attempt in sorted(self.found, key=lambda item: item[0].cost)[:_CONTINUED]:
+    def judge(self, problem: DimensionProblem, found: SearchResult) -> None:
+        """Verify the best of a search and keep it if it is better than those before."""
+        mechanism, motion, figures = dimensioned(problem, found.best), None, None
+        why: tuple[str, ...] = ("cannot be assembled",)
+        if mechanism is not None:
+            motion, figures, why = verify(mechanism, self.goals)
+            if why and found.cost >= 0.5 * INCOMPLETE:
+                why = tuple(dict.fromkeys((*why, "the range is not completed")))
+            elif why and found.cost > 0.5 * OUTSIDE:
+                why = tuple(dict.fromkeys((*why, "a bound is not kept")))
+        self.reasons.update(f"result: {reason}" for reason in why)
+        rank, design = (bool(why), found.cost), problem.design
+        if self.best is None or rank < self.best[0]:
+            self.best = (
+                rank,
+                Embodiment(
+                    design.graph,
+                    design.drivers,
+                    not why,
+                    mechanism,
+                    motion,
+                    figures,
+                    {},
+                    "",
+                    self.goals,
+                    self.seed,
+                    0,
+                    0.0,
+                ),
+            )
+
+    def result(self) -> Embodiment:
+        """Continue the most promising searches for a target to their end; return the best with the run's totals."""
+        aimed = self.goals.target is not None
+        for found, problem, attempt in sorted(self.found, key=lambda item: item[0].cost)[: _CONTINUED if aimed else 0]:
             random = np.random.default_rng([self.seed, attempt, 1])
             final = found
             if perf_counter() < self.deadline and found.cost > EXACT:
@@ -375,39 +398,28 @@ class _Run:
             self.judge(problem, final)
             if final.cost <= EXACT and self.best is not None and self.best[1].accepted:
                 break
-
-    def judge(self, problem: DimensionProblem, found: SearchResult) -> None:
-        """Verify the best of a search and keep it if it is better than those before."""
-        result = _judge(problem, found.best, found.cost, self.goals, self.seed)
-        self.reasons.update(result.reasons)
-        rank = (not result.accepted, found.cost)
-        if self.best is None or rank < self.best[0]:
-            self.best = rank, result
-
-    def result(self) -> Embodiment:
-        """Finish the searches for a target; return the best with the totals of the run."""
-        if self.goals.target is not None:
-            self.go_on()
         assert self.best is not None
-        evaluations = sum(problem.evaluations for _, problem, _ in self.found)
-        return _with_totals(
-            self.best[1], self.reasons, evaluations, perf_counter() - self.begin, self.history, len(self.found)
+        best, tries = self.best[1], len(self.found)
+        frame = "" if best.graph.frame is None else f"frame {best.graph.frame}, "
+        choice = f"{frame}drivers {', '.join(f'{a}-{b}' for a, b in best.drivers)}"
+        reasons = {reason: count for reason, count in self.reasons.items() if count}
+        if best.accepted and best.figures is not None:
+            text = (
+                f"accepted after {tries} search{'es' * (tries > 1)}: {choice}; smallest transmission angle "
+                f"{math.degrees(best.figures.transmission_angle):.1f} degrees, "
+                f"length ratio {best.figures.length_ratio:.2f}"
+            )
+        else:
+            listed = "; ".join(f"{reason}: {count}" for reason, count in reasons.items()) or "no candidate"
+            text = f"nothing was accepted in {tries} search{'es' * (tries > 1)}; the best has {choice}; {listed}"
+        return replace(
+            best,
+            reasons=reasons,
+            statement=text,
+            evaluations=sum(problem.evaluations for _, problem, _ in self.found),
+            seconds=perf_counter() - self.begin,
+            history=tuple(self.history),
         )
-
-
-def _check(graph: MechanismGraph, goals: Goals, seed: int, tries: int, seconds: float) -> None:
-    if not isinstance(graph, MechanismGraph):
-        raise GraphError(f"{graph!r} is not a MechanismGraph")
-    if not isinstance(goals, Goals):
-        raise GeometryError(f"goals = {goals!r} are not Goals")
-    if graph.space != 3 or not graph.is_connected:
-        raise GraphError("embodiment needs a connected graph of space 3 (planar mechanisms)")
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise GeometryError(f"seed = {seed!r} must be a whole number, 0 or more")
-    if isinstance(tries, bool) or not isinstance(tries, int) or tries < 1:
-        raise GeometryError(f"tries = {tries!r} must be a whole number, 1 or more")
-    if seconds != math.inf:
-        positive("seconds", seconds)
 
 
 def _kinds(
@@ -430,55 +442,6 @@ def _kinds(
         raise GeometryError(f"joints names {min(given)}, but the graph has no such joint")
     if inversion.frame == graph.frame:
         return tuple(kinds.values())
-    first = _moved(graph, inversion)
+    link = next(link for link in range(graph.links) if graph.with_frame(link) == inversion)
+    first = [link, *(k for k in range(graph.links) if k != link)]  # old number of every link of the inversion
     return tuple(kinds[min(first[a], first[b]), max(first[a], first[b])] for a, b, _ in inversion.joints)
-
-
-def _moved(graph: MechanismGraph, inversion: MechanismGraph) -> list[int]:
-    """Return the old number of every link of an inversion."""
-    for link in range(graph.links):
-        if graph.with_frame(link) == inversion:
-            return [link, *(k for k in range(graph.links) if k != link)]
-    raise AssertionError("an inversion is the graph with one of its links as frame")
-
-
-def _judge(problem: DimensionProblem, x: Any, cost: float, goals: Goals, seed: int) -> Embodiment:
-    """Verify the best of a search."""
-    mechanism = dimensioned(problem, x)
-    blank = Embodiment(
-        problem.design.graph, problem.design.drivers, False, mechanism, None, None, {}, "", goals, seed, 0, 0.0
-    )
-    if mechanism is None:
-        return _changed(blank, reasons={"result: cannot be assembled": 1})
-    motion, figures, why = verify(mechanism, goals)
-    if why and verdict(cost):
-        why = tuple(dict.fromkeys((*why, verdict(cost))))
-    return _changed(
-        blank, accepted=not why, motion=motion, figures=figures, reasons={f"result: {reason}": 1 for reason in why}
-    )
-
-
-def _changed(result: Embodiment, **changes: Any) -> Embodiment:
-    from dataclasses import replace
-
-    return replace(result, **changes)
-
-
-def _with_totals(
-    result: Embodiment, reasons: Counter[str], evaluations: int, seconds: float, history: list[HistoryRow], tries: int
-) -> Embodiment:
-    frame = "" if result.graph.frame is None else f"frame {result.graph.frame}, "
-    choice = f"{frame}drivers {', '.join(f'{a}-{b}' for a, b in result.drivers)}"
-    counted = {reason: count for reason, count in reasons.items() if count}
-    if result.accepted and result.figures is not None:
-        text = (
-            f"accepted after {tries} search{'es' * (tries > 1)}: {choice}; smallest transmission angle "
-            f"{math.degrees(result.figures.transmission_angle):.1f} degrees, "
-            f"length ratio {result.figures.length_ratio:.2f}"
-        )
-    else:
-        listed = "; ".join(f"{reason}: {count}" for reason, count in counted.items()) or "no candidate"
-        text = f"nothing was accepted in {tries} search{'es' * (tries > 1)}; the best has {choice}; {listed}"
-    return _changed(
-        result, reasons=counted, statement=text, evaluations=evaluations, seconds=seconds, history=tuple(history)
-    )

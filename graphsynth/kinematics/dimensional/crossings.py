@@ -41,6 +41,8 @@ def crossing_pairs(graph: MechanismGraph, most: int = 2) -> list[tuple[int, int]
 
     None is with the frame if that can be avoided; without pairs if there are none up to ``most``.
     """
+    import networkx as nx
+
     around = [{link for link in range(graph.links) if mask >> link & 1} for mask in graph.neighbours]
     binary = [link for link in range(graph.links) if len(around[link]) == 2]
     pairs = [(a, b) for a, b in combinations(binary, 2) if b not in around[a] and not around[a] & around[b]]
@@ -52,15 +54,9 @@ def crossing_pairs(graph: MechanismGraph, most: int = 2) -> list[tuple[int, int]
                 continue
             links = merged(graph, chosen)
             joints = {tuple(sorted((links[a], links[b]))) for a, b, _ in graph.joints}
-            if len(joints) == len(graph.joints) and _planar(joints):
+            if len(joints) == len(graph.joints) and nx.check_planarity(nx.Graph(list(joints)))[0]:
                 return list(chosen)
     return []
-
-
-def _planar(joints: set[tuple[int, ...]]) -> bool:
-    import networkx as nx
-
-    return bool(nx.check_planarity(nx.Graph(list(joints)))[0])
 
 
 def merged(graph: MechanismGraph, pairs: Sequence[tuple[int, int]]) -> list[int]:
@@ -105,10 +101,7 @@ class _Links:
             for j in (0, 1):
                 meet |= sides[:, self.first, i] == sides[:, self.second, j]
         cross = (_turn(a, b, c) * _turn(a, b, d) < 0.0) & (_turn(c, d, a) * _turn(c, d, b) < 0.0)
-        return np.asarray((cross & ~meet).sum(axis=1) + self._reflex(z))
-
-    def _reflex(self, z: Complex) -> NDArray[np.int64]:
-        found = np.zeros(len(z), dtype=np.int64)
+        found = np.asarray((cross & ~meet).sum(axis=1), dtype=np.int64)
         for joints in self.own:
             if len(joints) > 3:
                 at = z[:, joints]
@@ -131,22 +124,18 @@ def fewest_crossings(own: list[list[int]], count: int) -> tuple[Complex, int]:
     returned: the fewest found, not proved least.
     """
     links = _Links(own)
-    z = _starts(count)
+    random, shape = np.random.default_rng(_SEED), (_STARTS, count)  # the same every time
+    x, y = random.normal(size=shape), random.normal(size=shape)
+    z: Complex = np.asarray((x + 1j * y) * (math.sqrt(count) / 2.5), dtype=np.complex128)
     for k in range(_STEPS):
         move = _force(z, links)
         z = z + move * np.minimum(0.2, 0.4 * (1.0 - k / _STEPS) / np.maximum(np.abs(move).max(axis=1), 1e-9))[:, None]
     crossings = links.crossings(z)
     fewest = np.flatnonzero(crossings == crossings.min())
-    best = z[fewest[np.argmax(_room(z[fewest]))]][None]
-    return _finished(best, links)
-
-
-def _starts(count: int) -> Complex:
-    """Random places, the same every time."""
-    random = np.random.default_rng(_SEED)
-    shape = (_STARTS, count)
-    x, y = random.normal(size=shape), random.normal(size=shape)
-    return np.asarray((x + 1j * y) * (math.sqrt(count) / 2.5), dtype=np.complex128)
+    # the roomiest of them: smallest distance of two joints over the size of the picture
+    first, second = np.triu_indices(count, 1)
+    apart = np.abs(z[fewest][:, first] - z[fewest][:, second])
+    return _finished(z[fewest[np.argmax(apart.min(axis=1) / apart.max(axis=1))]][None], links)
 
 
 def _force(z: Complex, links: _Links) -> Complex:
@@ -162,13 +151,6 @@ def _force(z: Complex, links: _Links) -> Complex:
     np.add.at(total, (rows, first[None]), pull)
     np.add.at(total, (rows, second[None]), -pull)
     return total
-
-
-def _room(z: Complex) -> Array:
-    """Smallest distance of two joints over the size of the picture."""
-    first, second = np.triu_indices(z.shape[1], 1)
-    apart = np.abs(z[:, first] - z[:, second])
-    return np.asarray(apart.min(axis=1) / apart.max(axis=1))
 
 
 def _finished(z: Complex, links: _Links) -> tuple[Complex, int]:

@@ -78,22 +78,22 @@ class Design:
 
     def mechanism(self, places: Array, angles: Array) -> Mechanism:
         """Return the mechanism of one set, places (joints, 2) and angles (directed,), posed at the first input."""
-        joints: list[JointGeometry] = []
         direction = dict(zip(self.directed, angles.tolist()))
-        for k, (joint, kind) in enumerate(zip(self.graph.joints, self.kinds)):
-            at = (float(places[k, 0]), float(places[k, 1]))
-            if kind == "R":
-                joints.append(Revolute(joint.a, joint.b, at, at))
-            elif kind == "P":
-                joints.append(Prismatic(joint.a, joint.b, at, at, direction[k], direction[k]))
-            else:
-                joints.append(PinSlot(joint.a, joint.b, at, at, direction[k]))
-        return Mechanism(
-            self.graph,
-            tuple(joints),
-            tuple(Driver(*pair) for pair in self.drivers),
-            pose=((0.0, 0.0, 0.0),) * self.graph.links,
-        )
+        joints = [
+            made_joint(kind, a, b, at, at, direction.get(k, 0.0), direction.get(k, 0.0))
+            for k, ((a, b, _), kind, at) in enumerate(zip(self.graph.joints, self.kinds, map(tuple, places.tolist())))
+        ]
+        drivers = tuple(Driver(*pair) for pair in self.drivers)
+        return Mechanism(self.graph, tuple(joints), drivers, pose=((0.0, 0.0, 0.0),) * self.graph.links)
+
+
+def made_joint(
+    kind: str, a: int, b: int, at_a: tuple[float, float], at_b: tuple[float, float], angle_a: float, angle_b: float
+) -> JointGeometry:
+    """Return a joint of a kind of `Design`."""
+    if kind == "R":
+        return Revolute(a, b, at_a, at_b)
+    return Prismatic(a, b, at_a, at_b, angle_a, angle_b) if kind == "P" else PinSlot(a, b, at_a, at_b, angle_a)
 
 
 # --- which link is fixed and which is driven, when the graph leaves it open
@@ -125,7 +125,8 @@ def choices(graph: MechanismGraph, driver: Drivers | None) -> list[tuple[Mechani
         frame = inversion.frame
         assert frame is not None
         near = [link for link in range(inversion.links) if inversion.neighbours[frame] >> link & 1]
-        near = [link for link in near if _mobility(inversion, frame, link) == 1]
+        pins = {pair for a, b, mobility in inversion.joints for pair in ((a, b), (b, a)) if mobility == 1}
+        near = [link for link in near if (frame, link) in pins]
         for links in combinations(near, inversion.mobility):
             pairs = tuple((frame, link) for link in links)
             if find_fault(inversion, pairs) is None:
@@ -138,10 +139,6 @@ def choices(graph: MechanismGraph, driver: Drivers | None) -> list[tuple[Mechani
             f"no choice of {graph.mobility} drivers on the frame moves this mechanism; name the driven joints as (a, b)"
         )
     return [(inversion, pairs) for _, inversion, pairs in sorted(found, key=lambda item: item[0])]
-
-
-def _mobility(graph: MechanismGraph, a: int, b: int) -> int:
-    return next(joint.mobility for joint in graph.joints if (joint.a, joint.b) == (min(a, b), max(a, b)))
 
 
 def _is_link(value: Any) -> bool:

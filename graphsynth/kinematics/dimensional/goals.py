@@ -28,9 +28,12 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-def _link(name: str, value: int | None) -> None:
-    if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 0):
-        raise GeometryError(f"{name} = {value!r} is not a link; give its number, 0 or more")
+def _check(target: Target) -> None:
+    """Check tolerance and link, which every target has."""
+    positive("tolerance", target.tolerance)
+    link: Any = target.link
+    if link is not None and (isinstance(link, bool) or not isinstance(link, int) or link < 0):
+        raise GeometryError(f"link = {link!r} is not a link; give its number, 0 or more")
 
 
 def _numbers(name: str, values: Iterable[float], least: int) -> tuple[float, ...]:
@@ -50,12 +53,6 @@ def _listed(name: str, values: Any) -> tuple[Any, ...]:
         raise GeometryError(f"{name} = {values!r} is not a list; give one") from error
 
 
-def _rising(name: str, values: tuple[float, ...]) -> tuple[float, ...]:
-    if any(b <= a for a, b in pairwise(values)):
-        raise GeometryError(f"{name} must increase strictly; sort the list and remove duplicates")
-    return values
-
-
 @dataclass(frozen=True)
 class LineGoal:
     """A point of a link draws a straight segment, as straight as can be, during part of the turn.
@@ -67,7 +64,7 @@ class LineGoal:
     span : float
         Part of the turn in which the segment is drawn, radians.
     link : int, optional
-        The link that carries the point; by default the one farthest from the frame.
+        The link that carries the point; the one farthest from the frame by default.
     on_bar : bool
         The point is to lie on the line through the link's first two joints: the link is a straight rod.
     tolerance : float
@@ -87,10 +84,9 @@ class LineGoal:
 
     def __post_init__(self) -> None:
         positive("length", self.length)
-        positive("tolerance", self.tolerance)
         if not 0.0 < finite("span", self.span) <= math.tau:
             raise GeometryError(f"span = {self.span} must lie in (0, 2 pi]; give the part of the turn in radians")
-        _link("link", self.link)
+        _check(self)
 
 
 @dataclass(frozen=True)
@@ -105,7 +101,7 @@ class PathGoal:
         Inputs at the points relative to the first, increasing, within the turn or range; timed path.  Without them
         only the order counts.
     link : int, optional
-        The link that carries the point; by default the one farthest from the frame.
+        The link that carries the point; the one farthest from the frame by default.
     tolerance : float
         Largest distance from a point, over the size of the set of points.
 
@@ -126,8 +122,6 @@ class PathGoal:
             raise GeometryError(f"a path needs three or more points that do not all coincide; it has {len(places)}")
         object.__setattr__(self, "points", places)
         _timed(self, len(places))
-        positive("tolerance", self.tolerance)
-        _link("link", self.link)
 
 
 @dataclass(frozen=True)
@@ -165,8 +159,6 @@ class PosesGoal:
         if self.inputs is None:
             raise GeometryError("a poses goal needs the inputs at which the poses are passed; give inputs")
         _timed(self, len(rows))
-        positive("tolerance", self.tolerance)
-        _link("link", self.link)
 
 
 @dataclass(frozen=True)
@@ -192,15 +184,16 @@ class FunctionGoal:
     def __post_init__(self) -> None:
         object.__setattr__(self, "outputs", _numbers("outputs", self.outputs, 3))
         _timed(self, len(self.outputs))
-        positive("tolerance", self.tolerance)
-        _link("link", self.link)
 
 
 def _timed(goal: PathGoal | PosesGoal | FunctionGoal, count: int) -> None:
-    """Check and store the inputs of a goal, shifted to begin at 0."""
+    """Check a goal, and store its inputs shifted to begin at 0."""
+    _check(goal)
     if goal.inputs is None:
         return
-    inputs = _rising("inputs", _numbers("inputs", goal.inputs, 1))
+    inputs = _numbers("inputs", goal.inputs, 1)
+    if any(b <= a for a, b in pairwise(inputs)):
+        raise GeometryError("inputs must increase strictly; sort the list and remove duplicates")
     if len(inputs) != count:
         raise GeometryError(f"the goal has {count} targets but {len(inputs)} inputs; give one input for each")
     object.__setattr__(goal, "inputs", tuple(value - inputs[0] for value in inputs))
@@ -314,24 +307,26 @@ def target_link(design: Design, target: Target) -> int:
 
 
 class TargetFit(ABC):
-    """Base: where to sample, how many more unknowns, and the errors."""
+    """Base: where to sample, how many more unknowns, and the errors.
 
-    #: Inputs at which the target is sampled, relative to the first.
+    `inputs`: at which the target is sampled, relative to the first; `ranges`: of further unknowns, shape (extras, 2);
+    `placed`: the target speaks of absolute coordinates; `angular`: continuous angles are needed; `smooth`: the errors
+    vanish smoothly at a perfect candidate, so that least squares help; `warped`: the target reads the motion at other
+    inputs by set.
+    """
+
     inputs: Array
-    #: Ranges of further unknowns, shape (extras, 2).
     ranges: Array = np.zeros((0, 2))
-    #: Whether the target speaks of absolute coordinates.
-    placed = False
-    #: Whether continuous angles are needed.
-    angular = True
-    #: Whether the errors vanish smoothly at a perfect candidate, so that least squares help.
-    smooth = True
-    #: Whether the target reads the motion at other inputs by set.
-    warped = False
+    placed, angular, smooth, warped = False, True, True, False
 
     @abstractmethod
     def errors(self, sampled: Sampled, extras: Array, crank: Array) -> tuple[Complex, Placed]:
         """Errors (sets, m) whose largest size is in the unit of the tolerance, and the placement."""
+
+    def unplaced(self, q: Complex) -> Placed:
+        """Return a placement that leaves the whole where it is."""
+        one = np.ones(len(q), dtype=np.complex128)
+        return Placed(one, q, 0.0 * one)
 
 
 class PathFit(TargetFit):
@@ -388,8 +383,7 @@ class FunctionFit(TargetFit):
         """Differences of angles with the best zero of the scale."""
         e = sampled.angle - self.outputs
         e = e - 0.5 * (e.max(axis=1, keepdims=True) + e.min(axis=1, keepdims=True))
-        one = np.ones(len(e), dtype=np.complex128)
-        return e.astype(np.complex128), Placed(one, 0.0 * one, 0.0 * one)
+        return e.astype(np.complex128), self.unplaced(np.zeros(len(e), dtype=np.complex128))
 
 
 class LineFit(TargetFit):
@@ -408,16 +402,18 @@ class LineFit(TargetFit):
         z, w = sampled.z, sampled.w
         dz, dw = z[:, -1] - z[:, 0], w[:, -1] - w[:, 0]
         length = self.target.length * crank
-        if self.target.on_bar:
-            q, far = _on_bar(dz, dw, length)
+        if self.target.on_bar:  # q real with |dz + q dw| = length (the larger), and how far it is from existing
+            a, b, c = np.abs(dw) ** 2, (dz * np.conj(dw)).real, np.abs(dz) ** 2 - length**2
+            inside = b * b - a * c
+            q = ((-b + np.sqrt(np.maximum(inside, 0.0))) / a).astype(np.complex128)
+            far = np.sqrt(np.maximum(-inside, 0.0)) / (a * length)
         else:
             q, far = (length * np.exp(1j * extras[:, 1]) - dz) / dw, np.zeros(len(z))
         M = z + q[:, None] * w
         along = (M[:, -1] - M[:, 0]) / length * np.exp(1j * extras[:, 0])
         y = (np.conj(along)[:, None] * M).imag
         width = (_peak(y) + _peak(-y)) / length
-        one = np.ones(len(z), dtype=np.complex128)
-        return (width + far)[:, None].astype(np.complex128), Placed(one, q, 0.0 * one)
+        return (width + far)[:, None].astype(np.complex128), self.unplaced(q)
 
 
 def _peak(y: Array) -> Array:
@@ -426,20 +422,3 @@ def _peak(y: Array) -> Array:
     bend = np.minimum(y0 - 2.0 * y1 + y2, -1e-300)
     rise = np.where((y1 >= y0) & (y1 >= y2), -((y0 - y2) ** 2) / (8.0 * bend), 0.0)
     return np.asarray(np.maximum(y.max(axis=1), (y1 + rise).max(axis=1)))
-
-
-def _on_bar(dz: Complex, dw: Complex, length: Array) -> tuple[Complex, Array]:
-    """Real k with |dz + k dw| = length (the larger), and how far it is from existing."""
-    a, b, c = np.abs(dw) ** 2, (dz * np.conj(dw)).real, np.abs(dz) ** 2 - length**2
-    inside = b * b - a * c
-    k = (-b + np.sqrt(np.maximum(inside, 0.0))) / a
-    return k.astype(np.complex128), np.sqrt(np.maximum(-inside, 0.0)) / (a * length)
-
-
-def make_fit(target: Target | None) -> TargetFit | None:
-    """Return the fit of a target."""
-    if target is None:
-        return None
-    if isinstance(target, LineGoal):
-        return LineFit(target)
-    return FunctionFit(target) if isinstance(target, FunctionGoal) else PathFit(target)

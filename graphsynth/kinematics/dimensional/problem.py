@@ -4,28 +4,28 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.kinematics.dimensional.design import Design
+from graphsynth.kinematics.dimensional.design import Design, made_joint
 from graphsynth.kinematics.dimensional.goals import (
+    FunctionFit,
+    FunctionGoal,
     Goals,
+    LineFit,
     LineGoal,
     PathFit,
     Placed,
     Sampled,
     TargetFit,
-    make_fit,
     target_link,
 )
 from graphsynth.kinematics.dimensional.sketch import layout
 from graphsynth.kinematics.dimensional.verify import group_forms, transmission_sines
 from graphsynth.kinematics.engine.batch import simulate_batch
 from graphsynth.kinematics.simulation import simulate
-from graphsynth.mechanism.joints import JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver, Linear
 from graphsynth.mechanism.model import Mechanism, TracePoint
 
@@ -55,20 +55,6 @@ class Evaluated(NamedTuple):
     placed: Placed | None
 
 
-@dataclass(frozen=True)
-class Unknowns:
-    """Where the parts of the vector are."""
-
-    free: NDArray[np.intp]
-    angles: int
-    extras: int
-
-    @property
-    def size(self) -> int:
-        """Length of the vector."""
-        return 2 * len(self.free) + self.angles + self.extras
-
-
 class DimensionProblem:
     """Candidates for one design under given goals, from one sketch.
 
@@ -80,11 +66,19 @@ class DimensionProblem:
     def __init__(self, design: Design, goals: Goals, random: np.random.Generator, variant: int = 0) -> None:
         self.design, self.goals, self.sense = design, goals, -1 if variant & 1 else 1
         sense = self.sense
-        self.fit: TargetFit | None = make_fit(goals.target)
+        self.fit: TargetFit | None = None
+        if isinstance(goals.target, LineGoal):
+            self.fit = LineFit(goals.target)
+        elif isinstance(goals.target, FunctionGoal):
+            self.fit = FunctionFit(goals.target)
+        elif goals.target is not None:
+            self.fit = PathFit(goals.target)
         self.link = target_link(design, goals.target) if goals.target is not None else -1
         self.ends = [(joint.a, joint.b) for joint in design.graph.joints]
         free = np.setdiff1d(np.arange(len(self.ends)), design.fixed)
-        self.unknowns = Unknowns(free, len(design.directed), 0 if self.fit is None else len(self.fit.ranges))
+        self.free = free
+        self.extras = 0 if self.fit is None else len(self.fit.ranges)
+        self.size = 2 * len(free) + len(design.directed) + self.extras
         self.sketch = self._sketch(random)
         self.angles = random.uniform(0.0, math.pi, len(design.directed))
         base = design.mechanism(self.sketch, self.angles)
@@ -109,7 +103,11 @@ class DimensionProblem:
                 group: -mode if flips >> k & 1 else mode for k, (group, mode) in enumerate(self.modes.items())
             }
         self.evaluations = 0
-        self._set_inputs()
+        # uniform samples over the range, and the inputs of the target among them
+        own = np.zeros(0) if self.fit is None else self.fit.inputs
+        order = np.sort(np.concatenate([np.linspace(0.0, goals.span, (96 if self.iterative else 48) + 1), own]))
+        self.inputs = order[np.concatenate([[True], np.diff(order) > 1e-9])]
+        self.at_target = np.abs(self.inputs[None] - own[:, None]).argmin(axis=1)
 
     def _sketch(self, random: np.random.Generator) -> Array:
         """Places of the automatic sketch, shifted a little, with the driven links shrunk to cranks."""
@@ -122,25 +120,14 @@ class DimensionProblem:
                     places[k] = places[joint] + 0.3 * (places[k] - places[joint])
         return places
 
-    def _set_inputs(self) -> None:
-        """Uniform samples over the range, and the inputs of the target among them."""
-        count = 96 if self.iterative else 48
-        uniform = np.linspace(0.0, self.goals.span, count + 1)
-        own = np.zeros(0) if self.fit is None else self.fit.inputs
-        everything = np.concatenate([uniform, own])
-        order = np.sort(everything)
-        keep = np.concatenate([[True], np.diff(order) > 1e-9])
-        self.inputs = order[keep]
-        self.at_target = np.abs(self.inputs[None] - own[:, None]).argmin(axis=1)
-
     # --- from vectors to motions
 
     def decode(self, X: Array) -> tuple[Array, Array, Array]:
         """Places (sets, joints, 2), angles and extras of vectors (sets, size)."""
-        own, count = self.unknowns, 2 * len(self.unknowns.free)
+        count, angles = 2 * len(self.free), len(self.design.directed)
         places = np.repeat(self.sketch[None], len(X), axis=0)
-        places[:, own.free] = X[:, :count].reshape(len(X), -1, 2)
-        return places, X[:, count : count + own.angles], X[:, count + own.angles :]
+        places[:, self.free] = X[:, :count].reshape(len(X), -1, 2)
+        return places, X[:, count : count + angles], X[:, count + angles :]
 
     def bounds(self) -> Array:
         """Box of the search, shape (size, 2)."""
@@ -148,8 +135,8 @@ class DimensionProblem:
         reach = 1.5 * float(np.abs(self.sketch - middle).max())
         if self.fit is not None:
             reach = max(reach, self.goals.max_length_ratio)
-        box = [(middle[k % 2] - reach, middle[k % 2] + reach) for k in range(2 * len(self.unknowns.free))]
-        box += [(-math.pi, 2.0 * math.pi)] * self.unknowns.angles
+        box = [(middle[k % 2] - reach, middle[k % 2] + reach) for k in range(2 * len(self.free))]
+        box += [(-math.pi, 2.0 * math.pi)] * len(self.design.directed)
         return np.array([*box, *([] if self.fit is None else self.fit.ranges.tolist())]).reshape(-1, 2)
 
     def population(self, count: int, random: np.random.Generator) -> Array:
@@ -165,11 +152,11 @@ class DimensionProblem:
                 for k in self.design.joints_of(link):
                     if k not in self.design.fixed:
                         places[:, k] = places[:, joint] + size * (places[:, k] - places[:, joint])
-        angles = self.angles + random.normal(0.0, 0.5, (count, self.unknowns.angles))
-        ranges = self.bounds()[len(self.bounds()) - self.unknowns.extras :]
-        extras = random.uniform(ranges[:, 0], ranges[:, 1], (count, self.unknowns.extras))
-        X = np.concatenate([places[:, self.unknowns.free].reshape(count, -1), angles, extras], axis=1)
+        angles = self.angles + random.normal(0.0, 0.5, (count, len(self.angles)))
         box = self.bounds()
+        ranges = box[len(box) - self.extras :]
+        extras = random.uniform(ranges[:, 0], ranges[:, 1], (count, self.extras))
+        X = np.concatenate([places[:, self.free].reshape(count, -1), angles, extras], axis=1)
         return np.asarray(np.clip(X, box[:, 0], box[:, 1]))
 
     def evaluate(self, X: Array) -> Evaluated:
@@ -180,14 +167,20 @@ class DimensionProblem:
         rates = self.fit is not None and self.fit.warped
         motion = simulate_batch(self.base, self.inputs, dimensions, modes=self.modes, rates=rates)
         sines = transmission_sines(self.forms, dimensions, self.ends, motion.frames, motion.margins)
-        complete = motion.completed & self._closed(motion.frames)
+        complete = motion.completed
         with np.errstate(invalid="ignore"):
+            if self.goals.full_turn:
+                complete &= np.abs(motion.frames[:, -1] - motion.frames[:, 0]).max(axis=(1, 2)) < _CLOSED
             least = np.where(complete, _least(sines, self.goals.full_turn), 0.0)
-        ratio = self._ratio(places)
+        sides = self.design.sides
+        d = places[:, sides[:, 0]] - places[:, sides[:, 1]]
+        lengths = np.hypot(d[..., 0], d[..., 1])
+        shortest = np.maximum(lengths.min(axis=1, initial=np.inf), 1e-12)
+        ratio = lengths.max(axis=1) / shortest if lengths.shape[1] else np.ones(len(places))
         errors, placed = np.zeros((len(X), 1), dtype=np.complex128), None
         if self.fit is not None:
             errors, placed, arms = self._error(motion.frames, motion.velocities, extras, places, complete)
-            ratio = np.maximum(ratio, arms / self._shortest(places))
+            ratio = np.maximum(ratio, arms / shortest)
         error = np.abs(errors).max(axis=1)
         goal = max(_SPARE * math.sin(self.goals.min_transmission_angle), 1e-3)
         merit = np.minimum(least / goal, self.goals.max_length_ratio / ratio)
@@ -196,26 +189,6 @@ class DimensionProblem:
         cost = np.where(complete, cost, INCOMPLETE - 10.0 * reached)
         return Evaluated(cost, np.where(complete, merit, 0.0), errors, dimensions, motion.frames[:, 0], placed)
 
-    def _closed(self, frames: Array) -> NDArray[np.bool_]:
-        if not self.goals.full_turn:
-            return np.ones(len(frames), dtype=np.bool_)
-        with np.errstate(invalid="ignore"):
-            return np.asarray(np.abs(frames[:, -1] - frames[:, 0]).max(axis=(1, 2)) < _CLOSED)
-
-    def _lengths(self, places: Array) -> Array:
-        sides = self.design.sides
-        d = places[:, sides[:, 0]] - places[:, sides[:, 1]]
-        return np.asarray(np.hypot(d[..., 0], d[..., 1]))
-
-    def _shortest(self, places: Array) -> Array:
-        return np.asarray(np.maximum(self._lengths(places).min(axis=1, initial=np.inf), 1e-12))
-
-    def _ratio(self, places: Array) -> Array:
-        lengths = self._lengths(places)
-        if not lengths.shape[1]:
-            return np.ones(len(places))
-        return np.asarray(lengths.max(axis=1) / self._shortest(places))
-
     def crank(self, places: Array) -> Array:
         """Length of the first driven link: from its driven joint to its first other joint."""
         joint = self.design.driver_joints[0]
@@ -223,22 +196,19 @@ class DimensionProblem:
         d = places[:, joint] - places[:, other]
         return np.asarray(np.hypot(d[:, 0], d[:, 1]))
 
-    def _bar(self, places: Array) -> tuple[Complex, Complex]:
-        """Origin and direction of the target's link at the sketch pose: its first joint, towards its second."""
-        first, second = (self.design.joints_of(self.link) * 2)[:2]
-        d = places[:, second] - places[:, first]
-        z = d[:, 0] + 1j * d[:, 1]
-        size = np.abs(z)
-        along = np.where(size > 0.0, z / np.maximum(size, 1e-300), 1.0)
-        return places[:, first, 0] + 1j * places[:, first, 1], along
-
     def _error(
         self, frames: Array, velocities: Array, extras: Array, places: Array, complete: NDArray[np.bool_]
     ) -> tuple[Complex, Placed, Array]:
         """Errors of the target, its placement, and the longest arm of the tracing point."""
         assert self.fit is not None
         own = frames[:, :, self.link]
-        origin, along = self._bar(places)
+        # origin and direction of the link at the sketch pose: its first joint, towards its second
+        joints = self.design.joints_of(self.link)
+        first, second = (joints * 2)[:2]
+        bar = (places[:, second] - places[:, first]) @ [1.0, 1.0j]
+        size = np.abs(bar)
+        along = np.where(size > 0.0, bar / np.maximum(size, 1e-300), 1.0)
+        origin = places[:, first, 0] + 1j * places[:, first, 1]
         w = own[..., 2] + 1j * own[..., 3]
         z, w = own[..., 0] + 1j * own[..., 1] + w * origin[:, None], w * along[:, None]
         angle = np.unwrap(np.nan_to_num(np.angle(w)), axis=1) if self.fit.angular else np.zeros(w.shape)
@@ -247,7 +217,15 @@ class DimensionProblem:
             v = velocities[:, :, self.link]
             turn = own[..., 2] + 1j * own[..., 3]
             dz = v[..., 0] + 1j * v[..., 1] + 1j * v[..., 2] * turn * origin[:, None]
-            sampled = _hermite(self.inputs, (z, dz), (angle, v[..., 2]), times)
+            # cubic interpolation at inputs that differ by set
+            k = np.clip(np.searchsorted(self.inputs, times, side="right") - 1, 0, len(self.inputs) - 2)
+            row, h = np.arange(len(z))[:, None], self.inputs[k + 1] - self.inputs[k]
+            x = (times - self.inputs[k]) / h
+            a, b, c, d = (1 + 2 * x) * (1 - x) ** 2, x * (1 - x) ** 2 * h, x * x * (3 - 2 * x), x * x * (x - 1) * h
+            at = a * z[row, k] + b * dz[row, k] + c * z[row, k + 1] + d * dz[row, k + 1]
+            rate = v[..., 2]
+            theta = a * angle[row, k] + b * rate[row, k] + c * angle[row, k + 1] + d * rate[row, k + 1]
+            sampled = Sampled(at, np.exp(1j * theta), theta)
         else:
             sampled = Sampled(z[:, self.at_target], w[:, self.at_target], angle[:, self.at_target])
         filler = np.exp(0.1j * np.arange(sampled.z.shape[1]))
@@ -259,7 +237,6 @@ class DimensionProblem:
         placed = Placed(found.s, found.s * origin + found.q * along, found.t)
         with np.errstate(divide="ignore", invalid="ignore"):
             point = placed.q / placed.s
-        joints = self.design.joints_of(self.link)
         arms = np.abs(places[:, joints, 0] + 1j * places[:, joints, 1] - point[:, None]).max(axis=1)
         return errors, placed, np.nan_to_num(arms, nan=1e12, posinf=1e12)
 
@@ -277,19 +254,6 @@ def _least(sines: Array, periodic: bool) -> Array:
     bend = y0 - 2.0 * y1 + y2
     drop = np.where(bend > 0.0, (y0 - y2) ** 2 / (8.0 * np.where(bend > 0.0, bend, 1.0)), 0.0)
     return np.asarray((y1 - drop).min(axis=1))
-
-
-def _hermite(u: Array, origin: tuple[Complex, Complex], turn: tuple[Array, Array], times: Array) -> Sampled:
-    """Cubic interpolation of a link at inputs that differ by set."""
-    k = np.clip(np.searchsorted(u, times, side="right") - 1, 0, len(u) - 2)
-    (z, dz), (angle, rate) = origin, turn
-    row = np.arange(len(z))[:, None]
-    h = u[k + 1] - u[k]
-    x = (times - u[k]) / h
-    a, b, c, d = (1 + 2 * x) * (1 - x) ** 2, x * (1 - x) ** 2 * h, x * x * (3 - 2 * x), x * x * (x - 1) * h
-    at = a * z[row, k] + b * dz[row, k] + c * z[row, k + 1] + d * dz[row, k + 1]
-    theta = a * angle[row, k] + b * rate[row, k] + c * angle[row, k + 1] + d * rate[row, k + 1]
-    return Sampled(at, np.exp(1j * theta), theta)
 
 
 # --- from a vector to a mechanism a designer can read: own frame of every link, pose at the first input
@@ -316,8 +280,11 @@ def dimensioned(problem: DimensionProblem, x: Array) -> Mechanism | None:
         s, t = _placement(problem, frames, table)
     world = [s * _world(frames, joint.a, table[k, 0:2]) + t for k, joint in enumerate(design.graph.joints)]
     own = {link: _frame(problem, link, world) for link in range(design.graph.links)}
-    turned = cmath.phase(s)
-    joints = [_joint(problem, k, world[k], own, turned, frames, table) for k in range(len(design.graph.joints))]
+    joints = []
+    for k, (a, b, _) in enumerate(design.graph.joints):
+        direction = float(table[k, 2]) + float(np.arctan2(frames[a, 3], frames[a, 2])) + cmath.phase(s)
+        on_a, on_b = _local(own[a], world[k]), _local(own[b], world[k])
+        joints.append(made_joint(design.kinds[k], a, b, on_a, on_b, direction - own[a][1], direction - own[b][1]))
     points: dict[str, TracePoint] = {}
     if problem.fit is not None:
         points["P"] = TracePoint(problem.link, _local(own[problem.link], s * point_at + t))
@@ -364,22 +331,3 @@ def _frame(problem: DimensionProblem, link: int, world: list[complex]) -> tuple[
 def _local(frame: tuple[complex, float], at: complex) -> tuple[float, float]:
     p = (at - frame[0]) * cmath.exp(-1j * frame[1])
     return p.real, p.imag
-
-
-def _joint(
-    problem: DimensionProblem,
-    k: int,
-    at: complex,
-    own: dict[int, tuple[complex, float]],
-    turned: float,
-    frames: Array,
-    table: Array,
-) -> JointGeometry:
-    joint, kind = problem.design.graph.joints[k], problem.design.kinds[k]
-    on_a, on_b = _local(own[joint.a], at), _local(own[joint.b], at)
-    if kind == "R":
-        return Revolute(joint.a, joint.b, on_a, on_b)
-    direction = float(table[k, 2]) + float(np.arctan2(frames[joint.a, 3], frames[joint.a, 2])) + turned
-    if kind == "P":
-        return Prismatic(joint.a, joint.b, on_a, on_b, direction - own[joint.a][1], direction - own[joint.b][1])
-    return PinSlot(joint.a, joint.b, on_a, on_b, direction - own[joint.a][1])

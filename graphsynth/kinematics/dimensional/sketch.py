@@ -111,8 +111,11 @@ def layout(graph: MechanismGraph) -> JointLayout:
     if found is None:
         return _with_crossings(graph)
     loops, polygons = found
-    places = _circle(graph, loops[0]) if len(loops) == 2 else _best_outer(graph, loops, polygons)
-    return JointLayout(graph, places, polygons, True)
+    if len(loops) > 2:
+        return JointLayout(graph, _best_outer(graph, loops, polygons), polygons, True)
+    count, z = len(loops[0]), np.zeros(len(graph.joints), dtype=np.complex128)  # a regular polygon of sides 1
+    z[loops[0]] = np.exp(1j * math.tau * np.arange(count) / count) / (2.0 * math.sin(math.pi / count))
+    return JointLayout(graph, _upright(graph, z, loops[0]), polygons, True)
 
 
 # --- planar embedding
@@ -132,18 +135,13 @@ def _embedding(graph: MechanismGraph) -> tuple[list[list[int]], Polygons] | None
     outlines = tuple(
         tuple(index[link, other] for other in embedding.neighbors_cw_order(link)) for link in range(graph.links)
     )
-    return _loops(embedding, index), outlines
-
-
-def _loops(embedding: Any, index: dict[tuple[int, int], int]) -> list[list[int]]:
-    """Faces of the embedding as cycles of joints, in a fixed order."""
     seen: set[tuple[int, int]] = set()
-    found = []
+    found = []  # the faces in a fixed order
     for edge in sorted(index):
         if edge not in seen:
             around = embedding.traverse_face(*edge, mark_half_edges=seen)
             found.append([index[pair] for pair in zip(around, [*around[1:], around[0]])])
-    return found
+    return found, outlines
 
 
 def _best_outer(graph: MechanismGraph, loops: list[list[int]], polygons: Polygons) -> Array:
@@ -160,7 +158,9 @@ def _best_outer(graph: MechanismGraph, loops: list[list[int]], polygons: Polygon
     best = next(drawing for drawing, room in zip(drawings, rooms) if room >= (1.0 - 1e-6) * max(rooms))
     best.even_out(_STEPS)
     for _ in range(_ROUNDS):  # large graphs begin crowded
-        if best.closest() >= _CLOSE:
+        z = best.z[: len(graph.joints)]
+        closest = np.abs(z[:, None] - z)[np.triu_indices(len(z), 1)].min()
+        if closest / best.mean_side() >= _CLOSE:
             break
         best.even_out(_STEPS, crowded=True)
     return _upright(graph, best.z[: len(graph.joints)], best.outer)
@@ -175,18 +175,21 @@ class _Drawing:
         sides = _sides(polygons)
         spokes = [(count + hub, joint) for hub, loop in enumerate(inner) for joint in loop]
         triangles = [(count + h, a, b) for h, loop in enumerate(inner) for a, b in zip(loop, [*loop[1:], loop[0]])]
-        self.plates = [corner for p in polygons if len(p) > 2 for corner in _corners(p)]
-        self.triangles = np.array(triangles + self.plates + _corners(self.outer), dtype=np.intp)
+        plates = [corner for p in polygons if len(p) > 2 for corner in _corners(p)]
+        self.triangles = np.array(triangles + plates + _corners(self.outer), dtype=np.intp)
         stiff = {pair for p in polygons if len(p) > 2 for pair in _sides((p,))}
-        self.springs = _Springs(
-            np.array(sides, dtype=np.intp), [_STIFF if side in stiff else 1.0 for side in sides], count
-        )
-        z = _tutte(count + len(inner), np.array(sides + spokes), self.outer)
-        self.z = z / float(np.abs(self.springs.stretch(z)).mean())
+        self.sides = np.array(sides, dtype=np.intp)
+        self.stiffness = np.array([_STIFF if side in stiff else 1.0 for side in sides])
+        self.z = _tutte(count + len(inner), np.array(sides + spokes), self.outer)
+        self.z = self.z / self.mean_side()
         self.sense = np.sign(_areas(self.z, self.triangles))
         self.joints = count
-        self.corners = np.array(self.plates, dtype=np.intp).reshape(-1, 3)
+        self.corners = np.array(plates, dtype=np.intp).reshape(-1, 3)
         self.turned = np.sign(_areas(self.z, self.corners))
+
+    def mean_side(self) -> float:
+        """Mean length of the sides of links."""
+        return float(np.abs(self.z[self.sides[:, 1]] - self.z[self.sides[:, 0]]).mean())
 
     def even_out(self, steps: int, crowded: bool = False) -> None:
         """Let springs, repulsion and the room of the faces act; no face turns over.
@@ -200,8 +203,8 @@ class _Drawing:
             x,
             y,
             self.joints,
-            self.springs.sides,
-            self.springs.stiffness,
+            self.sides,
+            self.stiffness,
             self.triangles,
             self.sense,
             self.corners,
@@ -212,12 +215,6 @@ class _Drawing:
         )
         self.z = x + 1j * y
 
-    def closest(self) -> float:
-        """Smallest distance of two joints in mean sides."""
-        z = self.z[: self.joints]
-        apart = np.abs(z[:, None] - z)[np.triu_indices(len(z), 1)].min()
-        return float(apart / np.abs(self.springs.stretch(z)).mean())
-
     def room(self) -> float:
         """Smallest distance of two joints, or height of a plate, over the size of the picture."""
         z = self.z[: self.joints]
@@ -225,29 +222,14 @@ class _Drawing:
         least = apart[np.triu_indices(len(z), 1)].min()
         longest = apart[self.corners, np.roll(self.corners, 1, axis=1)].max(axis=1, initial=1e-300)
         heights = np.abs(_areas(z, self.corners)) / longest
-        bars = self.springs.clearances(z).min(initial=np.inf)
-        return float(min(least, heights.min(initial=np.inf), 2.0 * bars) / apart.max())
-
-
-class _Springs:
-    """The sides of links, their springs of rest length 1, and the joints they are to keep away from."""
-
-    def __init__(self, sides: IntArray, stiffness: list[float], joints: int) -> None:
-        self.sides, self.stiffness = sides, np.array(stiffness)
-        of_side, joint = np.divmod(np.arange(joints * len(sides)), joints)
-        foreign = (joint != sides[of_side, 0]) & (joint != sides[of_side, 1])
-        self.foreign = joint[foreign], sides[of_side[foreign], 0], sides[of_side[foreign], 1]
-
-    def stretch(self, z: Complex) -> Complex:
-        """Vectors along the sides."""
-        return np.asarray(z[self.sides[:, 1]] - z[self.sides[:, 0]])
-
-    def clearances(self, z: Complex) -> Array:
-        """Distances of joints from the sides they are not on."""
-        k, p, q = self.foreign
-        side, way = z[q] - z[p], z[k] - z[p]
+        # joints keep away from the sides they are not on
+        of_side, k = np.divmod(np.arange(self.joints * len(self.sides)), self.joints)
+        foreign = (k != self.sides[of_side, 0]) & (k != self.sides[of_side, 1])
+        start, end = z[self.sides[of_side[foreign]]].T
+        side, way = end - start, z[k[foreign]] - start
         share = (way.real * side.real + way.imag * side.imag) / np.maximum(side.real**2 + side.imag**2, 1e-12)
-        return np.asarray(np.abs(way - np.minimum(np.maximum(share, 0.0), 1.0) * side))
+        bars = np.abs(way - np.minimum(np.maximum(share, 0.0), 1.0) * side).min(initial=np.inf)
+        return float(min(least, heights.min(initial=np.inf), 2.0 * bars) / apart.max())
 
 
 def _sides(polygons: Polygons) -> list[tuple[int, int]]:
@@ -300,36 +282,23 @@ def _upright(graph: MechanismGraph, z: Complex, outer: list[int]) -> Array:
 # --- without a plane embedding
 
 
-def _circle(graph: MechanismGraph, loop: list[int]) -> Array:
-    """Draw a single loop: a regular polygon of sides 1."""
-    z = np.zeros(len(graph.joints), dtype=np.complex128)
-    z[loop] = np.exp(1j * math.tau * np.arange(len(loop)) / len(loop)) / (2.0 * math.sin(math.pi / len(loop)))
-    return _upright(graph, z, loop)
-
-
 def _with_crossings(graph: MechanismGraph) -> JointLayout:
-    """Let binary links cross as diagonals of a quadrilateral; by forces where that is not enough."""
+    """Let binary links cross as diagonals of a quadrilateral; where that is not enough, by forces.
+
+    These are springs between all joints of a link and repulsion, the best of many starts.
+    """
+    own = [[k for k, joint in enumerate(graph.joints) if link in (joint.a, joint.b)] for link in range(graph.links)]
     if not graph.is_planar and (pairs := crossing_pairs(graph)):
         number = merged(graph, pairs)
-        joints = [(number[a], number[b]) for a, b, _ in graph.joints]
+        pairs_of = [(number[a], number[b]) for a, b, _ in graph.joints]
         frame = None if graph.frame is None else number[graph.frame]
-        simple = MechanismGraph(max(number) + 1, joints, frame=frame)
+        simple = MechanismGraph(max(number) + 1, pairs_of, frame=frame)
         if _embedding(simple) is not None:
             drawn = layout(simple)
             index = {(a, b): k for k, (a, b, _) in enumerate(simple.joints)}
-            places = drawn.positions[[index[min(pair), max(pair)] for pair in joints]]
-            polygons = tuple(_around(places, own) for own in _own_joints(graph))
+            places = drawn.positions[[index[min(pair), max(pair)] for pair in pairs_of]]
+            polygons = tuple(_around(places, joints) for joints in own)
             return JointLayout(graph, places, polygons, False, len(pairs))
-    return _by_forces(graph)
-
-
-def _own_joints(graph: MechanismGraph) -> list[list[int]]:
-    return [[k for k, joint in enumerate(graph.joints) if link in (joint.a, joint.b)] for link in range(graph.links)]
-
-
-def _by_forces(graph: MechanismGraph) -> JointLayout:
-    """Springs between all joints of a link and repulsion, the best of many starts."""
-    own = _own_joints(graph)
     if max(map(len, own)) < 2:
         return JointLayout(graph, np.zeros((len(graph.joints), 2)), tuple(map(tuple, own)), True)
     z, crossings = fewest_crossings(own, len(graph.joints))

@@ -12,8 +12,9 @@ from its end to the point where the other two bars meet.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +24,9 @@ from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.joints import Revolute
 
 if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.program import Step
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.model import Mechanism
-from collections.abc import Sequence
-from typing import NamedTuple
-
-from graphsynth.kinematics.engine.program import Step
-from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
 
@@ -67,7 +64,15 @@ class Figures:
 
 def verify(mechanism: Mechanism, goals: Goals) -> tuple[Motion, Figures, tuple[str, ...]]:
     """Simulate the range anew and return the motion, its figures, and every reason to reject it (none: accepted)."""
-    inputs, at = _inputs(goals)
+    # a fine grid that contains the inputs of the target, and where they are
+    inputs, target, own = np.linspace(0.0, goals.span, _SAMPLES + 1), goals.target, np.zeros(0)
+    if isinstance(target, LineGoal):
+        own = np.array([target.span])
+    elif target is not None and target.inputs is not None:
+        own = np.array(target.inputs)
+    own = np.minimum(own, goals.span)
+    inputs = np.sort(np.concatenate([inputs, [u for u in own if np.abs(inputs - u).min() > 1e-9]]))
+    at = np.abs(inputs[None] - own[:, None]).argmin(axis=1)
     motion = simulate(mechanism, inputs)
     reasons = []
     if not motion.completed:
@@ -87,7 +92,7 @@ def verify(mechanism: Mechanism, goals: Goals) -> tuple[Motion, Figures, tuple[s
         reasons.append("the transmission angle is too small")
     if not ratio <= goals.max_length_ratio * (1.0 + _SLACK):
         reasons.append("the length ratio is too large")
-    if goals.target is not None and not error <= goals.target.tolerance:
+    if target is not None and not error <= target.tolerance:
         reasons.append("the target is missed")
     apart = motion.singularity_distance
     figures = Figures(
@@ -101,21 +106,6 @@ def verify(mechanism: Mechanism, goals: Goals) -> tuple[Motion, Figures, tuple[s
     return motion, figures, tuple(reasons)
 
 
-def _inputs(goals: Goals) -> tuple[Array, NDArray[np.intp]]:
-    """Return a fine grid that contains the inputs of the target, and where they are."""
-    inputs = np.linspace(0.0, goals.span, _SAMPLES + 1)
-    target = goals.target
-    own = np.zeros(0)
-    if isinstance(target, LineGoal):
-        own = np.array([target.span])
-    elif target is not None and target.inputs is not None:
-        own = np.array(target.inputs)
-    own = np.minimum(own, goals.span)
-    new = [value for value in own if np.abs(inputs - value).min() > 1e-9]
-    inputs = np.sort(np.concatenate([inputs, new]))
-    return inputs, np.abs(inputs[None] - own[:, None]).argmin(axis=1)
-
-
 def smallest_transmission(motion: Motion) -> float:
     """Smallest transmission angle of a motion over all groups, radians; NaN if it is not complete.
 
@@ -124,10 +114,8 @@ def smallest_transmission(motion: Motion) -> float:
     if not motion.completed:
         return math.nan
     mechanism = motion.mechanism
-    frames = np.stack(
-        [motion.poses[..., 0], motion.poses[..., 1], np.cos(motion.poses[..., 2]), np.sin(motion.poses[..., 2])],
-        axis=-1,
-    )
+    x, y, angle = np.moveaxis(motion.poses, -1, 0)
+    frames = np.stack([x, y, np.cos(angle), np.sin(angle)], axis=-1)
     ends = [(joint.a, joint.b) for joint in mechanism.joints]
     forms = group_forms(mechanism, motion.steps)
     sines = transmission_sines(forms, mechanism.dimensions[None], ends, frames[None], motion.margins[None])
@@ -236,17 +224,23 @@ class GroupForm(NamedTuple):
 
 def group_forms(mechanism: Mechanism, steps: Sequence[Step]) -> tuple[GroupForm, ...]:
     """Return the form of every group of a mechanism."""
-    return tuple(_form(mechanism, step) for step in steps if step.group >= 0)
+    from graphsynth.structure.assur import decompose
+
+    found = decompose(mechanism.graph, [driver.pair for driver in mechanism.drivers])
+    known, forms = {*found.driven}, []  # links placed before a group: the frame, driven links and earlier groups
+    for group, step in zip(found.groups, (step for step in steps if step.group >= 0)):
+        forms.append(_form(mechanism, step, known))
+        known |= {*group.links}
+    return tuple(forms)
 
 
-def _form(mechanism: Mechanism, step: Step) -> GroupForm:
+def _form(mechanism: Mechanism, step: Step, known: set[int]) -> GroupForm:
     plain = GroupForm(step.group, step.has_two_modes, (), (), ())
     if step.has_two_modes or not step.iterative:
         return plain
     inside, core = set(step.links), set(step.core)
     driven = {driver.pair for driver in mechanism.drivers}
     bars, pins = [], []
-    known = {link for s in _before(mechanism, step) for link in s}
     own = [
         (k, joint)
         for k, joint in enumerate(mechanism.joints)
@@ -263,14 +257,6 @@ def _form(mechanism: Mechanism, step: Step) -> GroupForm:
     if not bars or len(bars) + 2 * len(pins) != 3 * len(core):
         return plain
     return GroupForm(step.group, False, tuple(step.core), tuple(bars), tuple(pins))
-
-
-def _before(mechanism: Mechanism, step: Step) -> list[tuple[int, ...]]:
-    """Links placed before a group: the frame, driven links and earlier groups."""
-    from graphsynth.structure.assur import decompose
-
-    found = decompose(mechanism.graph, [driver.pair for driver in mechanism.drivers])
-    return [found.driven, *(group.links for group in found.groups[: step.group])]
 
 
 def transmission_sines(

@@ -103,9 +103,9 @@ def _move(lengths: Ints, positions: int) -> Moved:
     swing = np.full(len(lengths), np.nan)
     # range of the rocker's angle, unless that turns fully; the extremes by parabolas through three samples
     frames = batch.frames[turns, :, 0]
-    angle = np.unwrap(np.arctan2(frames[..., 3], frames[..., 2]), axis=1)
-    whole = np.abs(angle[:, -1] - angle[:, 0]) > math.pi
-    swing[turns] = np.where(whole, math.tau, _extreme(angle[:, :-1]) + _extreme(-angle[:, :-1]))
+    turned = np.unwrap(np.arctan2(frames[..., 3], frames[..., 2]), axis=1)
+    full: NDArray[np.bool_] = np.abs(turned[:, -1] - turned[:, 0]) > math.pi
+    swing[turns] = np.where(full, math.tau, _extreme(turned[:, :-1]) + _extreme(-turned[:, :-1]))
     return Moved(kind, transmission, swing, int(batch.reached.sum()) + 2 * len(left))
 
 

@@ -340,8 +340,8 @@ def tolerance_box(context: Context, tolerances: bool = True) -> ToleranceBox:
     axis = [_exact(exact_number(number, Unit.parse("")), value) for number, value in zip(numbers, table.tilt.axis)]
     for key, size in table.tolerances.items() if tolerances else ():
         if key not in _TOLERANCES:
-            place = context.scene.place / "mechanism" / "tolerances"
-            raise place.error(f"has an unknown key {key!r}{suggest(key, _TOLERANCES)}", key)
+            here = context.scene.place / "mechanism" / "tolerances"
+            raise here.error(f"has an unknown key {key!r}{suggest(key, _TOLERANCES)}", key)
         name = _TOLERANCES[key][0]
         absolute, relative = _tolerance(context, key, size)
         given[name] = spread(Range.read(key, given[name]), absolute, relative)
