@@ -125,7 +125,11 @@ class MechanismSystem:
                 "as many; use as many drivers as the mobility"
             )
         self.Lc = characteristic_length(mechanism)
-        self.driven = [(driver, _drivable(mechanism.joint(*driver.pair))) for driver in mechanism.drivers]
+        self.driven: list[tuple[Driver, Revolute | Prismatic]] = []
+        for driver in mechanism.drivers:
+            joint = mechanism.joint(*driver.pair)
+            assert isinstance(joint, Revolute | Prismatic)
+            self.driven.append((driver, joint))
 
     @property
     def weights(self) -> Array:
@@ -200,11 +204,6 @@ def _put(target: Balls, key: tuple[slice | int, ...], value: Balls | float) -> N
         target.mid[key], target.rad[key] = value.mid, value.rad
     else:
         target.mid[key] = value
-
-
-def _drivable(joint: JointGeometry) -> Revolute | Prismatic:
-    assert isinstance(joint, Revolute | Prismatic)
-    return joint
 
 
 def _driven(place: _Place, driver: Driver, joint: Revolute | Prismatic, u: Balls) -> Balls:

@@ -98,7 +98,7 @@ def certify_four_bar(ground: Any, crank: Any, coupler: Any, rocker: Any) -> Cran
     )
     kind, touches, bounds = four_bar_rotation(g * g, a, b, c)
     bounds = bounds if kind in _BOUNDED else ()
-    limits = [_cosine(place, (g * g + a * a - reach * reach) / (2 * g * a)) for place, reach in bounds]
+    limits = [_limit(place, "acos", (g * g + a * a - reach * reach) / (2 * g * a)) for place, reach in bounds]
     changes = tuple(angle for angle, met in zip(("0", "pi"), touches) if met and kind != "never assembled")
     return _certificate(kind, type_of(g, a, b, c), limits, changes)
 
@@ -133,7 +133,7 @@ def certify_slider_crank(crank: Any, coupler: Any, offset: Any = 0) -> CrankCert
         for sign in (1, -1):
             sine = (sign * b - e) / a
             if abs(sine) <= 1 and abs(e + sign * a) > b:
-                limits.append(_sine("stretched", sine))
+                limits.append(_limit("stretched", "asin", sine))
         limits = sorted(set(limits), key=lambda limit: limit.low)
     return _certificate(kind, "slider-crank", limits, changes)
 
@@ -163,7 +163,7 @@ def certify_inverted_slider_crank(crank: Any, ground: Any, offset: Any = 0) -> C
     kind = _kind(abs(g - a), g + a, e, g + a + 1)
     limits = []
     if kind in _BOUNDED:
-        limits.append(_cosine("folded", (g * g + a * a - e * e) / (2 * g * a)))
+        limits.append(_limit("folded", "acos", (g * g + a * a - e * e) / (2 * g * a)))
     return _certificate(kind, "inverted slider-crank", limits, ("0",) if kind == "change point" else ())
 
 
@@ -179,18 +179,13 @@ def _kind(nearest: Fraction, farthest: Fraction, least: Fraction, most: Fraction
     return KINDS[int(rotation_kind(nearest - least, farthest - most, nearest - most, farthest - least))]
 
 
-def _cosine(place: str, cosine: Fraction) -> LimitAngle:
+def _limit(place: str, inverse: str, value: Fraction) -> LimitAngle:
+    """Enclose the angle of a cosine ("acos") or sine ("asin"), which is exact at 1 and -1."""
     with precision(_BITS):
-        if abs(cosine) == 1:
-            return LimitAngle(place, *outward(flint.arb(0) if cosine == 1 else flint.arb.pi()))
-        return LimitAngle(place, *outward(ball(cosine).acos()))
-
-
-def _sine(place: str, sine: Fraction) -> LimitAngle:
-    with precision(_BITS):
-        if abs(sine) == 1:
-            return LimitAngle(place, *outward(int(sine) * flint.arb.pi() / 2))
-        return LimitAngle(place, *outward(ball(sine).asin()))
+        if abs(value) < 1:
+            return LimitAngle(place, *outward(getattr(ball(value), inverse)()))
+        quarters = int(value) if inverse == "asin" else 1 - int(value)
+        return LimitAngle(place, *outward(quarters * flint.arb.pi() / 2))
 
 
 def outward(value: Any) -> tuple[float, float]:
@@ -203,12 +198,12 @@ def outward(value: Any) -> tuple[float, float]:
 
 
 def _certificate(kind: str, type_: str, limits: list[LimitAngle], changes: tuple[str, ...]) -> CrankCertificate:
+    where = ", ".join(f"{limit.low:.12g} rad ({limit.place})" for limit in limits)
     text = {
         "full turn": "the crank makes a full turn on one assembly mode",
         "change point": f"the crank passes every angle, but assembly modes meet at {', '.join(changes)}",
-        "limited": "the crank stops at " + ", ".join(f"{limit.low:.12g} rad ({limit.place})" for limit in limits),
-        "immovable": "nothing moves, the crank has one place: "
-        + ", ".join(f"{limit.low:.12g} rad ({limit.place})" for limit in limits),
+        "limited": f"the crank stops at {where}",
+        "immovable": f"nothing moves, the crank has one place: {where}",
         "never assembled": "the linkage cannot be assembled at any crank angle",
     }[kind]
     return CrankCertificate(kind, type_, tuple(limits), changes, f"proved ({type_}): {text}")

@@ -131,13 +131,36 @@ def _certify(motion: Motion, between: bool, budget: Budget) -> MotionCertificate
     turns = _full_turn(motion) if between and len(asked) == len(motion.inputs) else None
     u, end = _inputs(motion.inputs[asked], turns)
     nodes = prove_nodes(system, u, samples)
-    position, angle, room = _radii(system, nodes, samples)
+    radii = _radii(system, nodes, samples)
     found = Cover(np.zeros(max(len(asked) - 1, 0), dtype=bool))
     if between and len(asked) > 1 and all(enclosed(driver.law) for driver in motion.mechanism.drivers):
         found = cover(system, nodes, budget, begin)
     closed = turns is not None and end
     closed = closed and bool(found.covered.all()) and _closes(system, nodes, turns)
-    return _certificate(motion, between, asked, (position, angle, room), found, closed, turns, begin)
+    n = len(motion.inputs)
+    poses, intervals = np.zeros(n, dtype=bool), np.zeros(max(n - 1, 0), dtype=bool)
+    proved = np.isfinite(radii[2])
+    poses[asked] = proved
+    intervals[: len(found.covered)] = found.covered & proved[:-1] & proved[1:]
+    position, angle, room = np.full((3, n), np.nan)
+    for target, part in zip((position, angle, room), radii):
+        target[asked] = part
+    reason = _reason(motion, between, poses, intervals, found)
+    return MotionCertificate(
+        certified=not reason,
+        poses=poses,
+        position_radius=position,
+        angle_radius=angle,
+        unique_within=room,
+        intervals=intervals,
+        closed=bool(closed and not reason),
+        undecided=tuple(sorted(found.undecided)),
+        reason=reason,
+        boxes=found.tested,
+        Lc=motion.Lc,
+        seconds=perf_counter() - begin,
+        statement=_statement(reason, between, int(poses.sum()), n, closed, turns is not None),
+    )
 
 
 def _full_turn(motion: Motion) -> Fraction | None:
@@ -195,7 +218,13 @@ def _closes(system: MechanismSystem, nodes: Nodes, turns: Fraction | None) -> bo
         if isinstance(joint, Prismatic):
             expected.append(angle[joint.b] - angle[joint.a])
         elif isinstance(joint, Gear):
-            if not _meshes_again(joint, nodes, gear, angle):
+            # the equation is the same after the turns that wheels and line of centres have made, exactly
+            line = round(float(nodes.directions[-1, gear].mid - nodes.directions[0, gear].mid) / math.tau)
+            made_by_line = tau_times(float(line))
+            if not bool((nodes.directions[-1, gear] - nodes.directions[0, gear] - made_by_line).size < 3.0):
+                return False
+            first, second = map(Fraction, joint.turns()[0])
+            if first * (angle[joint.a] - line) + second * (angle[joint.b] - line) != 0:
                 return False
             gear += 1
     for driver, joint in system.driven:
@@ -204,52 +233,6 @@ def _closes(system: MechanismSystem, nodes: Nodes, turns: Fraction | None) -> bo
             assert own is not None
             expected.append(angle[driver.link] - angle[driver.base] - own)
     return bool((nodes.turns[-1] - nodes.turns[0] == np.array(expected, dtype=np.int64)).all())
-
-
-def _meshes_again(joint: Gear, nodes: Nodes, gear: int, angle: dict[int, int]) -> bool:
-    """Whether the gear equation is the same after the turns that wheels and line of centres have made, exactly."""
-    first, last = nodes.directions[0, gear], nodes.directions[-1, gear]
-    line = round(float(last.mid - first.mid) / math.tau)
-    if not bool((last - first - tau_times(float(line))).size < 3.0):
-        return False
-    first_wheel, second_wheel = map(Fraction, joint.turns()[0])
-    return first_wheel * (angle[joint.a] - line) + second_wheel * (angle[joint.b] - line) == 0
-
-
-def _certificate(
-    motion: Motion,
-    between: bool,
-    asked: NDArray[np.intp],
-    radii: tuple[Array, Array, Array],
-    found: Cover,
-    closed: bool,
-    turns: Fraction | None,
-    begin: float,
-) -> MotionCertificate:
-    n = len(motion.inputs)
-    position, angle, room = (np.full(n, np.nan) for _ in range(3))
-    poses, intervals = np.zeros(n, dtype=bool), np.zeros(max(n - 1, 0), dtype=bool)
-    for target, part in zip((position, angle, room), radii):
-        target[asked] = part
-    proved = np.isfinite(radii[2])
-    poses[asked] = proved
-    intervals[: len(found.covered)] = found.covered & proved[:-1] & proved[1:]
-    reason = _reason(motion, between, poses, intervals, found)
-    return MotionCertificate(
-        certified=not reason,
-        poses=poses,
-        position_radius=position,
-        angle_radius=angle,
-        unique_within=room,
-        intervals=intervals,
-        closed=bool(closed and not reason),
-        undecided=tuple(sorted(found.undecided)),
-        reason=reason,
-        boxes=found.tested,
-        Lc=motion.Lc,
-        seconds=perf_counter() - begin,
-        statement=_statement(reason, between, poses, intervals, closed, turns),
-    )
 
 
 def _reason(motion: Motion, between: bool, poses: Mask, intervals: Mask, found: Cover) -> str:
@@ -277,14 +260,13 @@ def _reason(motion: Motion, between: bool, poses: Mask, intervals: Mask, found: 
     )
 
 
-def _statement(reason: str, between: bool, poses: Mask, intervals: Mask, closed: bool, turns: Fraction | None) -> str:
-    count = int(poses.sum())
+def _statement(reason: str, between: bool, count: int, asked: int, closed: bool, turned: bool) -> str:
     if reason:
-        return f"undecided: {reason} ({count} of {len(poses)} poses proved)"
+        return f"undecided: {reason} ({count} of {asked} poses proved)"
     text = f"certified: each of the {count} samples has exactly one exact assembly within its radius"
     if not between:
         return text + "; nothing is stated between samples"
     text += ", and all lie on one branch without a singularity"
     if closed:
         return text + "; after the full turn the mechanism is proved to be where it began"
-    return text + ("; closing after the turn is not proved" if turns is not None else "")
+    return text + ("; closing after the turn is not proved" if turned else "")

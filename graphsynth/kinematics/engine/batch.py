@@ -182,15 +182,11 @@ def simulate_batch(
         signs = started(_one_set(program, 0), float(u[0]), modes or {}, poses[0]).modes
         program = with_turns(program, poses, Tracker(program, signs).values(u[:1])[:, 0, 0])
         centres = lines_of_centres(program, poses)
-    return _run(program, signs, u, poses, centres, found, rates, _kept(mechanism, keep))
-
-
-def _kept(mechanism: Mechanism, keep: Sequence[int] | None) -> list[int]:
-    links = range(mechanism.graph.links) if keep is None else [link_number("link in keep", link) for link in keep]
-    for link in links:
-        if link >= mechanism.graph.links:
-            raise GeometryError(f"keep names link {link}, but the links are 0..{mechanism.graph.links - 1}")
-    return list(links)
+    count = mechanism.graph.links
+    kept = list(range(count)) if keep is None else [link_number("link in keep", link) for link in keep]
+    if max(kept, default=0) >= count:
+        raise GeometryError(f"keep names link {max(kept)}, but the links are 0..{count - 1}")
+    return _run(program, signs, u, poses, centres, found, rates, kept)
 
 
 def _check_gears(mechanism: Mechanism, sizes: Array) -> None:
@@ -246,11 +242,15 @@ def _run(
     kept: list[int],
 ) -> BatchMotion:
     sets, n = len(poses), len(u)
-    poses[:, program.mechanism.frame] = 0.0
+    frame = program.mechanism.frame
+    poses[:, frame] = 0.0
     needed = rates or any(step.iterative for step in program.steps)
     groups = np.array([k for k, step in enumerate(program.steps) if step.group >= 0], dtype=np.int64)
+    # eliminated links are placed if they are kept or carry something else
+    wanted = np.zeros(program.mechanism.graph.links, dtype=np.bool_)
+    wanted[kept] = wanted[program.tables.touched] = wanted[program.tables.eliminated[:, 2:4].ravel()] = True
     width = n if rates else 0
-    links = kept or [program.mechanism.frame]  # the kernel delivers margins with links only
+    links = kept or [frame]  # the kernel delivers margins with links only
     out = codes.Delivery(
         poses,
         centres,
@@ -262,7 +262,7 @@ def _run(
         np.empty((sets, len(groups), n)),
     )
     trace = Trace(u, Tracker(program, signs).values(u), workspace(program, n, needed))
-    done, why = run_program(program, signs, trace, 0, needed, _wanted(program, kept), out)
+    done, why = run_program(program, signs, trace, 0, needed, wanted, out)
     done[~found], why[~found, 0] = 0, codes.UNREACHABLE
     for array in (out.frames, out.velocities, out.accelerations, out.margins):
         array[~found] = np.nan
@@ -272,13 +272,6 @@ def _run(
     )
     M = np.moveaxis(out.margins, -1, 1)
     return BatchMotion(u, tuple(kept), frames, V, W, M, done, why[:, 0], group)
-
-
-def _wanted(program: Program, kept: list[int]) -> NDArray[np.bool_]:
-    """Eliminated links that must be placed: those kept, and those that carry something else."""
-    wanted = np.zeros(program.mechanism.graph.links, dtype=np.bool_)
-    wanted[kept] = wanted[program.tables.touched] = wanted[program.tables.eliminated[:, 2:4].ravel()] = True
-    return wanted
 
 
 def solve_rrr(A: ArrayLike, B: ArrayLike, l1: ArrayLike, l2: ArrayLike, sign: int = 1) -> tuple[Array, Array]:

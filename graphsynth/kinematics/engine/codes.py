@@ -21,8 +21,7 @@ E_RR, E_RP, E_PP = 0, 1, 2
 DRIVE_R, DRIVE_P = 0, 1
 R_DIST, R_LINE_PIN, R_LINE_SLOT, R_ANGLE, R_GEAR, P_DIST, P_LINE, NEWTON, PLATFORM = 2, 3, 4, 5, 6, 7, 8, 9, 10
 
-#: NEWTON: any core; PLATFORM: one core link held by three distances, by Newton with explicit 3 x 3 solves.
-ITERATIVE = (NEWTON, PLATFORM)
+#: From here on iterative: any core; PLATFORM: one core link held by three distances, with explicit 3 x 3 solves.
 ITERATIVE_FROM = NEWTON
 #: Steps with two assembly modes.
 TWO_MODES = (R_DIST, R_LINE_PIN, R_LINE_SLOT, P_DIST)

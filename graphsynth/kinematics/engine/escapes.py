@@ -54,9 +54,7 @@ def refined(tracker: Tracker, trace: Trace) -> Trace:
 def pivot_passes(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
     """Return the first passage of every slotted link on a refined grid; each ends the motion."""
     found = []
-    for step in tracker.program.steps:
-        if step.code != codes.R_LINE_SLOT:
-            continue
+    for step in (step for step in tracker.program.steps if step.code == codes.R_LINE_SLOT):
         jumps = _sudden(trace, step.core[0])
         if not jumps.size:
             continue
@@ -95,23 +93,16 @@ def escapes(tracker: Tracker, stop: Stop) -> Iterator[MotionEvent]:
         found = blow_up(way.u, own, 10.0, (1.0, 0.5, 2.0)) if far else None
         if found is not None:
             at, uncertainty, power = found
-            if step.code == codes.P_LINE:
-                at, uncertainty = _parallel(tracker, stop, k, at, uncertainty)
+            if step.code == codes.P_LINE:  # the guides become parallel close to there
+                source, sample = way.last
+                beyond = at + 0.5 * (at - stop.at)
+                _, code, where = tracker.near(source, sample, beyond)
+                if code == codes.UNREACHABLE and where == k:  # else another group is lost before
+                    at, bad = closed_limit(tracker, source, sample, k, beyond)
+                    uncertainty = abs(bad - at)
             gone = [link for link in step.links if way.distances[-1, link] > 1e-3 * own[-1]]
             why = f"the distance grows like the power {-power:.2f} of the input left"
             yield _event(step, gone, at, uncertainty, why)
-
-
-def _parallel(tracker: Tracker, stop: Stop, step: int, at: float, uncertainty: float) -> tuple[float, float]:
-    """Input at which the guides of a dyad become parallel, close to ``at``, and its uncertainty."""
-    assert stop.way is not None
-    source, k = stop.way.last
-    beyond = at + 0.5 * (at - stop.at)
-    _, code, where = tracker.near(source, k, beyond)
-    if code != codes.UNREACHABLE or where != step:  # another group is lost before
-        return at, uncertainty
-    good, bad = closed_limit(tracker, source, k, step, beyond)
-    return good, abs(bad - good)
 
 
 def closed_limit(tracker: Tracker, source: Trace, at: int, step: int, bad: float) -> tuple[float, float]:

@@ -21,7 +21,6 @@ from graphsynth.kinematics.engine.escapes import (
     lost_before,
 )
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
-from graphsynth.kinematics.engine.program import Step
 from graphsynth.kinematics.engine.result import MotionEvent
 from graphsynth.mechanism.joints import JointGeometry, Prismatic, Revolute
 
@@ -47,9 +46,15 @@ def ending(tracker: Tracker, trace: Trace) -> MotionEvent:
     stop = trace.stop
     step = tracker.program.steps[stop.step]
     if stop.code == codes.BAD_INPUT:
-        at, uncertainty = _without_value(tracker, trace)
-        text = f"the driver of link {step.links[0]} has no value from the input {at:.12g} on"
-        return MotionEvent("input", at, -1, step.links, 0, uncertainty, True, text)
+        bad = float(trace.u[trace.done])
+        good = float(trace.u[trace.done - 1]) if trace.done else bad
+        while (middle := 0.5 * (good + bad)) not in (good, bad):
+            if np.isfinite(tracker.values(np.array([middle]))[:, :3]).all():
+                good = middle
+            else:
+                bad = middle
+        text = f"the driver of link {step.links[0]} has no value from the input {bad:.12g} on"
+        return MotionEvent("input", bad, -1, step.links, 0, abs(bad - good), True, text)
     if trace.done == 0:
         name, text = step.name, f"{step.name} cannot be assembled at the first input"
         if step.code == codes.NEWTON:  # its modes are searched for, and some may be missed
@@ -63,34 +68,13 @@ def ending(tracker: Tracker, trace: Trace) -> MotionEvent:
         return MotionEvent("not assembled", stop.at, step.group, step.links, 0, 0.0, True, text)
     if stop.code == codes.UNREACHABLE:
         return _limit(tracker, trace, float(trace.u[trace.done]))
-    beyond = _limit_beyond(tracker, trace, stop)
-    return _singular(tracker, stop) if beyond is None else _limit(tracker, trace, beyond)
-
-
-def _without_value(tracker: Tracker, trace: Trace) -> tuple[float, float]:
-    """First input at which a driver has no value, by halving the last step, and the uncertainty."""
-    bad = float(trace.u[trace.done])
-    if trace.done == 0:
-        return bad, 0.0
-    good = float(trace.u[trace.done - 1])
-    while (middle := 0.5 * (good + bad)) not in (good, bad):
-        if np.isfinite(tracker.values(np.array([middle]))[:, :3]).all():
-            good = middle
-        else:
-            bad = middle
-    return bad, abs(bad - good)
-
-
-def _limit_beyond(tracker: Tracker, trace: Trace, stop: Stop) -> float | None:
-    """Input just beyond a stop at which an earlier dyad cannot be assembled, if there is one.
-
-    Where a dyad folds, speeds grow without bound, and a larger group that hangs on it is lost a little before.
-    """
+    # where a dyad folds, speeds grow without bound, and a larger group that hangs on it is lost a little before
     pair, lost = tracker.reach(trace, trace.done - 1, stop.at)
     source, at = (pair, 1) if lost is None else (trace, trace.done - 1)
     beyond = stop.at + 1e-9 * float(trace.u[-1] - trace.u[0])
     _, code, where = tracker.near(source, at, beyond)
-    return beyond if code == codes.UNREACHABLE and where < stop.step else None
+    before = code == codes.UNREACHABLE and where < stop.step
+    return _limit(tracker, trace, beyond) if before else _singular(tracker, stop)
 
 
 def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
@@ -184,7 +168,10 @@ def touches(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
         elif step.has_two_modes:
             found += _examined(tracker, trace, M, s, _touch)
             ends = {0, len(M) - 1} if trace.stop is None else {0}  # the stop has an event of its own
-            found += [_at_end(trace, k, step) for k in sorted(ends) if len(M) and M[k] <= _TOUCH]
+            for at in (float(trace.u[k]) for k in sorted(ends) if len(M) and M[k] <= _TOUCH):
+                text = f"group {step.group} ({step.kind}) is stretched or folded at the input {at:.12g}: "
+                text += "its two modes meet there"
+                found.append(MotionEvent("change point", at, step.group, step.links, 2, 0.0, False, text))
     return found
 
 
@@ -194,7 +181,15 @@ def _examined(
     """Events at the places where a margin may vanish between samples."""
     middle, u = M[1:-1], trace.u[: trace.done]
     least = (middle < _NEAR) & (middle <= M[:-2]) & (middle <= M[2:])
-    low = np.flatnonzero(least & (_vertex(u, M) < np.where(middle < _FLAT, math.inf, 0.5 * middle))) + 1
+    # the least value of the parabola through a sample and its two neighbours, of which it is the least
+    left, right = u[1:-1] - u[:-2], u[2:] - u[1:-1]
+    a, b = (M[:-2] - middle) / left, (M[2:] - middle) / right
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope, bend = (b * left - a * right) / (left + right), (a + b) / (left + right)
+        vertex = middle - 0.25 * np.nan_to_num(
+            slope**2 / bend, posinf=math.inf
+        )  # 0 / 0: three values that are the same
+    low = np.flatnonzero(least & (vertex < np.where(middle < _FLAT, math.inf, 0.5 * middle))) + 1
     around = [(int(k) - 1, int(k), int(k) + 1) for k in low] + _outer_dips(tracker, trace, M, s)
     return [event for where in around if (event := examine(tracker, trace, where, s)) is not None]
 
@@ -232,22 +227,6 @@ def _parallel_between(tracker: Tracker, trace: Trace, where: tuple[int, int, int
         return None
     cut = replace(trace, done=first + 1, stop=Stop(codes.UNREACHABLE, s, float(best.x), 0.0))
     return _limit(tracker, cut, float(best.x))
-
-
-def _vertex(u: Array, y: Array) -> Array:
-    """Least value of the parabola through every sample and its two neighbours (the middle one is the least of them)."""
-    left, right = u[1:-1] - u[:-2], u[2:] - u[1:-1]
-    a, b = (y[:-2] - y[1:-1]) / left, (y[2:] - y[1:-1]) / right
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slope, bend = (b * left - a * right) / (left + right), (a + b) / (left + right)
-        drop = np.nan_to_num(slope**2 / bend, posinf=math.inf)  # 0 / 0: three values that are the same
-        return np.asarray(y[1:-1] - 0.25 * drop)
-
-
-def _at_end(trace: Trace, k: int, step: Step) -> MotionEvent:
-    at = float(trace.u[k])
-    text = f"group {step.group} ({step.kind}) is stretched or folded at the input {at:.12g}: its two modes meet there"
-    return MotionEvent("change point", at, step.group, step.links, 2, 0.0, False, text)
 
 
 def _touch(tracker: Tracker, trace: Trace, where: tuple[int, int, int], s: int) -> MotionEvent | None:
@@ -356,15 +335,13 @@ def _stops(tracker: Tracker, trace: Trace, rate: Rate, group: int, link: int) ->
     with np.errstate(invalid="ignore"):
         kept = np.flatnonzero(np.isfinite(speed) & (np.abs(speed) > _STILL * fastest))
     low, high = kept[:-1], kept[1:]
-    turns = np.flatnonzero(speed[low] * speed[high] < 0.0)
+    turns = speed[low] * speed[high] < 0.0
     dips = _dips(trace.u[high] - trace.u[low], speed[low], speed[high], slope[low], slope[high])
     found: list[MotionEvent | None] = []
-    for k in turns:
+    for k in [*np.flatnonzero(turns), *dips]:
         at = _speed_from(tracker, trace, int(low[k]), rate)
-        found.append(_reversal(at, float(trace.u[low[k]]), float(trace.u[high[k]]), group, link))
-    for k in dips:
-        at = _speed_from(tracker, trace, int(low[k]), rate)
-        found += _dip(at, float(trace.u[low[k]]), float(trace.u[high[k]]), group, link)
+        first, last = float(trace.u[low[k]]), float(trace.u[high[k]])
+        found += [_reversal(at, first, last, group, link)] if turns[k] else _dip(at, first, last, group, link)
     return [event for event in found if event is not None]
 
 

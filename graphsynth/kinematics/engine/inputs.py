@@ -65,10 +65,7 @@ def warn_of_degrees(mechanism: Mechanism, u: Array) -> None:
 def coordinates(driver: Driver, u: Array) -> tuple[Array, Array, Array]:
     """Coordinate of a driver and its two derivatives, NaN where the law has no finite value.
 
-    Raises
-    ------
-    GeometryError
-        If the law does not return three arrays of the shape of its input.
+    `GeometryError` if the law does not return three arrays of the shape of its input.
     """
     name = f"the law of driver {driver.base}-{driver.link}"
     found = called(name, driver.law, u)
@@ -79,19 +76,15 @@ def coordinates(driver: Driver, u: Array) -> tuple[Array, Array, Array]:
     for part in parts:
         if part.shape != u.shape:
             raise GeometryError(f"{name} returned the shape {part.shape} for inputs of shape {u.shape}; return as many")
-    finite = np.isfinite(parts[0]) & np.isfinite(parts[1]) & np.isfinite(parts[2])
-    if not finite.all():
-        parts = [np.where(finite, part, np.nan) for part in parts]
-    return parts[0], parts[1], parts[2]
+    finite = np.isfinite(parts).all(axis=0)
+    value, rate, second = parts if finite.all() else (np.where(finite, part, np.nan) for part in parts)
+    return value, rate, second
 
 
 def fine_grid(mechanism: Mechanism, u: Array) -> Array:
     """Return inputs with extra samples where a turning driver would step too far.
 
-    Raises
-    ------
-    GeometryError
-        If the range needs more samples than memory has room for, or the user's own law jumps.
+    `GeometryError` if the range needs more samples than memory has room for, or the user's own law jumps.
     """
     if u.size < 2:
         return u
@@ -101,7 +94,11 @@ def fine_grid(mechanism: Mechanism, u: Array) -> Array:
         if isinstance(mechanism.joint(*driver.pair), Prismatic):
             size = steps * (_PARTS / abs(float(u[-1] - u[0])))
         else:
-            size = _travel(coordinates(driver, u), steps) / _FINE
+            # by values, rates and accelerations: a law that oscillates between neighbours is seen
+            value, rate, second = coordinates(driver, u)
+            by_rate = steps * np.maximum(np.abs(rate[1:]), np.abs(rate[:-1]))
+            by_second = 0.5 * steps**2 * np.maximum(np.abs(second[1:]), np.abs(second[:-1]))
+            size = np.maximum(np.abs(np.diff(value)), np.maximum(by_rate, by_second)) / _FINE
         parts = np.maximum(parts, np.ceil(np.nan_to_num(size, nan=1.0) - 1e-9))
     if parts.sum() * mechanism.graph.links > _MOST:
         raise GeometryError(
@@ -114,14 +111,6 @@ def fine_grid(mechanism: Mechanism, u: Array) -> Array:
     for driver in mechanism.drivers:
         _check_jumps(driver, grid)
     return grid
-
-
-def _travel(q: tuple[Array, Array, Array], steps: Array) -> Array:
-    """Travel between neighbours by values, rates and accelerations: a law that oscillates between them is seen."""
-    value, rate, second = q
-    by_rate = steps * np.maximum(np.abs(rate[1:]), np.abs(rate[:-1]))
-    by_second = 0.5 * steps**2 * np.maximum(np.abs(second[1:]), np.abs(second[:-1]))
-    return np.maximum(np.abs(np.diff(value)), np.maximum(by_rate, by_second))
 
 
 def _check_jumps(driver: Driver, u: Array) -> None:
@@ -183,13 +172,7 @@ def first_input(mechanism: Mechanism) -> float:
 
 
 def whole_range(mechanism: Mechanism) -> tuple[float, float]:
-    """Return the inputs to be tried where none are given: a full rotation, a period, a table.
-
-    Raises
-    ------
-    GeometryError
-        No driver, or a law whose range is not known.
-    """
+    """Return the inputs to be tried where none are given: a full rotation, a period, a table; else `GeometryError`."""
     if not mechanism.drivers:
         raise GeometryError("the mechanism has no driver, so nothing moves it; give drivers")
     driver, u0 = mechanism.drivers[0], first_input(mechanism)

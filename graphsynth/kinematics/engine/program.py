@@ -63,17 +63,17 @@ class KernelRow(NamedTuple):
 
 @dataclass(frozen=True)
 class Step:
-    """What one step of a program places."""
+    """What one step of a program places.
 
-    #: See :mod:`.codes`.
+    `code`: see :mod:`.codes`; `group`: index of the Assur group, or -1 for a driver; `links` placed; `kind`:
+    "driver R", "driver P", "RRR", "RRP", "RPR", "PRP", "RPP", or a description of the group; `core`: links whose poses
+    are the unknowns.
+    """
+
     code: int
-    #: Index of the Assur group, or -1 for a driver.
     group: int
-    #: Links placed.
     links: tuple[int, ...]
-    #: "driver R", "driver P", "RRR", "RRP", "RPR", "PRP", "RPP", or a description of the group.
     kind: str
-    #: Links whose poses are the unknowns.
     core: tuple[int, ...] = ()
 
     @property
@@ -89,7 +89,7 @@ class Step:
     @property
     def iterative(self) -> bool:
         """Whether the step is solved by Newton's method."""
-        return self.code in codes.ITERATIVE
+        return self.code >= codes.ITERATIVE_FROM
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,14 +118,9 @@ def compile_program(mechanism: Mechanism, dimensions: Array | None = None) -> Pr
         found = decompose(mechanism.graph, [driver.pair for driver in mechanism.drivers])
     except GraphError as error:
         raise GeometryError(f"the mechanism cannot be simulated: {error}") from error
-    _check_size(mechanism, dimensions)
-    return _Compiler(mechanism, found, mechanism.dimensions[None] if dimensions is None else dimensions).program()
-
-
-def _check_size(mechanism: Mechanism, dimensions: Array | None) -> None:
-    """Products of four lengths must be numbers."""
-    points = np.abs((mechanism.dimensions if dimensions is None else dimensions)[..., _LENGTHS])
-    check_largest(float(points.max(initial=0.0)))
+    sizes = mechanism.dimensions[None] if dimensions is None else dimensions
+    check_largest(float(np.abs(sizes[..., _LENGTHS]).max(initial=0.0)))  # products of four lengths must be numbers
+    return _Compiler(mechanism, found, sizes).program()
 
 
 class _Compiler:
@@ -150,7 +145,14 @@ class _Compiler:
 
     def program(self) -> Program:
         placed = {self.mechanism.frame}
-        self._place_driven(placed)
+        # the links that drivers hang on the frame, one after another
+        left = [pair for pair in self.driven if set(pair) <= set(self.found.driven)]
+        while left:
+            pair = next(p for p in left if len(placed & set(p)) == 1)
+            left.remove(pair)
+            link = pair[0] if pair[1] in placed else pair[1]
+            self._drive(pair, link)
+            placed.add(link)
         for index, group in enumerate(self.found.groups):
             self._group(index, group.links, placed)
             placed |= set(group.links)
@@ -174,16 +176,6 @@ class _Compiler:
         )
         gears, far = np.array(self.gears, dtype=np.int64), links * Lc + 4.0 * float(drawn.max(initial=0.0))
         return Program(self.mechanism, tuple(self.steps), tables, gears, Lc, far)
-
-    def _place_driven(self, placed: set[int]) -> None:
-        """Place the links that drivers hang on the frame, one after another."""
-        left = [pair for pair in self.driven if set(pair) <= set(self.found.driven)]
-        while left:
-            pair = next(p for p in left if len(placed & set(p)) == 1)
-            left.remove(pair)
-            link = pair[0] if pair[1] in placed else pair[1]
-            self._drive(pair, link)
-            placed.add(link)
 
     def _drive(self, pair: tuple[int, int], link: int) -> None:
         joint, (index, driver) = self.joint[pair], self.driven[pair]
@@ -213,20 +205,8 @@ class _Compiler:
         code, rows = _closed(core, rows)
         place = {link: k for k, link in enumerate(core)}
         outside = sorted({link for joint in own for link in joint.pair} - inside)
-        self.table.append(
-            [
-                code,
-                len(self.rows),
-                len(rows),
-                len(self.core),
-                len(core),
-                first_eliminated,
-                len(gone),
-                len(self.touched),
-                len(outside),
-                index,
-            ]
-        )
+        first = [code, len(self.rows), len(rows), len(self.core), len(core), first_eliminated, len(gone)]
+        self.table.append([*first, len(self.touched), len(outside), index])
         self.steps.append(Step(code, index, links, _describe(code, links, own), core))
         for kind, a, b, parameters in rows:
             if kind == codes.GEAR:
@@ -338,7 +318,8 @@ def _closed(core: tuple[int, ...], rows: list[KernelRow]) -> tuple[int, list[Ker
             return (codes.R_LINE_PIN if last.b == own else codes.R_LINE_SLOT), third
         if last.kind == codes.ANGLE:
             return codes.R_ANGLE, third
-        if last.kind == codes.GEAR and _same_point(held, last, own):
+        ends = [row.parameters[2:4] if row.b == own else row.parameters[0:2] for row in (held, last)]
+        if last.kind == codes.GEAR and all(np.array_equal(p, q) for p, q in zip(*ends)):  # on the revolute joint
             return codes.R_GEAR, third
     if kinds == [codes.DIST, codes.LINE, codes.ANGLE]:
         return codes.P_DIST, order(codes.LINE, codes.ANGLE, codes.DIST)
@@ -347,12 +328,6 @@ def _closed(core: tuple[int, ...], rows: list[KernelRow]) -> tuple[int, list[Ker
     if kinds.count(codes.ANGLE) > 1:
         raise GeometryError(f"link {own} has its direction fixed twice by prismatic joints; its place is not defined")
     return codes.NEWTON, rows
-
-
-def _same_point(first: KernelRow, second: KernelRow, link: int) -> bool:
-    """Whether two rows hold the same point of a link, in every dimension set."""
-    ends = [row.parameters[2:4] if row.b == link else row.parameters[0:2] for row in (first, second)]
-    return all(np.array_equal(p, q) for p, q in zip(*ends))
 
 
 def _describe(code: int, links: tuple[int, ...], own: list[JointGeometry]) -> str:

@@ -71,10 +71,7 @@ class PointPath(NamedTuple):
     def straightness(self) -> float:
         """Largest distance of the sampled points from the chord between the first and the last (NaN left out).
 
-        Raises
-        ------
-        GeometryError
-            A path without two different ends.
+        `GeometryError` for a path without two different ends.
         """
         p = self.position[np.isfinite(self.position).all(axis=1)]
         if len(p) < 2 or not (p[-1] - p[0]).any():
@@ -178,7 +175,12 @@ class Motion(MotionMethods):
             else:
                 held[:, k, 3 * driver.link + 2], held[:, k, 3 * driver.base + 2] = 1.0, -1.0
         moving = [3 * k + c for k in range(links) if k != mechanism.frame for c in range(3)]
-        size = np.array([self.Lc if angular else 1.0 for angular in _angular_rows(mechanism)])  # every row in lengths
+        # every row in lengths: second rows of P joints and turning drivers are angles
+        angular: list[bool] = []
+        for joint in mechanism.joints:
+            angular += [False, isinstance(joint, Prismatic)] if joint.mobility == 1 else [False]
+        angular += [not isinstance(mechanism.joint(*driver.pair), Prismatic) for driver in mechanism.drivers]
+        size = np.where(angular, self.Lc, 1.0)
         matrix = np.concatenate([J, held], axis=1)[:, :, moving] * size[:, None]
         matrix = matrix * np.tile([1.0, 1.0, 1.0 / self.Lc], links)[moving]
         return np.asarray(np.linalg.svd(matrix, compute_uv=False)[:, -1])
@@ -198,10 +200,7 @@ class Motion(MotionMethods):
     def point(self, name_or_link: str | int, local: ArrayLike | None = None) -> PointPath:
         """Path of a named point, or of the point ``local`` (x, y) of a link, with derivatives by the input.
 
-        Raises
-        ------
-        GeometryError
-            For a name or a link that the mechanism does not have.
+        `GeometryError` for a name or a link that the mechanism does not have.
         """
         if isinstance(name_or_link, str):
             if name_or_link not in self.mechanism.points:
@@ -227,12 +226,8 @@ class Motion(MotionMethods):
         PRR the angle between the link (or the line from pivot to pin) and the normal of the guide.  0 where the dyad
         is stretched or folded.
         """
-        groups = [step for step in self.steps if step.group >= 0]
-        return {
-            step.group: np.arcsin(np.sqrt(np.clip(self.margins[:, step.group], 0.0, 1.0)))
-            for step in groups
-            if step.has_two_modes
-        }
+        groups = [step.group for step in self.steps if step.group >= 0 and step.has_two_modes]
+        return {group: np.arcsin(np.sqrt(np.clip(self.margins[:, group], 0.0, 1.0))) for group in groups}
 
     def pressure_angle(self) -> dict[int, Array]:
         """Pressure angle of every dyad with two modes, by group: the complement of the transmission angle."""
@@ -254,11 +249,3 @@ class Motion(MotionMethods):
             columns[f"margin_{group}"] = self.margins[:, group]
         columns["residual"], columns["error"] = self.residuals, self.errors
         return pd.DataFrame(columns)
-
-
-def _angular_rows(mechanism: Mechanism) -> list[bool]:
-    """Of the rows of `_smallest_singular_value`, those that are angles: second rows of P joints, turning drivers."""
-    rows: list[bool] = []
-    for joint in mechanism.joints:
-        rows += [False, isinstance(joint, Prismatic)] if joint.mobility == 1 else [False]
-    return rows + [not isinstance(mechanism.joint(*driver.pair), Prismatic) for driver in mechanism.drivers]

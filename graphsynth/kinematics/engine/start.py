@@ -28,10 +28,7 @@ _STARTS = 200
 def sign_table(program: Program, modes: Mapping[int, int]) -> Array:
     """Mode signs by step; +1 unless given.
 
-    Raises
-    ------
-    GeometryError
-        If a group does not exist, has one mode only, or the mode is not +1 or -1 (a rank for larger groups).
+    `GeometryError` for a group that does not exist, or a mode that is not +1 or -1 (a rank for larger groups).
     """
     signs = np.ones(len(program.steps))
     if not isinstance(modes, Mapping):
@@ -155,32 +152,14 @@ def group_modes(tracker: Tracker, trace: Trace, k: int) -> Array | None:
     group has a continuum of poses: special dimensions let it move by itself.
     """
     program = tracker.program
-    row0, count = program.tables.steps[k, 1:3]
-    kinds = program.tables.rows[row0 : row0 + count, 0]
-    step = program.steps[k]
-    if len(step.core) == 1 and (kinds == codes.DIST).all():
-        return _platform_modes(program, trace, k)
     held = conditions(program, k, trace.X[0])
-    if held is not None:
+    if held is None:
+        return _searched_modes(tracker, trace, k)
+    if any(one.kind != codes.DIST for one in held):
         return triad_modes(held, program.Lc)[:, None, :]
-    return _searched_modes(tracker, trace, k)
-
-
-def _platform_modes(program: Program, trace: Trace, k: int) -> Array | None:
     from graphsynth.kinematics.triad.assembly_modes import assembly_modes
 
-    own = program.steps[k].core[0]
-    row0, count = program.tables.steps[k, 1:3]
-    anchors, vertices, lengths = [], [], []
-    for r in range(row0, row0 + count):
-        _, a, b, _, _ = program.tables.rows[r]
-        pa, pb = complex(*program.tables.row_table[0, r, 0:2]), complex(*program.tables.row_table[0, r, 2:4])
-        other, far, near = (b, pb, pa) if a == own else (a, pa, pb)
-        x, y, c, s = trace.X[0, other]
-        anchors.append(complex(x, y) + complex(c, s) * far)
-        vertices.append(near)
-        lengths.append(program.tables.row_table[0, r, codes.H])
-    found = assembly_modes(anchors, vertices, lengths)
+    found = assembly_modes([one.far for one in held], [one.own for one in held], [one.size for one in held])
     return None if found.self_motion else np.asarray(found.poses)[:, None, :]
 
 

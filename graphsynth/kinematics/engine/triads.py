@@ -101,9 +101,14 @@ def triad_modes(found: list[Condition], Lc: float) -> Array:
 
 
 def _orientations(rest: list[Condition]) -> Complex:
-    """Candidates for z from the zeros of the eliminant."""
+    """Candidates for z: zeros of the eliminant, which vanishes where the three conditions have a common place."""
     alpha = 2.0 * np.pi * np.arange(_NODES) / _NODES
-    coefficients = np.fft.fft(_eliminant(rest, np.exp(1j * alpha))) / _NODES
+    (q, m0, c0), first, second = _reduced(rest, np.exp(1j * alpha))
+    N, D = _meeting(first, second)
+    eliminant = np.abs(N) ** 2 + 2.0 * (m0 * N * np.conj(D)).real + c0.real * np.abs(D) ** 2
+    if q == 0.0:  # three lines through one point
+        eliminant = (m0 * N - np.conj(m0 * N) + c0 * D).imag
+    coefficients = np.fft.fft(eliminant) / _NODES
     size = float(np.abs(coefficients).max())
     degree = max((k for k in range(_NODES // 2) if abs(coefficients[k]) > 1e-13 * size), default=0)
     if not size > 0.0 or degree == 0:
@@ -111,15 +116,6 @@ def _orientations(rest: list[Condition]) -> Complex:
     roots = np.roots(np.concatenate([coefficients[degree:0:-1], coefficients[:1], coefficients[-1 : -degree - 1 : -1]]))
     near = roots[np.abs(np.abs(roots) - 1.0) < _RING]
     return np.asarray(near / np.abs(near))
-
-
-def _eliminant(rest: list[Condition], z: Complex) -> Array:
-    """Real function of the orientation that vanishes where the three conditions have a common place."""
-    (q, m0, c0), first, second = _reduced(rest, z)
-    N, D = _meeting(first, second)
-    if q == 0.0:  # three lines through one point
-        return np.asarray((m0 * N - np.conj(m0 * N) + c0 * D).imag)
-    return np.asarray(np.abs(N) ** 2 + 2.0 * (m0 * N * np.conj(D)).real + c0.real * np.abs(D) ** 2)
 
 
 def _reduced(rest: list[Condition], z: Complex) -> tuple[tuple[float, Complex, Complex], ...]:

@@ -22,6 +22,7 @@ from graphsynth.kinematics.triad.escalation import Arms, Sextic, coefficients, e
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
 
 
 def sextic(anchors: Complex, vertices: Complex, lengths: Array) -> Sextic:
@@ -44,28 +45,13 @@ def sextic(anchors: Complex, vertices: Complex, lengths: Array) -> Sextic:
 class AssemblyModes:
     """All assembly modes of one problem, sorted by alpha.
 
-    Attributes
-    ----------
-    poses : ndarray, shape (m, 3)
-        ``(x, y, alpha)`` with alpha in (-pi, pi]; m is 0 to 6, or 0 with ``self_motion`` set.
-    determinants : ndarray, shape (m,)
-        ``det JX`` of every mode, length^4.
-    residuals : ndarray, shape (m,)
-        Largest ``|f_k|`` relative to the square of the largest length.
-    near_double_root : bool
-        Two modes are closer than float64 coefficients can separate (type-II singularity).
-    escalated : bool
-        The modes were then computed at 50 digits from the given double-precision input.
-    double : ndarray of bool, shape (m,)
-        Modes that stay merged even at 50 digits; they count twice.
-    self_motion : str
-        Description of a continuous family of poses; empty if there is none.
-    consistent : bool
-        The number of modes is even and the signs of ``det JX`` cancel (theory/platform-direct 4).
-    note : str
-        Remark, for instance on a drop of the degree.
-    method : str
-        How the modes were counted.
+    `poses` (m, 3): ``(x, y, alpha)`` with alpha in (-pi, pi]; m is 0 to 6, or 0 with `self_motion`, the description of
+    a continuous family of poses.  `determinants` (m,): ``det JX``, length^4.  `residuals` (m,): largest ``|f_k|``
+    relative to the square of the largest length.  `near_double_root`: two modes are closer than float64 coefficients
+    can separate (type-II singularity); `escalated`: the modes were then computed at 50 digits from the given
+    double-precision input; `double` (m,): those that stay merged even there, they count twice.  `consistent`: the
+    number of modes is even and the signs of ``det JX`` cancel (theory/platform-direct 4).  `note`: for instance on a
+    drop of the degree; `method`: how the modes were counted.
     """
 
     poses: Array
@@ -73,7 +59,7 @@ class AssemblyModes:
     residuals: Array
     near_double_root: bool
     escalated: bool
-    double: NDArray[np.bool_]
+    double: Mask
     self_motion: str
     consistent: bool
     note: str
@@ -96,54 +82,23 @@ class AssemblyModes:
 
 @dataclass(frozen=True, eq=False)
 class AssemblyModeBatch:
-    """Assembly modes of N problems in one list, by problem and then by alpha.
+    """Assembly modes of N problems in one list of M, by problem and then by alpha.
 
-    Attributes
-    ----------
-    problem : ndarray of int, shape (M,)
-        Problem of every mode.
-    poses : ndarray, shape (M, 3)
-        ``(x, y, alpha)``, alpha in (-pi, pi].
-    determinants : ndarray, shape (M,)
-        ``det JX``, length^4.
-    counts : ndarray of int, shape (N,)
-        Number of modes of every problem.
-    near_double_root : ndarray of bool, shape (N,)
-        Double precision does not decide this problem.  If it was not escalated its modes are incomplete or inaccurate.
-    consistent : ndarray of bool, shape (N,)
-        Even number of modes and vanishing sum of ``sign(det JX)`` (theory/platform-direct 4), double modes left out.
-    escalated : ndarray of bool, shape (N,)
-        Solved again at 50 digits.
-    remarks : dict of int to str
-        For escalated problems: a self-motion, or why the problem is not decided.  Such problems have no modes here.
+    Of every mode: its `problem` (M,), `poses` (M, 3), `determinants` (M,), as in `AssemblyModes`.  Of every problem
+    (N,) `counts` of modes; `near_double_root`: double precision does not decide it, and its modes are incomplete or
+    inaccurate unless `escalated`, solved again at 50 digits; `consistent`: even number of modes and vanishing sum of
+    ``sign(det JX)`` (theory/platform-direct 4), double modes left out.  `remarks`: for escalated problems a
+    self-motion, or why the problem is not decided; such problems have no modes here.
     """
 
     problem: NDArray[np.intp]
     poses: Array
     determinants: Array
     counts: NDArray[np.intp]
-    near_double_root: NDArray[np.bool_]
-    consistent: NDArray[np.bool_]
-    escalated: NDArray[np.bool_]
+    near_double_root: Mask
+    consistent: Mask
+    escalated: Mask
     remarks: dict[int, str] = field(default_factory=dict)
-
-
-def _scale(anchors: Complex, vertices: Complex, lengths: Array) -> float:
-    """Largest length of the problem."""
-    spread, arms = np.abs(anchors - anchors[0]).max(), np.abs(vertices - vertices[0]).max()
-    return float(max(spread, arms, lengths.max())) or 1.0
-
-
-def _jacobian(anchors: Complex, vertices: Complex, pose: Array) -> tuple[Array, Complex]:
-    """``df/dX`` (..., 3, 3) and the leg vectors (..., 3)."""
-    arm = np.exp(1j * pose[..., 2:3]) * vertices
-    d = pose[..., 0:1] + 1j * pose[..., 1:2] + arm - anchors
-    return 2.0 * np.stack([d.real, d.imag, arm.real * d.imag - arm.imag * d.real], axis=-1), d
-
-
-def _closure(d: Complex, lengths: Array) -> Array:
-    size = np.abs(d)
-    return np.asarray((size - lengths) * (size + lengths))
 
 
 def _rows(name: str, values: ArrayLike, dtype: type) -> NDArray[Any]:
@@ -170,29 +125,16 @@ def assembly_modes_batch(
 ) -> AssemblyModeBatch:
     """All assembly modes of N problems (3-RPR): about a million problems a second on one core.
 
-    Parameters
-    ----------
-    anchors, vertices : array_like of complex, shape (N, 3) or (3,)
-        Anchors A_k in the fixed frame, vertices b_k in the platform frame; a single row serves all problems.
-    lengths : array_like, shape (N, 3) or (3,)
-        Leg lengths, zero or more.
-    escalate : bool
-        Solve flagged problems again at 50 digits (tens of milliseconds each); else they stay flagged.
-    arms : tuple (pivots (3,), arms (3,), angles (N, 3)), optional
-        From what the anchors came, so that 50 digits can start from the given angles.
+    Anchors A_k in the fixed frame, vertices b_k in the platform frame (complex) and leg lengths, zero or more, each of
+    shape (N, 3), or (3,) for all problems.  `escalate`: solve flagged problems again at 50 digits (tens of milliseconds
+    each); else they stay flagged.  `arms` (pivots (3,), arms (3,), angles (N, 3)): from what the anchors came, so that
+    50 digits can start from the given angles.
 
-    Returns
-    -------
-    AssemblyModeBatch
-        The count is guaranteed for the computed coefficients where ``near_double_root`` is False
-        (theory/platform-direct 2); every pose is polished on the closure equations and accurate to about 3e-12 of the
-        largest length, or flagged.
+    The count is guaranteed for the computed coefficients where ``near_double_root`` is False (theory/platform-direct
+    2); every pose is polished on the closure equations and accurate to about 3e-12 of the largest length, or flagged.
 
-    Raises
-    ------
-    GeometryError
-        Numbers that are not finite, negative lengths, shapes that do not fit, a problem whose largest dimension is not
-        between 1e-60 and 1e60.
+    `GeometryError` for numbers that are not finite, negative lengths, shapes that do not fit, a problem whose largest
+    dimension is not between 1e-60 and 1e60.
 
     Examples
     --------
@@ -209,7 +151,13 @@ def assembly_modes_batch(
     n = max(len(A), len(b), len(l2))
     if any(len(rows) not in (1, n) for rows in (A, b, l2)):
         raise GeometryError(f"{len(A)} anchors, {len(b)} platforms and {len(l2)} legs; give N or one of each")
-    _check_sizes(A, b, l2)
+    # determinants, length^4, are to be numbers
+    tables = [np.abs(rows.view(np.float64)) for rows in (A, b, l2)]
+    largest = max(float(table.max(initial=0.0)) for table in tables)
+    if not (largest <= LARGEST and l2.min(initial=LARGEST) >= SMALLEST):  # else no problem can be out of range
+        size = np.maximum.reduce(np.broadcast_arrays(*(table.max(axis=1) for table in tables)))
+        for problem in np.flatnonzero((size > LARGEST) | ((size > 0.0) & (size < SMALLEST))):
+            check_largest(float(size[problem]), f"dimension of problem {problem}")
     if len(A) < n:
         A = np.repeat(A, n, axis=0)
     batch = _compiled(A, b, l2)
@@ -219,16 +167,6 @@ def assembly_modes_batch(
     if undecided.size == 0:
         return batch
     return _escalated(batch, undecided, A, np.broadcast_to(b, A.shape), np.broadcast_to(l2, A.shape), arms)
-
-
-def _check_sizes(A: Complex, b: Complex, l2: Array) -> None:
-    """Refuse problems whose determinants, length^4, would not be numbers."""
-    tables = [np.abs(rows.view(np.float64)) for rows in (A, b, l2)]
-    largest = max(float(table.max(initial=0.0)) for table in tables)
-    if not (largest <= LARGEST and l2.min(initial=LARGEST) >= SMALLEST):  # else no problem can be out of range
-        size = np.maximum.reduce(np.broadcast_arrays(*(table.max(axis=1) for table in tables)))
-        for problem in np.flatnonzero((size > LARGEST) | ((size > 0.0) & (size < SMALLEST))):
-            check_largest(float(size[problem]), f"dimension of problem {problem}")
 
 
 def _compiled(A: Complex, b: Complex, l2: Array) -> AssemblyModeBatch:
@@ -257,10 +195,11 @@ def _escalated(
     keep = ~np.isin(batch.problem, undecided)
     problems, poses, determinants = [batch.problem[keep]], [batch.poses[keep]], [batch.determinants[keep]]
     remarks = {}
-    for index in undecided:
-        i = int(index)
-        given = None if arms is None else (_three(arms[0], complex), _three(arms[1], float), arms[2][i])
-        modes = _at_fifty_digits(A[i], b[i], l2[i], given, bool(batch.near_double_root[i]))
+    for i in undecided.tolist():
+        given: Any = None
+        if arms is not None:
+            given = np.asarray(arms[0], dtype=complex).tolist(), np.asarray(arms[1], dtype=float).tolist(), arms[2][i]
+        modes = _described(A[i], b[i], l2[i], bool(batch.near_double_root[i]), *escalate(A[i], b[i], l2[i], given))
         problems.append(np.full(len(modes), i, dtype=np.intp))
         poses.append(modes.poses)
         determinants.append(modes.determinants)
@@ -283,41 +222,36 @@ def _escalated(
     )
 
 
-def _three(values: ArrayLike, dtype: type) -> Any:
-    return tuple(np.asarray(values, dtype=dtype).tolist())
-
-
-def _at_fifty_digits(A: Complex, b: Complex, l2: Array, arms: Arms | None, flagged: bool) -> AssemblyModes:
-    poses, double, self_motion = escalate(A, b, l2, arms)
-    return _described(A, b, l2, poses, double, self_motion, flagged, "isolated by bounds on derivatives at 50 digits")
-
-
 def _described(
-    A: Complex,
-    b: Complex,
-    l2: Array,
-    poses: Array,
-    double: NDArray[np.bool_],
-    self_motion: str,
-    flagged: bool,
-    method: str,
+    A: Complex, b: Complex, l2: Array, flagged: bool, poses: Array, double: Mask | None = None, self_motion: str = ""
 ) -> AssemblyModes:
-    """Modes with everything that can be recomputed from the poses."""
-    JX, d = _jacobian(A, b, poses)
-    determinants = np.linalg.det(JX)
-    residuals = np.max(np.abs(_closure(d, l2)), axis=-1, initial=0.0) / _scale(A, b, l2) ** 2
-    single = np.sign(determinants[~double])
+    """Modes with everything that can be recomputed from the poses; at 50 digits `double` is known."""
+    arm = np.exp(1j * poses[:, 2:3]) * b
+    d = poses[:, 0:1] + 1j * poses[:, 1:2] + arm - A  # the legs
+    determinants = np.linalg.det(2.0 * np.stack([d.real, d.imag, arm.real * d.imag - arm.imag * d.real], axis=-1))
+    size = np.abs(d)
+    largest = float(max(np.abs(A - A[0]).max(), np.abs(b - b[0]).max(), l2.max())) or 1.0
+    residuals = np.max(np.abs((size - l2) * (size + l2)), axis=-1, initial=0.0) / largest**2
+    merged = np.zeros(len(poses), dtype=bool) if double is None else double
+    single = np.sign(determinants[~merged])
     consistent = bool(single.size % 2 == 0 and single.sum() == 0) and not self_motion
+    pairs = [
+        f"{name} {first + 1} and {second + 1} coincide: the degree drops to at most four modes"
+        for name, points in (("anchors", A), ("platform vertices", b))
+        for first, second in ((0, 1), (0, 2), (1, 2))
+        if points[first] == points[second]
+    ]
+    method = f"isolated by bounds on derivatives{', float64' if double is None else ' at 50 digits'}"
     return AssemblyModes(
         poses,
         determinants,
         residuals,
         flagged,
-        "digits" in method,
-        double,
+        double is not None,
+        merged,
         self_motion,
         consistent,
-        _degree_note(A, b),
+        pairs[0] if pairs else "",
         method,
     )
 
@@ -343,14 +277,5 @@ def assembly_modes(
     batch = assembly_modes_batch(A, b, l2, escalate=False)
     flagged = bool(batch.near_double_root[0])
     if flagged or not batch.consistent[0]:
-        return _at_fifty_digits(A, b, l2, arms, flagged)
-    single = np.zeros(len(batch.poses), dtype=bool)
-    return _described(A, b, l2, batch.poses, single, "", False, "isolated by bounds on derivatives, float64")
-
-
-def _degree_note(A: Complex, b: Complex) -> str:
-    for name, points in (("anchors", A), ("platform vertices", b)):
-        for first, second in ((0, 1), (0, 2), (1, 2)):
-            if points[first] == points[second]:
-                return f"{name} {first + 1} and {second + 1} coincide: the degree drops to at most four modes"
-    return ""
+        return _described(A, b, l2, flagged, *escalate(A, b, l2, arms))
+    return _described(A, b, l2, False, batch.poses)

@@ -7,6 +7,7 @@ brings along).  Slow (milliseconds per problem) and only used where the fast sol
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,15 +42,13 @@ def escalate(
         b = [mp.mpc(value) / unit for value in vertices]
         l2 = [mp.mpf(value) / unit for value in lengths]
         g, n, d = coefficients(A, b, l2, mp.conj)
-        if max(abs(c) for c in g) < mp.mpf(10) ** -14:  # below the resolution of the given numbers
-            return np.zeros((0, 3)), np.zeros(0, dtype=bool), "the sextic vanishes: a continuous family of poses"
-        family = _congruent(A, b, l2)
-        if family:
-            return np.zeros((0, 3)), np.zeros(0, dtype=bool), family
         found: list[tuple[Any, Any, bool]] = []
-        roots = _roots(mp, g)
+        family = _congruent(A, b, l2)
+        if max(abs(c) for c in g) < mp.mpf(10) ** -14:  # below the resolution of the given numbers
+            family = "the sextic vanishes: a continuous family of poses"
+        roots = [] if family else _roots(mp, g)
         if roots is None:
-            return np.zeros((0, 3)), np.zeros(0, dtype=bool), "not decided: a root of the sextic is too flat to isolate"
+            family, roots = "not decided: a root of the sextic is too flat to isolate", []
         for alpha, merged in roots:
             z = mp.expj(alpha)
             N, Delta = ((n[0] * z + n[1]) * z + n[2]) + n[3] / z, d[0] + d[1] * z - mp.conj(d[1]) / z
@@ -58,11 +57,12 @@ def escalate(
                 continue
             family, points = _geometric(mp, A, b, l2, z)
             if family:
-                return np.zeros((0, 3)), np.zeros(0, dtype=bool), family
+                break
             known = [q for q, other, _ in found if abs(other - alpha) < _COINCIDENT]  # a split double root comes twice
             found += [(p, alpha, False) for p in points if all(abs(p - q) > _COINCIDENT for q in known)]
+        found = [] if family else found
         poses = [[float(p.real * unit), float(p.imag * unit), float(alpha)] for p, alpha, _ in found]
-        return np.array(poses).reshape(-1, 3), np.array([merged for *_, merged in found], dtype=bool), ""
+        return np.array(poses).reshape(-1, 3), np.array([merged for *_, merged in found], dtype=bool), family
 
 
 class Sextic(NamedTuple):
@@ -112,12 +112,7 @@ def _roots(mp: Any, g: Sequence[Any]) -> list[tuple[Any, bool]] | None:
         total = sum((mp.j * k) ** order * g[k] * z**k for k in (1, 2, 3))
         return 2 * total.real + (g[0] if order == 0 else 0)
 
-    def value(x: Any) -> Any:
-        return derivative(0, x)
-
-    def slope(x: Any) -> Any:
-        return derivative(1, x)
-
+    value, slope = partial(derivative, 0), partial(derivative, 1)
     shift = mp.mpf(1) / 1000  # no node on the symmetric positions
     nodes = [-mp.pi + shift + 2 * mp.pi * k / 32 for k in range(33)]
     stack = [(nodes[k], nodes[k + 1]) for k in range(32)]
@@ -143,11 +138,11 @@ def _roots(mp: Any, g: Sequence[Any]) -> list[tuple[Any, bool]] | None:
     if stack:
         return None
     wrapped = sorted(((x - 2 * mp.pi if x > mp.pi else x, merged) for x, merged in roots), key=lambda root: root[0])
-    return [root for k, root in enumerate(wrapped) if k == 0 or not _same_root(root, wrapped[k - 1])]
-
-
-def _same_root(root: tuple[Any, bool], previous: tuple[Any, bool]) -> bool:
-    return root[1] and previous[1] and bool(abs(root[0] - previous[0]) < 100 * _MERGED)
+    return [
+        (x, merged)
+        for k, (x, merged) in enumerate(wrapped)
+        if not (k and merged and wrapped[k - 1][1] and abs(x - wrapped[k - 1][0]) < 100 * _MERGED)
+    ]
 
 
 def _bracketed(value: Any, slope: Any, low: Any, high: Any, positive: bool) -> Any:

@@ -51,12 +51,14 @@ class LegSolution:
     @property
     def S(self) -> Array:
         """``2 l1 rho sin(gamma)``, squared length."""
-        return _unscaled(self.scaled[0], self.exponent)
+        with np.errstate(over="ignore", under="ignore"):
+            return np.asarray(np.ldexp(self.scaled[0], 2 * self.exponent))
 
     @property
     def C(self) -> Array:
         """``2 l1 rho cos(gamma)``, squared length."""
-        return _unscaled(self.scaled[1], self.exponent)
+        with np.errstate(over="ignore", under="ignore"):
+            return np.asarray(np.ldexp(self.scaled[1], 2 * self.exponent))
 
     def angle(self, sigma: ArrayLike) -> Array:
         """Angle of the arm (radians, in (-pi, pi]) on branch ``sigma`` = +1 or -1; NaN if out of reach or free."""
@@ -64,11 +66,6 @@ class LegSolution:
         (u, v), (C, S) = _normalised(self.u, self.v), _normalised(self.scaled[1], self.scaled[0])
         y, x = _dot2(v, C, sigma * u, S), _dot2(u, C, -sigma * v, S)
         return np.where(self.status == LegStatus.FREE, np.nan, np.arctan2(y, x))
-
-
-def _unscaled(value: Array, exponent: NDArray[np.int32]) -> Array:
-    with np.errstate(over="ignore", under="ignore"):
-        return np.asarray(np.ldexp(value, 2 * exponent))
 
 
 def _normalised(a: Array, b: Array) -> tuple[Array, Array]:
@@ -137,11 +134,7 @@ def solve_leg(u: ArrayLike, v: ArrayLike, l1: ArrayLike, l2: ArrayLike) -> LegSo
     """
     given = np.broadcast_arrays(*(np.asarray(x, dtype=np.float64) for x in (u, v, l1, l2)))
     exponent = np.frexp(np.max(np.abs(np.stack(given)), axis=0))[1]
-    scaled: list[Array] = [np.asarray(np.ldexp(x, -exponent)) for x in given]  # exact: no overflow in the squares
-    return _solve_scaled(scaled[0], scaled[1], scaled[2], scaled[3], exponent)
-
-
-def _solve_scaled(u: Array, v: Array, l1: Array, l2: Array, exponent: NDArray[np.int32]) -> LegSolution:
+    u, v, l1, l2 = (np.asarray(np.ldexp(x, -exponent)) for x in given)  # exact: no overflow in the squares
     C, P1, P2 = _discriminants(u, v, l1, l2)
     rho = np.hypot(u, v)
     far, near = _quotient(-P1, rho + (l1 + l2)), _quotient(-P2, rho + np.abs(l1 - l2))
