@@ -172,27 +172,11 @@ class MotionMethods(Shown):
     # --- what is done in rooms above: pictures, binding, forces
 
     def plot(self, of: str | int | None = None, order: int = 0, *, ax: Any = None) -> gs.Chart:
-        """Plot paths of the named points, or coordinates over the input.
+        """Plot paths of the named points, or coordinates over the input; a chart that shows itself in a notebook.
 
-        Parameters
-        ----------
-        of : str or int, optional
-            A named point, or a link: its x and y, its angle or displacement over the input.  Without it the paths of
-            all named points; if there are none, the coordinates of the undriven links on the frame.
-        order : {0, 1, 2}
-            1 and 2 are first and second derivatives by the input.
-        ax : matplotlib.axes.Axes, optional
-            Drawn on these axes too.
-
-        Returns
-        -------
-        Chart
-            Shows itself in a notebook; ``.save("chart.png")`` writes it, ``.draw(ax)`` draws it on matplotlib axes.
-
-        Raises
-        ------
-        GeometryError
-            An unknown point or link, another order.
+        `of` is a named point, or a link: its x and y, its angle or displacement over the input.  Without it the paths
+        of all named points; if there are none, the coordinates of the undriven links on the frame.  `order` 1 and 2
+        are first and second derivatives by the input.  The chart is drawn on the matplotlib axes `ax` too.
         """
         chart: gs.Chart = work("plot motion")(self, of, order)
         if ax is not None:
@@ -200,25 +184,11 @@ class MotionMethods(Shown):
         return chart
 
     def animate(self, path: str | Path | None = None, **options: Any) -> gs.Drawing:
-        """Animate the motion, and write it to a file if a path is given.
+        """Animate the motion: an SVG that moves by itself and shows itself in a notebook.
 
-        Parameters
-        ----------
-        path : path-like, optional
-            ``.html``: a page with a player; ``.svg``: a picture that moves by itself; ``.gif``.
-        **options
-            ``frames``, ``seconds``, ``title``, ``width``, ``height`` as for
-            :func:`graphsynth.drawing.animation.animation_html`.
-
-        Returns
-        -------
-        Drawing
-            An SVG that moves by itself; shows itself in a notebook.
-
-        Raises
-        ------
-        GraphsynthError
-            Another suffix; nothing of the motion is assembled.
+        It is written if a path is given: ``.html``, a page with a player; ``.svg``; ``.gif``.  Options: ``frames``,
+        ``seconds``, ``title``, ``width``, ``height`` as for :func:`graphsynth.drawing.animation.animation_html`.
+        `GraphsynthError` for another suffix, or if nothing of the motion is assembled.
         """
         found: gs.Drawing = work("animate motion")(self, path, **options)
         return found

@@ -40,15 +40,12 @@ _CLOSED = 1e-9
 
 
 class Found(Protocol):
-    """What a search for dimensions returns, as `embody` does."""
+    """What a search for dimensions returns, as `embody` does: its best mechanism, and what was found or why nothing."""
 
     @property
-    def mechanism(self) -> Mechanism | None:
-        """The best found; None if there is none."""
-
+    def mechanism(self) -> Mechanism | None: ...  # noqa: D102
     @property
-    def statement(self) -> str:
-        """What was found, or why nothing."""
+    def statement(self) -> str: ...  # noqa: D102
 
 
 def simulate(
@@ -99,21 +96,15 @@ def simulate(
     >>> motion.completed, motion.closure.closed, motion.residual < 1e-14
     (True, True, True)
     """
-    mechanism = _mechanism(mechanism)
-    if inputs is None:
-        return _simulate_whole(mechanism, modes, start, events)
-    return _simulate(mechanism, monotonic(angles("inputs", inputs)), modes, start, events)
-
-
-def _mechanism(given: Any) -> Mechanism:
-    if isinstance(given, Mechanism):
-        return given
-    found = getattr(given, "mechanism", given)
+    given: Any = mechanism
+    found = given if isinstance(given, Mechanism) else getattr(given, "mechanism", given)
     if found is None:
         raise GeometryError(f"there is no mechanism to move: {given.statement}")
     if not isinstance(found, Mechanism):
         raise GeometryError(f"{type(given).__name__} is not a Mechanism; give one, or what embody returns")
-    return found
+    if inputs is None:
+        return _simulate_whole(found, modes, start, events)
+    return _simulate(found, monotonic(angles("inputs", inputs)), modes, start, events)
 
 
 def _simulate_whole(
@@ -143,7 +134,9 @@ def _simulate(
     program = compile_program(mechanism)
     warn_of_degrees(mechanism, u)
     given = start if start is not None else mechanism.pose
-    guess = None if given is None else _poses(given, mechanism)
+    guess = None if given is None else finite_array("start", given)
+    if guess is not None and guess.shape != (mechanism.graph.links, 3):
+        raise GeometryError(f"start has shape {guess.shape}; give (x, y, theta) for {mechanism.graph.links} links")
     tracker = started(program, float(u[0]), modes or {}, guess)
     grid = fine_grid(mechanism, u)
     seed, code, step = initial(tracker, float(u[0]), modes or {}, guess)
@@ -156,20 +149,19 @@ def _simulate(
     return _motion(tracker, trace, u, found, begin)
 
 
-def _poses(start: ArrayLike, mechanism: Mechanism) -> Array:
-    poses = finite_array("start", start)
-    if poses.shape != (mechanism.graph.links, 3):
-        raise GeometryError(f"start has shape {poses.shape}; give (x, y, theta) for {mechanism.graph.links} links")
-    return poses
-
-
 def _events(tracker: Tracker, trace: Trace, wanted: bool) -> tuple[Trace, list[MotionEvent]]:
     """Events in order, and the trace up to the end of the branch."""
     found: list[MotionEvent] = []
     sense = 1.0 if trace.u[-1] >= trace.u[0] else -1.0
     if trace.stop is not None:
         found.append(ending(tracker, trace))
-    for touch in _touched(tracker, trace, sense):
+    touched = touches(tracker, trace) + pivot_passes(tracker, trace) if trace.done else []
+    ends = [event for event in touched if event.ends_motion]
+    if ends:  # up to the first that ends the motion
+        first = min(ends, key=lambda event: sense * event.input)
+        before = [event for event in touched if not event.ends_motion and sense * event.input < sense * first.input]
+        touched = [*before, first]
+    for touch in touched:
         if touch.ends_motion:
             found = [event for event in found if not event.ends_motion] + [touch]
             trace.done = int(np.sum(sense * trace.u < sense * touch.input))
@@ -182,22 +174,31 @@ def _events(tracker: Tracker, trace: Trace, wanted: bool) -> tuple[Trace, list[M
     return trace, sorted(found, key=lambda event: sense * event.input)
 
 
-def _touched(tracker: Tracker, trace: Trace, sense: float) -> list[MotionEvent]:
-    """Touches and passages of pivots up to the first that ends the motion."""
-    if trace.done == 0:
-        return []
-    found = touches(tracker, trace) + pivot_passes(tracker, trace)
-    first = min((event for event in found if event.ends_motion), key=lambda event: sense * event.input, default=None)
-    if first is None:
-        return found
-    return [e for e in found if not e.ends_motion and sense * e.input < sense * first.input] + [first]
-
-
 def _motion(tracker: Tracker, trace: Trace, u: Array, events: list[MotionEvent], begin: float) -> Motion:
     program = tracker.program
     where = np.searchsorted(trace.u, u) if u[-1] >= u[0] else np.searchsorted(-trace.u, -u)
-    poses, velocities, accelerations, margins, modes = _arrays(tracker, trace)
-    reached = where < trace.done
+    # poses with continuous angles, derivatives, margins and modes by group; NaN beyond the samples reached
+    n = trace.done
+    kept = np.where(program.tables.need_angle, trace.TH, np.arctan2(trace.X[:, :, 3], trace.X[:, :, 2]))
+    kept[:n] = np.where(program.tables.need_angle, kept[:n], np.unwrap(kept[:n], axis=0) if n else kept[:n])
+    if n and tracker.turned is not None:
+        kept[:n] += math.tau * np.round((tracker.turned - kept[0]) / math.tau)
+    poses = np.concatenate([trace.X[:, :, :2], kept[:, :, None]], axis=2)
+    groups = [k for k, step in enumerate(program.steps) if step.group >= 0]
+    margins, velocities, accelerations = trace.M[:, groups], trace.V, trace.W
+    modes, merged = np.zeros(margins.shape, dtype=np.int8), np.zeros(len(trace.u), dtype=bool)
+    for column, k in enumerate(groups):
+        if program.steps[k].has_two_modes:
+            modes[:n, column] = int(tracker.modes[k])
+            merged |= trace.M[:, k] <= 1e-14
+        elif program.steps[k].iterative:
+            modes[:n, column] = np.sign(trace.M[:n, k])
+    for array in (velocities, accelerations):
+        array[merged] = np.nan  # both modes meet: the velocity does not exist
+        array[:, program.mechanism.frame] = 0.0
+    for array in (poses, velocities, accelerations, margins):
+        array[n:] = np.nan
+    reached = where < n
     last = next((event for event in reversed(events) if event.ends_motion), None)
     completed = bool(reached.all()) and last is None
     closure = _closure(tracker, trace, completed, events)
@@ -219,37 +220,6 @@ def _motion(tracker: Tracker, trace: Trace, u: Array, events: list[MotionEvent],
         Lc=program.Lc,
         seconds=perf_counter() - begin,
     )
-
-
-def _arrays(tracker: Tracker, trace: Trace) -> tuple[Array, Array, Array, Array, NDArray[np.int8]]:
-    """Poses with continuous angles, derivatives, margins and modes by group; NaN beyond the samples reached."""
-    program, n = tracker.program, trace.done
-    angle = np.arctan2(trace.X[:, :, 3], trace.X[:, :, 2])
-    kept = np.where(program.tables.need_angle, trace.TH, angle)
-    kept[:n] = np.where(program.tables.need_angle, kept[:n], np.unwrap(kept[:n], axis=0) if n else kept[:n])
-    if n and tracker.turned is not None:
-        kept[:n] += math.tau * np.round((tracker.turned - kept[0]) / math.tau)
-    poses = np.concatenate([trace.X[:, :, :2], kept[:, :, None]], axis=2)
-    groups = [k for k, step in enumerate(program.steps) if step.group >= 0]
-    margins = trace.M[:, groups]
-    modes = np.zeros(margins.shape, dtype=np.int8)
-    for column, k in enumerate(groups):
-        step = program.steps[k]
-        if step.has_two_modes:
-            modes[:n, column] = int(tracker.modes[k])
-        elif step.iterative:
-            modes[:n, column] = np.sign(trace.M[:n, k])
-    velocities, accelerations = trace.V, trace.W
-    merged = np.zeros(len(trace.u), dtype=bool)
-    for k, step in enumerate(program.steps):
-        if step.has_two_modes:
-            merged |= trace.M[:, k] <= 1e-14
-    for array in (velocities, accelerations):
-        array[merged] = np.nan  # both modes meet: the velocity does not exist
-        array[:, program.mechanism.frame] = 0.0
-    for array in (poses, velocities, accelerations, margins):
-        array[n:] = np.nan
-    return poses, velocities, accelerations, margins, modes
 
 
 def _closure(tracker: Tracker, trace: Trace, completed: bool, events: list[MotionEvent]) -> Closure:

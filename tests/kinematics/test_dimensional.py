@@ -310,7 +310,7 @@ def test_bar_formula_is_the_classical_angle_of_a_four_bar() -> None:
     )
     ends = [(joint.a, joint.b) for joint in mechanism.joints]
     # link 3 turns about its pivot on the frame (joint 1), the coupler is the bar from joint 2 to joint 3
-    form = GroupForm(0, False, (3,), ((2, 1, 3, 3),), ((1, 0, 3),))
+    form = GroupForm(0, False, (3,), ((2, 1, 3, 3),), ((1, 0, 1, 3),))
     sines = transmission_sines([form], mechanism.dimensions[None], ends, frames[None], motion.margins[None])
     diagonal = 9.0 + 1.0 - 6.0 * np.cos(motion.inputs)
     cosine = (2.6**2 + 2.4**2 - diagonal) / (2 * 2.6 * 2.4)

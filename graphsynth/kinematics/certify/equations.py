@@ -36,7 +36,7 @@ class _BallPlane(Plane):
         return v.real, v.imag
 
     def unit(self, angle: Number) -> Balls:
-        return _fixed_unit(angle) if isinstance(angle, float) else unit(angle)
+        return _fixed(angle) if isinstance(angle, float) else unit(angle)
 
     def turned(self, v: Balls, by: Balls) -> Balls:
         return v if by is _FRAME else by * v
@@ -69,14 +69,10 @@ _PLANE = _BallPlane(
 _FRAME = exact(1.0 + 0.0j)
 
 
-@lru_cache(1024)
-def _fixed(x: float, y: float) -> Balls:
-    return exact(complex(x, y))
-
-
-@lru_cache(1024)
-def _fixed_unit(angle: float) -> Balls:
-    return unit(exact([angle]))[0]
+@lru_cache(2048)
+def _fixed(x: float, y: float | None = None) -> Balls:
+    """Return a vector of floats; of an angle alone its direction."""
+    return unit(exact([x]))[0] if y is None else exact(complex(x, y))
 
 
 class _Place:
@@ -224,13 +220,8 @@ def _reduced(value: Balls, turns: tuple[float, ...]) -> Balls:
     return value - (whole if turns == (1.0,) else whole * sum(map(exact, turns[1:]), exact(turns[0])))
 
 
-def enclosed(law: Law) -> bool:
-    """Whether the law can be followed between inputs: its rate over an interval is enclosed."""
-    return hasattr(law, "at")
-
-
 def law_over(law: Law, u: Balls) -> tuple[Balls, Balls]:
-    """Coordinate and rate over the inputs; a law that is not `enclosed` is known at midpoints, as exact numbers."""
+    """Coordinate and rate over the inputs; one without ``at`` is known at midpoints, as exact numbers."""
     if isinstance(law, Linear | Harmonic | Polynomial):
         return law.at(u, _PLANE.sin, _PLANE.cos)
     value, rate, _ = law(u.mid)

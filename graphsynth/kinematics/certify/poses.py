@@ -15,7 +15,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.intervals.balls import Balls, exact, tau_times
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.moving import Budget, Cover, Nodes, cover, prove_nodes, whole_turns
-from graphsynth.kinematics.certify.equations import MechanismSystem, enclosed, whole_periods
+from graphsynth.kinematics.certify.equations import MechanismSystem, whole_periods
 from graphsynth.kinematics.engine.result import Motion
 from graphsynth.mechanism.joints import Gear, Prismatic
 
@@ -106,23 +106,15 @@ def certify(
 
     Examples
     --------
-    >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
-    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
-    >>> rocker = Mechanism(graph, [
-    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
-    ...     Revolute(0, 3, (2.0, 0.0)),
-    ... ], [Driver(0, 1)])
+    >>> from graphsynth import Mechanism, simulate
+    >>> rocker = Mechanism.four_bar(2.0, 1.0, 2.5, 2.5)
     >>> proof = certify(simulate(rocker, np.linspace(0.0, 2.0 * np.pi, 37)))
     >>> proof.certified, proof.closed, bool(proof.position_radius.max() < 1e-12)
     (True, True, True)
     """
     if not isinstance(motion, Motion):
         raise GeometryError(f"{type(motion).__name__} is not a motion of graphsynth.simulate; give one")
-    return _certify(motion, between, Budget(whole("max_boxes", max_boxes, 1, 10**9), positive("seconds", seconds)))
-
-
-def _certify(motion: Motion, between: bool, budget: Budget) -> MotionCertificate:
-    begin = perf_counter()
+    begin, budget = perf_counter(), Budget(whole("max_boxes", max_boxes, 1, 10**9), positive("seconds", seconds))
     check_rounding()
     system = MechanismSystem(motion.mechanism)
     reached = motion.assembled & np.isfinite(motion.poses).all(axis=(1, 2))
@@ -133,7 +125,7 @@ def _certify(motion: Motion, between: bool, budget: Budget) -> MotionCertificate
     nodes = prove_nodes(system, u, samples)
     radii = _radii(system, nodes, samples)
     found = Cover(np.zeros(max(len(asked) - 1, 0), dtype=bool))
-    if between and len(asked) > 1 and all(enclosed(driver.law) for driver in motion.mechanism.drivers):
+    if between and len(asked) > 1 and all(hasattr(d.law, "at") for d in motion.mechanism.drivers):
         found = cover(system, nodes, budget, begin)
     closed = turns is not None and end
     closed = closed and bool(found.covered.all()) and _closes(system, nodes, turns)
@@ -244,7 +236,7 @@ def _reason(motion: Motion, between: bool, poses: Mask, intervals: Mask, found: 
         return f"no exact assembly is proved beside the sample at input {where:.9g}: singular there, or no assembly"
     if not between or intervals.all():
         return ""
-    unknown = [d for d in motion.mechanism.drivers if not enclosed(d.law)]
+    unknown = [d for d in motion.mechanism.drivers if not hasattr(d.law, "at")]
     if unknown:
         pair = f"{unknown[0].base}-{unknown[0].link}"
         return f"the law of driver {pair} is known at points only, so nothing is proved between samples"

@@ -1,11 +1,8 @@
 """The search: differential evolution over batches of motions, then a local polish of a target.
 
-Why there is always something to begin with: at a sketch where the structure without the driven link is held regularly,
-a crank whose joints all lie close to its pivot on the frame moves every other joint a little only, so by the implicit
-function theorem the whole turn exists.  The population holds cranks of many sizes; the search enlarges what lives.
-
-Sources: [Storn & Price 1997], J. Global Optim. 11, 341-359 (differential evolution); [Deb 2000], Comput.
-Methods Appl. Mech. Eng. 186, 311-338 (complete motions before bounds, bounds before aims).
+Why there is always something to begin with: docs/explanation/embodiment.md, "Why a full turn is always within reach".
+Sources: [Storn & Price 1997], J. Global Optim. 11, 341-359 (differential evolution); [Deb 2000], Comput. Methods Appl.
+Mech. Eng. 186, 311-338 (complete motions before bounds, bounds before aims).
 """
 
 from __future__ import annotations
@@ -79,7 +76,14 @@ def search(
     With a target the first search is short: it tells the promising starts, which are then continued.  `effort` is the
     share of the usual number of first candidates and of generations.
     """
-    begun = _begin(problem, random, effort) if before is None else before
+    begun, aimed = before, problem.fit is not None
+    if begun is None:  # many candidates, of which the best are the first population
+        width = min(120, 15 * problem.size) if aimed else min(60, 6 * problem.size)
+        first = problem.population(max(width, round(effort * (20 if aimed else 4) * width), 1), random)
+        outcome = problem.evaluate(first)
+        order = np.argsort(outcome.cost, kind="stable")[: max(width, 8)]
+        counts = len(first), int((outcome.cost < 0.5 * INCOMPLETE).sum()), int((outcome.merit >= 1.0).sum())
+        begun = SearchResult(first[order[0]], float(outcome.cost[order[0]]), (), counts, first[order])
     fit, count = problem.fit, 60  # generations at most: fewer where a motion costs more
     if fit is not None:
         count = 120 if before is None else 400 if fit.warped else 600
@@ -102,17 +106,6 @@ def search(
             best, value, population[0] = polished, better, polished
             history.append(HistoryRow(attempt, len(history), problem.evaluations, value))
     return SearchResult(best, value, tuple(history), start, population)
-
-
-def _begin(problem: DimensionProblem, random: np.random.Generator, effort: float) -> SearchResult:
-    """Make many candidates and keep the best as the first population."""
-    aimed, size = problem.fit is not None, problem.size
-    width = min(120, 15 * size) if aimed else min(60, 6 * size)
-    first = problem.population(max(width, round(effort * (20 if aimed else 4) * width), 1), random)
-    outcome = problem.evaluate(first)
-    order = np.argsort(outcome.cost, kind="stable")[: max(width, 8)]
-    start = (len(first), int((outcome.cost < 0.5 * INCOMPLETE).sum()), int((outcome.merit >= 1.0).sum()))
-    return SearchResult(first[order[0]], float(outcome.cost[order[0]]), (), start, first[order])
 
 
 def _evolve(

@@ -1,13 +1,8 @@
 """Sketches of graphs that cannot be drawn without crossings: with the fewest crossings found.
 
-First, binary links that cross are looked for.  Two binary links that cross are the diagonals of a convex quadrilateral
-with their four joints as corners, so the drawing is that of the graph in which one link of four joints stands for both.
-If that graph is planar, every embedding has the joints of the two links alternating around the new link (else the links
-could be parted again without a crossing, and the graph would be planar itself): one crossing, the least possible.  If
-no pair will do, two pairs are tried.
-
-Where that fails, force-directed drawings from many starts are moved at once (arrays with the start as first axis), the
-crossings of sides are counted for each, and the drawing with the fewest is relaxed; no step may add a crossing.
+Two binary links cross as diagonals of a quadrilateral, or two pairs do (why so: docs/explanation/sketching.md, "Chains
+that are not planar").  Where that fails, force-directed drawings from many starts are moved at once (arrays with the
+start as first axis), and that with the fewest crossings of sides is relaxed; no step may add one.
 """
 
 from __future__ import annotations
@@ -157,7 +152,17 @@ def _finished(z: Complex, links: _Links) -> tuple[Complex, int]:
     """Drive joints away from foreign sides, as long as no crossing is added."""
     crossings, step = int(links.crossings(z)[0]), 0.1
     for _ in range(_FINISH):
-        move = _force(z, links) + _clearing(z, links.sides(z)[0])
+        # drive joints away from sides they are not on
+        sides = links.sides(z)[0]
+        p, q = z[0, sides[:, 0], None], z[0, sides[:, 1], None]
+        side, way = q - p, z - p
+        share = (way.real * side.real + way.imag * side.imag) / np.maximum(side.real**2 + side.imag**2, 1e-12)
+        gap = way - np.minimum(np.maximum(share, 0.0), 1.0) * side
+        distance = np.maximum(np.abs(gap), 1e-9)
+        push = gap * (_CLEARING * np.maximum(0.0, _CLEAR - distance) / distance)
+        rows = np.arange(len(sides))
+        push[rows, sides[:, 0]] = push[rows, sides[:, 1]] = 0.0
+        move = _force(z, links) + push.sum(axis=0)
         tried = z + move * min(step, 0.15 / max(float(np.abs(move).max()), 1e-9))
         found = int(links.crossings(tried)[0])
         if found <= crossings:
@@ -167,16 +172,3 @@ def _finished(z: Complex, links: _Links) -> tuple[Complex, int]:
             if step < 1e-3:
                 break
     return z[0], crossings
-
-
-def _clearing(z: Complex, sides: IntArray) -> Complex:
-    """Force that drives joints away from sides they are not on."""
-    p, q = z[0, sides[:, 0], None], z[0, sides[:, 1], None]
-    side, way = q - p, z - p
-    share = (way.real * side.real + way.imag * side.imag) / np.maximum(side.real**2 + side.imag**2, 1e-12)
-    gap = way - np.minimum(np.maximum(share, 0.0), 1.0) * side
-    distance = np.maximum(np.abs(gap), 1e-9)
-    push = gap * (_CLEARING * np.maximum(0.0, _CLEAR - distance) / distance)
-    rows = np.arange(len(sides))
-    push[rows, sides[:, 0]] = push[rows, sides[:, 1]] = 0.0
-    return np.asarray(push.sum(axis=0)[None])

@@ -64,6 +64,13 @@ class Design:
         first = [k for k in own if k in self.driver_joints]
         return tuple((first + [k for k in own if k not in first])[:2])
 
+    @cached_property
+    def cranks(self) -> tuple[tuple[int, list[int]], ...]:
+        """Revolute driven joints on the frame, each with the joints of the link that is driven there."""
+        driven = zip(self.drivers, self.driver_joints)
+        found = [(k, link) for (base, link), k in driven if base == self.graph.frame and self.kinds[k] == "R"]
+        return tuple((k, self.joints_of(link)) for k, link in found)
+
     def joints_of(self, link: int) -> list[int]:
         """Return the indices of the joints of a link."""
         return [k for k, joint in enumerate(self.graph.joints) if link in (joint.a, joint.b)]

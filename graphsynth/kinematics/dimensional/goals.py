@@ -1,8 +1,7 @@
 """What dimensions shall achieve, and by how much candidates miss it.
 
-Moving, turning and scaling the whole mechanism, and moving the tracing point on its link, change a curve linearly:
-with z the origin and theta the angle of the link, every curve it can draw is ``s z + q exp(i theta) + t`` with complex
-s, q, t.  So these are not searched but solved for (variable projection: [Golub & Pereyra 1973]): six numbers less.
+Every curve a link can draw is ``s z + q exp(i theta) + t``, so that s, q, t are not searched but solved for (variable
+projection; docs/explanation/embodiment.md, "Targets").
 """
 
 from __future__ import annotations
@@ -70,10 +69,7 @@ class LineGoal:
     tolerance : float
         Largest width of the strip that holds the segment, over its length.
 
-    Raises
-    ------
-    GeometryError
-        A span outside (0, 2 pi], or numbers that are not finite.
+    `GeometryError` for a span outside (0, 2 pi], or numbers that are not finite.
     """
 
     length: float
@@ -105,10 +101,7 @@ class PathGoal:
     tolerance : float
         Largest distance from a point, over the size of the set of points.
 
-    Raises
-    ------
-    GeometryError
-        Fewer than three points, or all at one place.
+    `GeometryError` for fewer than three points, or all at one place.
     """
 
     points: tuple[tuple[float, float], ...]
@@ -140,10 +133,7 @@ class PosesGoal:
     tolerance : float
         Largest distance from a pose over the size of the set of points; angles count as arcs of that size.
 
-    Raises
-    ------
-    GeometryError
-        Fewer than three poses, or inputs missing.
+    `GeometryError` for fewer than three poses, or inputs missing.
     """
 
     poses: tuple[tuple[float, float, float], ...]
@@ -220,10 +210,7 @@ class Goals:
         distances of a tracing point from the joints of its link count among the long ones.
     target : LineGoal, PathGoal, PosesGoal or FunctionGoal, optional
 
-    Raises
-    ------
-    GeometryError
-        A bound that nothing can satisfy, or a target of another type.
+    `GeometryError` for a bound that nothing can satisfy, or a target of another type.
 
     Examples
     --------

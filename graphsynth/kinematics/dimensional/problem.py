@@ -113,11 +113,9 @@ class DimensionProblem:
         """Places of the automatic sketch, shifted a little, with the driven links shrunk to cranks."""
         places = layout(self.design.graph).positions.copy()
         places += random.normal(0.0, 0.12, places.shape)
-        frame = self.design.graph.frame
-        for (base, link), joint in zip(self.design.drivers, self.design.driver_joints):
-            if base == frame and self.design.kinds[joint] == "R":
-                for k in self.design.joints_of(link):
-                    places[k] = places[joint] + 0.3 * (places[k] - places[joint])
+        for joint, own in self.design.cranks:
+            for k in own:
+                places[k] = places[joint] + 0.3 * (places[k] - places[joint])
         return places
 
     # --- from vectors to motions
@@ -145,13 +143,10 @@ class DimensionProblem:
         places = np.repeat(self.sketch[None], count, axis=0)
         places += random.normal(0.0, 1.0, places.shape) * (random.uniform(0.0, 0.35, (count, 1, 1)) + wide)
         places[:, self.design.fixed] = self.sketch[list(self.design.fixed)]
-        frame = self.design.graph.frame
-        for (base, link), joint in zip(self.design.drivers, self.design.driver_joints):
-            if base == frame and self.design.kinds[joint] == "R":
-                size = np.exp(random.uniform(math.log(0.15), math.log(2.0), (count, 1)))
-                for k in self.design.joints_of(link):
-                    if k not in self.design.fixed:
-                        places[:, k] = places[:, joint] + size * (places[:, k] - places[:, joint])
+        for joint, own in self.design.cranks:
+            size = np.exp(random.uniform(math.log(0.15), math.log(2.0), (count, 1)))
+            for k in set(own) - {*self.design.fixed}:
+                places[:, k] = places[:, joint] + size * (places[:, k] - places[:, joint])
         angles = self.angles + random.normal(0.0, 0.5, (count, len(self.angles)))
         box = self.bounds()
         ranges = box[len(box) - self.extras :]

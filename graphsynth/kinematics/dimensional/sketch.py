@@ -1,13 +1,8 @@
 """The automatic sketch: where to draw the joints of a mechanism graph that has no dimensions yet.
 
-The joints become the vertices of a plane graph: a link with two joints is an edge, a link with more is a polygon.  When
-the mechanism graph is planar, its loops and its link polygons are the faces.  One loop is the outer face, a regular
-polygon; a hub is put into every other loop and joined to its joints.  The graph so made is 3-connected, so the
-barycentric drawing of Tutte (1963, "How to draw a graph", Proc. London Math. Soc. 13, 743-767) has no crossings and
-every link polygon is strictly convex.  Forces then even out the distances; no step may turn a face over.
-
-A graph that is not planar (11 of the 230 ten-link chains) is drawn with the fewest crossings found, see
-:mod:`graphsynth.kinematics.dimensional.crossings`; one with a cut link by forces.
+The barycentric drawing of Tutte (1963) of the plane graph of joints, with a hub in every loop but the outer one, evened
+out by forces; no step may turn a face over.  How and why: docs/explanation/sketching.md.  A graph that is not planar is
+drawn as in :mod:`graphsynth.kinematics.dimensional.crossings`; one with a cut link by forces.
 """
 
 from __future__ import annotations
@@ -36,19 +31,11 @@ _ROUNDS, _CLOSE = 30, 0.3
 _OUTER = 4
 #: Springs of polygons over those of bars: plates are to be nearly regular.
 _STIFF = 3.0
-#: Height of a plate's corner over the line of its neighbours below which it is pushed out, in mean sides.
-_HEIGHT = 0.6
-#: Trials of a step, each with the offending vertices moved less.
-_RETRIES = 4
-#: Share of the area of a triangle that a step must leave.
-_KEPT = 0.4
-#: Distance of joints from sides they are not on below which a force acts, in mean sides, and its strength.
-_CLEAR, _CLEARING = 0.5, 5.0
-#: Distance of two joints below which a further force acts, in mean sides.
-_APART = 0.6
-#: Strength of the force that keeps triangles from becoming flat.
-_BARRIER = 0.05
-_STRENGTHS = (_APART, _CLEAR, _CLEARING, _BARRIER, _HEIGHT, _KEPT, float(_RETRIES))
+#: What the kernel takes, lengths in mean sides: distance of two joints below which a further force acts; distance of
+#: joints from sides they are not on below which a force acts, and its strength; strength of the force that keeps
+#: triangles from becoming flat; height of a plate's corner over the line of its neighbours below which it is pushed
+#: out; share of the area of a triangle that a step must leave; trials of a step, with offending vertices moved less.
+_STRENGTHS = (0.6, 0.5, 5.0, 0.05, 0.6, 0.4, 4.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +167,18 @@ class _Drawing:
         stiff = {pair for p in polygons if len(p) > 2 for pair in _sides((p,))}
         self.sides = np.array(sides, dtype=np.intp)
         self.stiffness = np.array([_STIFF if side in stiff else 1.0 for side in sides])
-        self.z = _tutte(count + len(inner), np.array(sides + spokes), self.outer)
+        # barycentric: outer face on a regular polygon, every other vertex at the mean of its neighbours
+        size, edges, rim = count + len(inner), np.array(sides + spokes), np.arange(len(self.outer)) / len(self.outer)
+        A = np.zeros((size, size))
+        np.add.at(A, (edges[:, 0], edges[:, 1]), 1.0)
+        A = np.minimum(A + A.T, 1.0)
+        z: Complex = np.zeros(size, dtype=np.complex128)
+        z[self.outer] = np.exp(1j * math.tau * rim)
+        free = np.setdiff1d(np.arange(size), self.outer)
+        if free.size:
+            L = np.diag(A.sum(axis=1)) - A
+            z[free] = np.linalg.solve(L[free][:, free], -L[free][:, self.outer] @ z[self.outer])
+        self.z = z
         self.z = self.z / self.mean_side()
         self.sense = np.sign(_areas(self.z, self.triangles))
         self.joints = count
@@ -240,20 +238,6 @@ def _sides(polygons: Polygons) -> list[tuple[int, int]]:
 
 def _corners(around: Any) -> list[tuple[int, int, int]]:
     return [(around[k - 2], around[k - 1], around[k]) for k in range(len(around))]
-
-
-def _tutte(count: int, edges: IntArray, outer: list[int]) -> Complex:
-    """Barycentric drawing: outer face on a regular polygon, every other vertex at the mean of its neighbours."""
-    A = np.zeros((count, count))
-    np.add.at(A, (edges[:, 0], edges[:, 1]), 1.0)
-    A = np.minimum(A + A.T, 1.0)
-    z = np.zeros(count, dtype=np.complex128)
-    z[outer] = np.exp(1j * math.tau * np.arange(len(outer)) / len(outer))
-    free = np.setdiff1d(np.arange(count), outer)
-    if free.size:
-        L = np.diag(A.sum(axis=1)) - A
-        z[free] = np.linalg.solve(L[free][:, free], -L[free][:, outer] @ z[outer])
-    return z
 
 
 def _areas(z: Complex, triangles: IntArray) -> Array:

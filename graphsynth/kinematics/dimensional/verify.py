@@ -1,12 +1,7 @@
 """The check that dimensions found must pass: the whole range by `simulate`, step control, events and all.
 
-The transmission angle of a bar is asked for as in a four-bar linkage: hold the driver, take the bar away, and let the
-rest move in the one way left to it; the angle between the bar and the normal of that motion, seen across the bar, is
-the transmission angle (pi/2: the bar pushes along the motion).  With J the constraint matrix of the group's core links,
-one row per bar (the unit vector along the bar times the velocity across it), the column of the inverse of J that
-belongs to the bar is that motion with a unit component along the bar, so ``sin mu = 1 / |velocity across the bar|``.
-For a dyad it is the angle at its inner joint; for a link held by three bars it is the angle between a bar and the line
-from its end to the point where the other two bars meet.
+The transmission angle of a bar in any group is defined in docs/explanation/embodiment.md, "The search".  Here J is the
+constraint matrix of the group's core links, one row per bar: the unit vector along it times the velocity across it.
 """
 
 from __future__ import annotations
@@ -74,36 +69,30 @@ def verify(mechanism: Mechanism, goals: Goals) -> tuple[Motion, Figures, tuple[s
     inputs = np.sort(np.concatenate([inputs, [u for u in own if np.abs(inputs - u).min() > 1e-9]]))
     at = np.abs(inputs[None] - own[:, None]).argmin(axis=1)
     motion = simulate(mechanism, inputs)
-    reasons = []
-    if not motion.completed:
-        reasons.append("the range is not completed")
-    elif goals.full_turn and not (motion.closure.tested and motion.closure.closed):
-        reasons.append("not closed after the turn")
-    if any(event.kind in ("change point", "near fold", "fold", "escape", "singular") for event in motion.events):
-        reasons.append("two assembly modes meet or nearly meet")
-    if motion.completed and (motion.modes != motion.modes[0]).any():
-        reasons.append("an assembly mode changes")
-    if motion.completed and not motion.residual <= _RESIDUAL:
-        reasons.append("a joint opens")
-    angle = smallest_transmission(motion)
-    ratio = length_ratio(mechanism)
-    error = _goal_error(motion, goals, inputs, at) if motion.completed else math.nan
-    if not angle >= goals.min_transmission_angle - _SLACK:
-        reasons.append("the transmission angle is too small")
-    if not ratio <= goals.max_length_ratio * (1.0 + _SLACK):
-        reasons.append("the length ratio is too large")
-    if target is not None and not error <= target.tolerance:
-        reasons.append("the target is missed")
-    apart = motion.singularity_distance
+    done = motion.completed
+    angle, ratio = smallest_transmission(motion), length_ratio(mechanism)
+    error = _goal_error(motion, goals, inputs, at) if done else math.nan
+    closed = motion.closure.tested and motion.closure.closed
+    meetings = ("change point", "near fold", "fold", "escape", "singular")
+    missed = {
+        "the range is not completed": not done,
+        "not closed after the turn": done and goals.full_turn and not closed,
+        "two assembly modes meet or nearly meet": any(event.kind in meetings for event in motion.events),
+        "an assembly mode changes": done and bool((motion.modes != motion.modes[0]).any()),
+        "a joint opens": done and not motion.residual <= _RESIDUAL,
+        "the transmission angle is too small": not angle >= goals.min_transmission_angle - _SLACK,
+        "the length ratio is too large": not ratio <= goals.max_length_ratio * (1.0 + _SLACK),
+        "the target is missed": target is not None and not error <= target.tolerance,
+    }
     figures = Figures(
         transmission_angle=angle,
-        singularity_distance=float(apart.min()) if motion.completed else math.nan,
+        singularity_distance=float(motion.singularity_distance.min()) if done else math.nan,
         length_ratio=ratio,
         goal_error=error,
         residual=motion.residual,
         closure=motion.closure.error,
     )
-    return motion, figures, tuple(reasons)
+    return motion, figures, tuple(reason for reason, wrong in missed.items() if wrong)
 
 
 def smallest_transmission(motion: Motion) -> float:
@@ -210,8 +199,8 @@ def in_order(z: NDArray[np.complex128], goal: NDArray[np.complex128]) -> float:
 class GroupForm(NamedTuple):
     """How to find the transmission of one group.
 
-    ``core`` holds the unknown links, ``bars`` (joint at one end, link there, joint at the other end, link there) and
-    ``pins`` (joint, link, link) the constraints; without bars the margin of the engine is taken: its square root where
+    ``core`` holds the unknown links, ``bars`` and ``pins`` the constraints: joint at one end, link there, joint at the
+    other end (for a pin the same), link there.  Without bars the margin of the engine is taken: its square root where
     ``closed``, else its size.
     """
 
@@ -219,7 +208,7 @@ class GroupForm(NamedTuple):
     closed: bool
     core: tuple[int, ...]
     bars: tuple[tuple[int, int, int, int], ...]
-    pins: tuple[tuple[int, int, int], ...]
+    pins: tuple[tuple[int, int, int, int], ...]
 
 
 def group_forms(mechanism: Mechanism, steps: Sequence[Step]) -> tuple[GroupForm, ...]:
@@ -240,7 +229,7 @@ def _form(mechanism: Mechanism, step: Step, known: set[int]) -> GroupForm:
         return plain
     inside, core = set(step.links), set(step.core)
     driven = {driver.pair for driver in mechanism.drivers}
-    bars, pins = [], []
+    bars = []
     own = [
         (k, joint)
         for k, joint in enumerate(mechanism.joints)
@@ -251,9 +240,7 @@ def _form(mechanism: Mechanism, step: Step, known: set[int]) -> GroupForm:
     for link in sorted(inside - core):
         ends = [(k, joint.b if joint.a == link else joint.a) for k, joint in own if link in joint.pair]
         bars.append((ends[0][0], ends[0][1], ends[1][0], ends[1][1]))
-    for k, joint in own:
-        if not {joint.a, joint.b} & (inside - core):
-            pins.append((k, joint.a, joint.b))
+    pins = [(k, joint.a, k, joint.b) for k, joint in own if not {joint.a, joint.b} & (inside - core)]
     if not bars or len(bars) + 2 * len(pins) != 3 * len(core):
         return plain
     return GroupForm(step.group, False, tuple(step.core), tuple(bars), tuple(pins))
@@ -283,29 +270,30 @@ def _bars(form: GroupForm, dimensions: Array, ends: Sequence[tuple[int, int]], f
     place = {link: 3 * k for k, link in enumerate(form.core)}
     size = 3 * len(form.core)
     J = np.zeros((*frames.shape[:2], size, size))
-    across = np.zeros((*frames.shape[:2], len(form.bars), 2, size))
-    for r, (p, a, q, b) in enumerate(form.bars):
-        A, B = _point(p, a, dimensions, ends, frames), _point(q, b, dimensions, ends, frames)
+    bars, row = len(form.bars), len(form.bars)
+    across = np.zeros((*frames.shape[:2], bars + len(form.pins), 2, size))
+    for r, (p, a, q, b) in enumerate((*form.bars, *form.pins)):
+        A = _point(p, a, dimensions, ends, frames)
+        B = A if p == q else _point(q, b, dimensions, ends, frames)
         for link, at, sign in ((a, A, -1.0), (b, B, 1.0)):
-            if link in place:
-                _velocity(across[:, :, r], place[link], at, sign)
+            if link in place:  # a link's twist is that of its point at the world's origin
+                k = place[link]
+                across[:, :, r, 0, k] = across[:, :, r, 1, k + 1] = sign
+                across[:, :, r, 0, k + 2], across[:, :, r, 1, k + 2] = -sign * at[..., 1], sign * at[..., 0]
+        if p == q:
+            J[:, :, row : row + 2] = across[:, :, r]
+            row += 2
+            continue
         e = B - A
         e = e / np.maximum(np.hypot(e[..., 0], e[..., 1]), 1e-300)[..., None]
         J[:, :, r] = (e[..., None] * across[:, :, r]).sum(axis=2)
-    row = len(form.bars)
-    for k, a, b in form.pins:
-        at = _point(k, a, dimensions, ends, frames)
-        for link, sign in ((a, -1.0), (b, 1.0)):
-            if link in place:
-                _velocity(J[:, :, row : row + 2], place[link], at, sign)
-        row += 2
     missing = ~np.isfinite(J).all(axis=(2, 3))
     J[missing] = np.eye(size)
     try:
-        columns = np.linalg.inv(J)[..., : len(form.bars)]
+        columns = np.linalg.inv(J)[..., :bars]
     except np.linalg.LinAlgError:  # one pose is singular to the last bit
-        columns = np.linalg.pinv(J)[..., : len(form.bars)] * 1e300
-    moved = np.einsum("...rck,...kr->...rc", across, columns)
+        columns = np.linalg.pinv(J)[..., :bars] * 1e300
+    moved = np.einsum("...rck,...kr->...rc", across[:, :, :bars], columns)
     with np.errstate(over="ignore"):
         sine = 1.0 / np.hypot(moved[..., 0], moved[..., 1]).max(axis=-1)
     sine[missing] = np.nan
@@ -318,9 +306,3 @@ def _point(k: int, link: int, dimensions: Array, ends: Sequence[tuple[int, int]]
     px, py = dimensions[:, k, first, None], dimensions[:, k, first + 1, None]
     x, y, c, s = (frames[:, :, link, i] for i in range(4))
     return np.stack([x + c * px - s * py, y + s * px + c * py], axis=-1)
-
-
-def _velocity(rows: Array, column: int, at: Array, sign: float) -> None:
-    """Put the velocity of a point into two rows; a link's twist is that of its point at the world's origin."""
-    rows[:, :, 0, column], rows[:, :, 1, column + 1] = sign, sign
-    rows[:, :, 0, column + 2], rows[:, :, 1, column + 2] = -sign * at[..., 1], sign * at[..., 0]

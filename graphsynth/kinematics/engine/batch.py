@@ -35,23 +35,12 @@ _REASONS = {
 
 @dataclass(frozen=True, eq=False)
 class BatchMotion:
-    """Branches of many dimension sets (estimated: floating point; NaN where a branch does not reach).
+    """Branches of many dimension sets over `inputs` (n,), estimated: floating point; NaN where a branch does not reach.
 
-    Attributes
-    ----------
-    inputs : ndarray, shape (n,)
-    links : tuple of int
-        Links kept; the third axis of the next three arrays.
-    frames : ndarray, shape (sets, n, len(links), 4)
-        ``(x, y, cos theta, sin theta)``.
-    velocities, accelerations : ndarray, shape (sets, n, len(links), 3)
-        Derivatives of ``(x, y, theta)`` by the input; empty if not asked for.
-    margins : ndarray, shape (sets, n, groups)
-        As in `Motion.margins`.
-    reached : ndarray of int, shape (sets,)
-        Number of inputs reached.
-    code, group : ndarray of int, shape (sets,)
-        Why a set stopped and in which group (-1 for none); see `reason`.
+    `frames` (sets, n, len(links), 4): ``(x, y, cos theta, sin theta)`` of the `links` kept; `velocities` and
+    `accelerations` (sets, n, len(links), 3): derivatives of ``(x, y, theta)`` by the input, empty if not asked for;
+    `margins` (sets, n, groups): as in `Motion.margins`; by set `reached`, the number of inputs reached, and why it
+    stopped, `code`, and in which `group` (-1 for none); see `reason`.
     """
 
     inputs: Array
@@ -85,13 +74,7 @@ class BatchMotion:
         return np.concatenate([self.frames[..., :2], angle[..., None]], axis=-1)
 
     def point(self, link: int, local: ArrayLike) -> Array:
-        """Positions of a point (x, y) of a link, shape (sets, n, 2); ``local`` may differ by set, shape (sets, 2).
-
-        Raises
-        ------
-        GeometryError
-            A link that was not kept.
-        """
+        """Positions of a point (x, y) of a link that was kept, shape (sets, n, 2); ``local`` may differ by set."""
         at = finite_array("local", local)
         px, py = at[..., 0:1], at[..., 1:2]
         if link not in self.links:
@@ -153,12 +136,7 @@ def simulate_batch(
 
     Examples
     --------
-    >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute
-    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
-    >>> base = Mechanism(graph, [
-    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
-    ...     Revolute(0, 3, (2.0, 0.0)),
-    ... ], [Driver(0, 1)])
+    >>> base = Mechanism.four_bar(2.0, 1.0, 2.5, 2.5)
     >>> sets = np.repeat(base.dimensions[None], 3, axis=0)
     >>> sets[:, 1, 0] = [2.0, 2.6, 9.0]  # x of joint 0-3 on the frame
     >>> simulate_batch(base, np.linspace(0.0, 6.28, 91), sets).completed.tolist()
@@ -277,26 +255,9 @@ def _run(
 def solve_rrr(A: ArrayLike, B: ArrayLike, l1: ArrayLike, l2: ArrayLike, sign: int = 1) -> tuple[Array, Array]:
     """Joint C of RRR dyads with ``|AC| = l1`` and ``|BC| = l2``; closed form, compiled.
 
-    Parameters
-    ----------
-    A, B : array_like, shape (n, 2)
-        Outer joints.
-    l1, l2 : array_like, shape () or (n,)
-        Lengths, positive.
-    sign : {+1, -1}
-        +1 puts C left of the way from A to B.
-
-    Returns
-    -------
-    C : ndarray, shape (n, 2)
-        NaN where the circles do not meet.
-    margin : ndarray, shape (n,)
-        Square of the sine of the transmission angle; negative where the circles do not meet.
-
-    Raises
-    ------
-    GeometryError
-        A sign that is not +1 or -1, a length that is not positive, shapes that do not fit.
+    `A`, `B` (n, 2): outer joints; `l1`, `l2`: positive lengths, one or n; `sign`: +1 puts C left of the way from A to
+    B, -1 right.  Returns C (n, 2), NaN where the circles do not meet, and the square of the sine of the transmission
+    angle (n,), negative there.  `GeometryError` for other signs, lengths and shapes.
 
     Examples
     --------
@@ -304,7 +265,7 @@ def solve_rrr(A: ArrayLike, B: ArrayLike, l1: ArrayLike, l2: ArrayLike, sign: in
     >>> C.round(12).tolist(), margin.round(12).tolist()
     ([[1.8, 2.4]], [1.0])
     """
-    from graphsynth.kinematics.engine import kernels
+    from graphsynth.kinematics.engine.kernels.loops import rrr
 
     if sign not in (1, -1):
         raise GeometryError(f"sign = {sign!r} must be +1 or -1")
@@ -318,5 +279,5 @@ def solve_rrr(A: ArrayLike, B: ArrayLike, l1: ArrayLike, l2: ArrayLike, sign: in
             raise GeometryError(f"{name} must be one positive length or one for each of the {len(first)} dyads")
         lengths.append(np.ascontiguousarray(np.atleast_1d(values)))
     C, margin = np.empty_like(first), np.empty(len(first))
-    kernels.rrr(first, second, lengths[0], lengths[1], float(sign), C, margin)
+    rrr(first, second, lengths[0], lengths[1], float(sign), C, margin)
     return C, margin

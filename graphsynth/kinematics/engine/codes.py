@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
 
 # Rows: one equation each, between links a and b.  P, Q: points of a and b; t, n: direction of a's line and its normal.
 RX, RY = 0, 1  #: Q - P = 0
@@ -44,100 +44,31 @@ PARALLEL = 1e-14
 DONE, UNREACHABLE, STEP_TOO_LONG, NO_CONVERGENCE, SINGULAR, BAD_INPUT = 0, 1, 2, 3, 4, 5
 
 
-class Tables(NamedTuple):
-    """A program in tables; those of numbers have the dimension sets as first axis.
+#: A program in tables; those of numbers have the dimension sets as first axis.  A row of ``steps``: code, first row,
+#: rows, first core link, core links, first eliminated link, eliminated links, first touched link, touched links, group.
+#: A row of ``rows``: kind, links a and b, their places in the core or -1.
+Tables = namedtuple(
+    "Tables", "steps touched rows row_table core eliminated eliminated_table drives drive_table need_angle"
+)
 
-    A row of ``steps``: code, first row, rows, first core link, core links, first eliminated link, eliminated links,
-    first touched link, touched links, group.  A row of ``rows``: kind, links a and b, their places in the core or -1.
-    """
+#: State of every link over n samples, the sample as last axis.  X (links, 4, n) holds x, y, cos and sin; TH (links, n)
+#: angles where gears need them; V and W (links, 3, n) first and second derivatives by the input; PHI (gears, n)
+#: directions of lines of centres; M (steps, n) margins.
+State = namedtuple("State", "X TH V W PHI M")
 
-    steps: Any
-    touched: Any
-    rows: Any
-    row_table: Any
-    core: Any
-    eliminated: Any
-    eliminated_table: Any
-    drives: Any
-    drive_table: Any
-    need_angle: Any
+#: What a run keeps of every dimension set: of which links and steps, and where it goes.  It starts from ``poses``
+#: (sets, links, 3) and ``centres`` (sets, gears), the directions of lines of centres; without them from sample 0 as it
+#: is.
+Delivery = namedtuple("Delivery", "poses centres links steps frames velocities accelerations margins")
 
+#: A group to be placed: its rows ``r0 .. r0 + nr`` with their numbers, its core links ``c0 .. c0 + nc``.
+Group = namedtuple("Group", "rows rp r0 nr core c0 nc")
 
-class State(NamedTuple):
-    """State of every link over n samples, the sample as last axis.
+#: Workspace of one run.  J (n, n), f (n,), pivots (n,): a linear system; g (6,) and G (n, 6): gradients of a row and of
+#: all rows; ``out``: see `newton`, and expected velocities; P, Q: see `anchors` and `platform_rows`; x (links, 11): one
+#: sample; T (12, n): rows of the loops; phi, m, ql: lines of centres, margins and driver coordinates at one sample;
+#: blur (n,): how far rounding moved the links of the groups before.
+Room = namedtuple("Room", "J f g G pivots out P Q x T phi m ql blur")
 
-    X (links, 4, n) holds x, y, cos and sin; TH (links, n) angles where gears need them; V and W (links, 3, n) first and
-    second derivatives by the input; PHI (gears, n) directions of lines of centres; M (steps, n) margins.
-    """
-
-    X: Any
-    TH: Any
-    V: Any
-    W: Any
-    PHI: Any
-    M: Any
-
-
-class Delivery(NamedTuple):
-    """What a run keeps of every dimension set: of which links and steps, and where it goes.
-
-    It starts from ``poses`` (sets, links, 3) and ``centres`` (sets, gears), the directions of lines of centres; without
-    them from sample 0 as it is.
-    """
-
-    poses: Any
-    centres: Any
-    links: Any
-    steps: Any
-    frames: Any
-    velocities: Any
-    accelerations: Any
-    margins: Any
-
-
-class Group(NamedTuple):
-    """A group to be placed: its rows ``r0 .. r0 + nr`` with their numbers, its core links ``c0 .. c0 + nc``."""
-
-    rows: Any
-    rp: Any
-    r0: Any
-    nr: Any
-    core: Any
-    c0: Any
-    nc: Any
-
-
-class Room(NamedTuple):
-    """Workspace of one run.
-
-    J (n, n), f (n,), pivots (n,): a linear system; g (6,) and G (n, 6): gradients of a row and of all rows; ``out``:
-    see `newton`, and expected velocities; P, Q: see `anchors` and `platform_rows`; x (links, 11): one sample; T (12,
-    n): rows of the loops; phi, m, ql: lines of centres, margins and driver coordinates at one sample; blur (n,): how
-    far rounding moved the links of the groups before.
-    """
-
-    J: Any
-    f: Any
-    g: Any
-    G: Any
-    pivots: Any
-    out: Any
-    P: Any
-    Q: Any
-    x: Any
-    T: Any
-    phi: Any
-    m: Any
-    ql: Any
-    blur: Any
-
-
-class At(NamedTuple):
-    """One sample: its number, the step from the one before (if ``warm``) and the margin there, the mode."""
-
-    i: Any
-    h: Any
-    before: Any
-    warm: Any
-    sign: Any
-    derivs: Any
+#: One sample: its number, the step from the one before (if ``warm``) and the margin there, the mode.
+At = namedtuple("At", "i h before warm sign derivs")

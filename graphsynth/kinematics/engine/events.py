@@ -336,24 +336,19 @@ def _stops(tracker: Tracker, trace: Trace, rate: Rate, group: int, link: int) ->
         kept = np.flatnonzero(np.isfinite(speed) & (np.abs(speed) > _STILL * fastest))
     low, high = kept[:-1], kept[1:]
     turns = speed[low] * speed[high] < 0.0
-    dips = _dips(trace.u[high] - trace.u[low], speed[low], speed[high], slope[low], slope[high])
+    # intervals in which a speed of one sign comes close to zero or beyond, by its cubic interpolant
+    sense, step = np.sign(speed[low]), trace.u[high] - trace.u[low]
+    v0, v1, m0, m1 = sense * speed[low], sense * speed[high], sense * slope[low] * step, sense * slope[high] * step
+    dips = np.flatnonzero((v1 > 0.0) & (m0 <= 0.0) & (m1 >= 0.0))
+    t, v0, v1, m0, m1 = np.linspace(0.0, 1.0, 17)[:, None], v0[dips], v1[dips], m0[dips], m1[dips]
+    cubic = v0 * (1 + 2 * t) * (1 - t) ** 2 + v1 * (3 - 2 * t) * t**2 + m0 * t * (1 - t) ** 2 - m1 * t**2 * (1 - t)
+    dips = dips[cubic.min(axis=0, initial=math.inf) < _SLOW * np.maximum(v0, v1)]
     found: list[MotionEvent | None] = []
     for k in [*np.flatnonzero(turns), *dips]:
         at = _speed_from(tracker, trace, int(low[k]), rate)
         first, last = float(trace.u[low[k]]), float(trace.u[high[k]])
         found += [_reversal(at, first, last, group, link)] if turns[k] else _dip(at, first, last, group, link)
     return [event for event in found if event is not None]
-
-
-def _dips(step: Array, v0: Array, v1: Array, w0: Array, w1: Array) -> NDArray[np.intp]:
-    """Intervals in which a speed of one sign comes close to zero or beyond, by its cubic interpolant."""
-    sense = np.sign(v0)
-    v0, v1, m0, m1 = sense * v0, sense * v1, sense * w0 * step, sense * w1 * step
-    found = np.flatnonzero((v1 > 0.0) & (m0 <= 0.0) & (m1 >= 0.0))
-    t = np.linspace(0.0, 1.0, 17)[:, None]
-    v0, v1, m0, m1 = v0[found], v1[found], m0[found], m1[found]
-    cubic = v0 * (1 + 2 * t) * (1 - t) ** 2 + v1 * (3 - 2 * t) * t**2 + m0 * t * (1 - t) ** 2 - m1 * t**2 * (1 - t)
-    return np.asarray(found[cubic.min(axis=0, initial=math.inf) < _SLOW * np.maximum(v0, v1)])
 
 
 def _speed_from(tracker: Tracker, trace: Trace, k: int, rate: Rate) -> Speed:

@@ -1,8 +1,7 @@
 """Following one branch of a mechanism over increasing or decreasing inputs, with step control.
 
-A closed-form step fails only where its group cannot be assembled.  A Newton step is refused when the corrector moves
-far compared with the predictor, converges slowly, or the determinant halves or changes sign; it is then
-halved.  A step that becomes too small is a singularity, never a jump.
+What makes a step too long: docs/explanation/planar-engine.md, "Larger groups".  It is halved; a step that becomes too
+small is a singularity, never a jump.
 """
 
 from __future__ import annotations
@@ -261,11 +260,11 @@ def run_program(
     delivery: codes.Delivery = _KEPT,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Run the kernel for every dimension set; returns samples reached, and code and step of the stop."""
-    from graphsynth.kinematics.engine import kernels
+    from graphsynth.kinematics.engine.kernels.running import run
 
     sets, sizes = len(program.tables.row_table), (program.Lc, program.far)
     done, why = np.zeros(sets, dtype=np.int64), np.zeros((sets, 2), dtype=np.int64)
     every = np.ones(program.mechanism.graph.links, dtype=np.bool_) if wanted is None else wanted
     q, u, state = trace.q, trace.u, trace.memory
-    kernels.run(program.tables, every, q, u, modes, state, delivery, done, why, first, sizes, derivs)
+    run(program.tables, every, q, u, modes, state, delivery, done, why, first, sizes, derivs)
     return done, why

@@ -1,9 +1,7 @@
 """A mechanism as a program: drivers and groups in the order of assembly, in flat tables for the kernels.
 
-Inside a group, a link with exactly two plain joints (R or P) is eliminated: what is left of it is one equation between
-its neighbours (a distance, a point on a line, an angle).  So a dyad has one core link and three equations, a
-triad of class III one core link and three equations, and the kernels solve 3 x 3 systems where link by link would mean
-6 x 6 and 12 x 12.  The eliminated links are placed afterwards, in closed form.
+Inside a group, a link with exactly two plain joints (R or P) is eliminated, and placed afterwards in closed form; see
+docs/explanation/planar-engine.md, "Groups, and what is eliminated".
 """
 
 from __future__ import annotations
@@ -133,14 +131,11 @@ class _Compiler:
         self.driven = {driver.pair: (k, driver) for k, driver in enumerate(mechanism.drivers)}
         self.steps: list[Step] = []
         self.table: list[list[int]] = []
-        self.rows: list[list[int]] = []
-        self.row_parameters: list[list[Number]] = []
+        self.rows: list[tuple[list[int], list[Number]]] = []
         self.core: list[int] = []
         self.touched: list[int] = []
-        self.eliminated: list[list[int]] = []
-        self.eliminated_parameters: list[list[Number]] = []
-        self.drives: list[list[int]] = []
-        self.drive_parameters: list[list[Number]] = []
+        self.eliminated: list[tuple[list[int], list[Number]]] = []
+        self.drives: list[tuple[list[int], list[Number]]] = []
         self.gears: list[int] = []
 
     def program(self) -> Program:
@@ -162,18 +157,12 @@ class _Compiler:
             if isinstance(joint, Gear):
                 need[[joint.a, joint.b]] = True
         Lc, drawn = characteristic_length(self.mechanism), np.abs(self.mechanism.dimensions[:, _LENGTHS])
-        tables = codes.Tables(
-            steps=_ints(self.table, 10),
-            touched=np.array(self.touched or [0], dtype=np.int64),
-            rows=_ints(self.rows, 5),
-            row_table=self._floats(self.row_parameters, codes.ROW_WIDTH),
-            core=np.array(self.core or [0], dtype=np.int64),
-            eliminated=_ints(self.eliminated, 4),
-            eliminated_table=self._floats(self.eliminated_parameters, codes.ELIM_WIDTH),
-            drives=_ints(self.drives, 4),
-            drive_table=self._floats(self.drive_parameters, codes.DRIVE_WIDTH),
-            need_angle=need,
-        )
+        steps = np.array(self.table, dtype=np.int64).reshape(-1, 10)
+        touched, core = (np.array(links or [0], dtype=np.int64) for links in (self.touched, self.core))
+        rows, row_table = self._tables(self.rows, 5, codes.ROW_WIDTH)
+        drives = self._tables(self.drives, 4, codes.DRIVE_WIDTH)
+        eliminated = self._tables(self.eliminated, 4, codes.ELIM_WIDTH)
+        tables = codes.Tables(steps, touched, rows, row_table, core, *eliminated, *drives, need)
         gears, far = np.array(self.gears, dtype=np.int64), links * Lc + 4.0 * float(drawn.max(initial=0.0))
         return Program(self.mechanism, tuple(self.steps), tables, gears, Lc, far)
 
@@ -185,8 +174,7 @@ class _Compiler:
         direction = np.exp(1j * da)
         self.table.append([code, len(self.drives), 0, 0, 0, 0, 0, 0, 0, -1])
         self.steps.append(Step(code, -1, (link,), f"driver {joint.kind}"))
-        self.drives.append([code, other, link, index])
-        self.drive_parameters.append([*_parts(base, direction, own), sign * forward, da - db])
+        self.drives.append(([code, other, link, index], [*_parts(base, direction, own), sign * forward, da - db]))
 
     def _group(self, index: int, links: tuple[int, ...], placed: set[int]) -> None:
         inside = set(links)
@@ -212,8 +200,7 @@ class _Compiler:
             if kind == codes.GEAR:
                 parameters[codes.SLOT] = float(len(self.gears))
                 self.gears.append(len(self.rows))
-            self.rows.append([kind, a, b, place.get(a, -1), place.get(b, -1)])
-            self.row_parameters.append(parameters)
+            self.rows.append(([kind, a, b, place.get(a, -1), place.get(b, -1)], parameters))
         self.core.extend(core)
         self.touched.extend(outside)
 
@@ -257,8 +244,7 @@ class _Compiler:
         kind = codes.E_RR if isinstance(second, Revolute) else kind
         ta, tb = np.exp(1j * da), np.exp(1j * db)
         turn = 0.0 * da if kind == codes.E_RR else db - deb if kind == codes.E_RP else da - dea
-        self.eliminated.append([kind, link, a, b])
-        self.eliminated_parameters.append([*_parts(pa, ea, pb, eb, ta, tb), turn])
+        self.eliminated.append(([kind, link, a, b], [*_parts(pa, ea, pb, eb, ta, tb), turn]))
         if kind == codes.E_RP:  # the pin of a runs on a line of b
             offset = (np.exp(-1j * deb) * (ea - eb)).imag
             return KernelRow(codes.LINE, b, a, [*_parts(pb, pa, tb), offset, *[0.0] * 5])
@@ -281,14 +267,14 @@ class _Compiler:
             return joint.a, on_a, on_b, size[2], size[5]
         return joint.b, on_b, on_a, size[5], size[2]
 
-    def _floats(self, rows: list[list[Number]], width: int) -> Array:
-        """Return a parameter table, shape (sets, rows, width); cams make it wider."""
-        width = max([width, *map(len, rows)])
+    def _tables(self, rows: list[tuple[list[int], list[Number]]], count: int, width: int) -> tuple[IntArray, Array]:
+        """Return whole numbers (rows, count) and a parameter table (sets, rows, width); cams make it wider."""
+        width = max([width, *(len(parameters) for _, parameters in rows)])
         table = np.zeros((self.sets, len(rows), width))
-        for k, parameters in enumerate(rows):
+        for k, (_, parameters) in enumerate(rows):
             for column, value in enumerate(parameters):
                 table[:, k, column] = value
-        return table
+        return np.array([own for own, _ in rows], dtype=np.int64).reshape(-1, count), table
 
 
 def _parts(*points: Complex) -> list[Number]:
@@ -341,7 +327,3 @@ def _describe(code: int, links: tuple[int, ...], own: list[JointGeometry]) -> st
     if len(links) == 1:
         return "+".join(joint.kind for joint in outer)
     return f"group of {len(links)} links"
-
-
-def _ints(rows: list[list[int]], width: int) -> IntArray:
-    return np.array(rows, dtype=np.int64).reshape(-1, width)

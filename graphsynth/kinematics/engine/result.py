@@ -149,22 +149,23 @@ class Motion(MotionMethods):
         Norm of the inverse constraint matrix times (residual + 4 units of rounding of the largest coordinate): first
         order, so it is an estimate, and infinite at a singular pose.
         """
-        keep = self.assembled
-        found = np.full(len(self.inputs), np.nan)
-        if not keep.any():
-            return found
-        smallest = self._smallest_singular_value(keep)
-        size = np.abs(self.poses[keep][:, :, :2]).max(axis=(1, 2)) / self.Lc
+        size = np.abs(self.poses[:, :, :2]).max(axis=(1, 2)) / self.Lc
         unit = np.finfo(np.float64).eps
         with np.errstate(divide="ignore"):
-            found[keep] = (self.residuals[keep] + 4.0 * unit * np.maximum(size, 1.0)) / smallest
-        return found
+            return np.asarray((self.residuals + 4.0 * unit * np.maximum(size, 1.0)) / self.singularity_distance)
 
-    def _smallest_singular_value(self, keep: NDArray[np.bool_]) -> Array:
-        """Of the constraint matrix with the driver coordinates held, lengths in units of Lc."""
+    @cached_property
+    def singularity_distance(self) -> Array:
+        """Smallest singular value of the constraint matrix with the drivers held, at every sample; shape (n,).
+
+        Rows and unknowns are in units of ``Lc`` and radians, so the size of the mechanism does not matter; 0 at a
+        singular pose, NaN where the branch does not reach.
+        """
+        found = np.full(len(self.inputs), np.nan)
+        if not self.assembled.any():
+            return found
         mechanism = self.mechanism
-        links, poses = mechanism.graph.links, self.poses[keep]
-        J = jacobian(mechanism.joints, poses)
+        links, poses = mechanism.graph.links, self.poses[self.assembled]
         held = np.zeros((len(poses), len(mechanism.drivers), 3 * links))
         for k, driver in enumerate(mechanism.drivers):
             joint = mechanism.joint(*driver.pair)
@@ -181,20 +182,9 @@ class Motion(MotionMethods):
             angular += [False, isinstance(joint, Prismatic)] if joint.mobility == 1 else [False]
         angular += [not isinstance(mechanism.joint(*driver.pair), Prismatic) for driver in mechanism.drivers]
         size = np.where(angular, self.Lc, 1.0)
-        matrix = np.concatenate([J, held], axis=1)[:, :, moving] * size[:, None]
+        matrix = np.concatenate([jacobian(mechanism.joints, poses), held], axis=1)[:, :, moving] * size[:, None]
         matrix = matrix * np.tile([1.0, 1.0, 1.0 / self.Lc], links)[moving]
-        return np.asarray(np.linalg.svd(matrix, compute_uv=False)[:, -1])
-
-    @cached_property
-    def singularity_distance(self) -> Array:
-        """Smallest singular value of the constraint matrix with the drivers held, at every sample; shape (n,).
-
-        Rows and unknowns are in units of ``Lc`` and radians, so the size of the mechanism does not matter; 0 at a
-        singular pose, NaN where the branch does not reach.
-        """
-        found = np.full(len(self.inputs), np.nan)
-        if self.assembled.any():
-            found[self.assembled] = self._smallest_singular_value(self.assembled)
+        found[self.assembled] = np.linalg.svd(matrix, compute_uv=False)[:, -1]
         return found
 
     def point(self, name_or_link: str | int, local: ArrayLike | None = None) -> PointPath:

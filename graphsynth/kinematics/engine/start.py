@@ -53,17 +53,13 @@ def started(program: Program, u0: float, modes: Mapping[int, int], guess: Array 
     """Return a tracker on the modes given, or those of the pose ``guess`` (links, 3), whose turns it counts on."""
     signs = sign_table(program, modes)
     tracker = Tracker(program, signs)
-    if guess is not None:
-        program = with_turns(program, guess[None], tracker.values(np.array([u0]))[:, 0, 0])
-        tracker = Tracker(program, signs, lines_of_centres(program, guess[None])[0], guess[:, 2])
-        _signs_from(tracker, u0, guess, modes)
-    return tracker
-
-
-def _signs_from(tracker: Tracker, u0: float, guess: Array, modes: Mapping[int, int]) -> None:
-    """Choose the sign of every dyad left open so that its links come closest to the guess."""
+    if guess is None:
+        return tracker
+    program = with_turns(program, guess[None], tracker.values(np.array([u0]))[:, 0, 0])
+    tracker = Tracker(program, signs, lines_of_centres(program, guess[None])[0], guess[:, 2])
+    # the sign of every dyad left open brings its links closest to the guess
     trace = tracker.blank(np.array([u0]))
-    for k, step in enumerate(tracker.program.steps):
+    for k, step in enumerate(program.steps):
         if not step.has_two_modes or step.group in modes:
             continue
         errors = []
@@ -77,9 +73,10 @@ def _signs_from(tracker: Tracker, u0: float, guess: Array, modes: Mapping[int, i
             own = list(step.links)
             X, pose = trace.X[0, own], guess[own]
             turned = (X[:, 2] - np.cos(pose[:, 2])) ** 2 + (X[:, 3] - np.sin(pose[:, 2])) ** 2
-            apart = ((X[:, :2] - pose[:, :2]) ** 2).sum(axis=1) / tracker.program.Lc**2
+            apart = ((X[:, :2] - pose[:, :2]) ** 2).sum(axis=1) / program.Lc**2
             errors.append(float((turned + apart).sum()))
         tracker.modes[k] = 1.0 if errors[0] <= errors[1] else -1.0
+    return tracker
 
 
 def lines_of_centres(program: Program, poses: Array) -> Array:
@@ -164,7 +161,8 @@ def group_modes(tracker: Tracker, trace: Trace, k: int) -> Array | None:
 
 
 def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
-    from graphsynth.kinematics.engine import kernels
+    from graphsynth.kinematics.engine.kernels.newton import newton
+    from graphsynth.kinematics.engine.kernels.running import make_room
 
     p, t = tracker.program, tracker.program.tables
     row0, count, core0, cores = (int(v) for v in t.steps[k, 1:5])
@@ -172,7 +170,7 @@ def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
     random = np.random.default_rng(20190 + k)
     reached = trace.X[0, sorted({link for s in p.steps[:k] for link in s.links} | {p.mechanism.frame}), :2]
     centre, size = reached.mean(axis=0), 2.0 * max(p.Lc, float(np.ptp(reached, axis=0).max()))
-    room = kernels.make_room(count, p.mechanism.graph.links, len(trace.PHI[0]), len(p.steps), len(trace.q), 1)
+    room = make_room(count, p.mechanism.graph.links, len(trace.PHI[0]), len(p.steps), len(trace.q), 1)
     state, room.phi[:], room.ql[:] = room.x, trace.PHI[0], trace.q[:, :3, 0]
     found: list[Array] = []
     for _ in range(_STARTS * cores):
@@ -181,7 +179,7 @@ def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
             angle = random.uniform(-np.pi, np.pi)
             where = centre + random.uniform(-size, size, 2)
             state[link, :5] = (*where, np.cos(angle), np.sin(angle), angle)
-        code = kernels.newton(group, state, room.phi, room.ql, room, p.Lc)
+        code = newton(group, state, room.phi, room.ql, room, p.Lc)
         if code:
             continue
         core = state[list(step.core), :4]

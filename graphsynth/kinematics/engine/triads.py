@@ -1,13 +1,8 @@
 """All assembly modes of a link held by three conditions: every triad with one ternary link.
 
 With pose (p, z), z = exp(i alpha), each condition (a distance, a point of the link on a fixed line, a line of the link
-through a fixed point) reads
-
-    q p conj(p) + m(z) p + conj(m(z)) conj(p) + c(z) = 0,    q = 1 for a distance, else 0,
-
-with m and c of degree one in z and 1/z.  Two linear combinations without p conj(p) give p = N(z) / D(z); the third
-condition becomes a trigonometric polynomial in alpha.  Its coefficients are found from values at equidistant angles,
-its zeros as eigenvalues of the companion matrix, and each is polished by Newton's method on the conditions.
+through a fixed point) reads ``q p conj(p) + m(z) p + conj(m(z) p) + c(z) = 0``, q = 1 for a distance, else 0, with m
+and c of degree one in z and 1/z.  Their solution: docs/explanation/planar-engine.md, "Triads with prismatic joints".
 """
 
 from __future__ import annotations
@@ -130,10 +125,10 @@ def _meeting(first: tuple[float, Complex, Complex], second: tuple[float, Complex
     return c2 * np.conj(m1) - c1 * np.conj(m2), m1 * np.conj(m2) - m2 * np.conj(m1)
 
 
-def _places(rest: list[Condition], z: complex) -> list[Array]:
+def _places(held: list[Condition], z: complex) -> list[Array]:
     """Poses at one orientation that meet two conditions (the third is met by the choice of z)."""
     at = np.array([z])
-    (q, m0, c0), *linear = _reduced(rest, at)
+    (q, m0, c0), *linear = _reduced(held, at)
     alpha = float(np.angle(z))
     if q == 0.0:
         linear = [(q, m0, c0), *linear]
@@ -144,23 +139,17 @@ def _places(rest: list[Condition], z: complex) -> list[Array]:
             found.append(complex(N[0] / D[0]))
     if not found and q == 1.0:  # parallel lines, or only one: the line with the larger gradient, and the circle
         _, m, c = max(linear, key=lambda one: float(abs(one[1][0])))
-        found = _line_and_circle(complex(m[0]), float(c[0].real), complex(m0[0]), float(c0[0].real))
+        if m[0] == 0.0:
+            return []
+        # 2 Re(m p) + c = 0 and |p|^2 + 2 Re(m0 p) + c0 = 0
+        centre, square = -np.conj(m0[0]), abs(m0[0]) ** 2 - c0[0].real
+        unit = np.conj(m[0]) / abs(m[0])
+        distance = -(c[0].real + 2.0 * (m[0] * centre).real) / (2.0 * abs(m[0]))
+        rest = square - distance**2
+        along = np.sqrt(max(rest, 0.0))
+        sides = (1.0, -1.0) if rest >= -1e-9 * abs(square) else ()
+        found = [complex(centre + unit * (distance + side * 1j * along)) for side in sides]
     return [np.array([p.real, p.imag, alpha]) for p in found]
-
-
-def _line_and_circle(m: complex, c: float, m0: complex, c0: float) -> list[complex]:
-    """Points with 2 Re(m p) + c = 0 and |p|^2 + 2 Re(m0 p) + c0 = 0."""
-    if m == 0.0:
-        return []
-    centre = -np.conj(m0)
-    square = abs(m0) ** 2 - c0
-    unit = np.conj(m) / abs(m)
-    distance = -(c + 2.0 * (m * centre).real) / (2.0 * abs(m))
-    rest = square - distance**2
-    if rest < -1e-9 * abs(square):
-        return []
-    along = np.sqrt(max(rest, 0.0))
-    return [complex(centre + unit * (distance + s * 1j * along)) for s in (1.0, -1.0)]
 
 
 def _polish(rest: list[Condition], pose: Array, Lc: float, fixed: bool) -> Array | None:

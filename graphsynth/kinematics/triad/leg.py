@@ -88,14 +88,6 @@ def _two_product(a: Array, b: Array) -> tuple[Array, Array]:
     return product, ((high_a * high_b - product) + high_a * low_b + low_a * high_b) + low_a * low_b
 
 
-def _sum3(terms: list[Array]) -> Array:
-    """Sum as if computed in three-fold working precision ([Ogita et al. 2005], algorithm SumK with K = 3)."""
-    for _ in range(2):
-        for index in range(1, len(terms)):
-            terms[index], terms[index - 1] = _two_sum(terms[index], terms[index - 1])
-    return np.asarray(sum(terms[:-1]) + terms[-1])
-
-
 def _dot2(a: Array, b: Array, c: Array, d: Array) -> Array:
     """Return ``a b + c d`` without cancellation error from the products."""
     p, e = _two_product(a, b)
@@ -109,7 +101,12 @@ def _discriminants(u: Array, v: Array, l1: Array, l2: Array) -> tuple[Array, Arr
     uu, vv, aa, bb, ab = (_two_product(x, y) for x, y in ((u, u), (v, v), (l1, l1), (l2, l2), (l1, l2)))
 
     def combine(*parts: tuple[int, tuple[Array, Array]]) -> Array:
-        return _sum3([factor * term for factor, pair in parts for term in pair])
+        """Sum as if computed in three-fold working precision ([Ogita et al. 2005], algorithm SumK with K = 3)."""
+        terms = [factor * term for factor, pair in parts for term in pair]
+        for _ in range(2):
+            for index in range(1, len(terms)):
+                terms[index], terms[index - 1] = _two_sum(terms[index], terms[index - 1])
+        return np.asarray(sum(terms[:-1]) + terms[-1])
 
     C = combine((1, uu), (1, vv), (1, aa), (-1, bb))
     P1 = combine((1, aa), (2, ab), (1, bb), (-1, uu), (-1, vv))
@@ -120,11 +117,9 @@ def _discriminants(u: Array, v: Array, l1: Array, l2: Array) -> tuple[Array, Arr
 def solve_leg(u: ArrayLike, v: ArrayLike, l1: ArrayLike, l2: ArrayLike) -> LegSolution:
     """Reach and angles of a leg with arm ``l1`` and link ``l2`` that ends at (u, v) from its pivot.
 
-    Absolute error of the angle at most about 4e-16 rad for the given double-precision numbers
-    (theory/platform-inverse 7); the status is decided by the sign of compensated sums, not by a tolerance.  Lengths are
-    zero or more; nothing is checked here.
-
-    Source: theory/platform-inverse 5 to 7.
+    Absolute error of the angle at most about 4e-16 rad for the given double-precision numbers; the status is decided by
+    the sign of compensated sums, not by a tolerance (theory/platform-inverse 5 to 7).  Lengths are zero or more;
+    nothing is checked here.
 
     Examples
     --------

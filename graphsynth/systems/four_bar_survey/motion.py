@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,8 +24,7 @@ _POSITIONS = 180_000  # computed at once: poses stay in the cache, and memory is
 _MEETING = 1e-12
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Moved:
+class Moved(NamedTuple):
     """What motion says of sets (estimated: floating point at the sampled crank angles), arrays of shape (n,).
 
     `kind`: as found, place in `KINDS`; `transmission`: smallest transmission angle over a full rotation, radians, NaN
@@ -119,19 +118,18 @@ def _extreme(values: Array) -> Array:
     return np.asarray(top - np.where(bend < 0.0, (high - low) ** 2 / (8.0 * np.where(bend < 0.0, bend, 1.0)), 0.0))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Jamming:
+class Jamming(NamedTuple):
     """What the bearing between coupler and rocker does, by set (estimated: closed forms in floating point).
 
-    `tilt`: largest tilt of the coupler over the rotation, radians; `part`: of the rotation in which the bearing binds,
-    0 to 1; `axis_tilt`: largest tilt of the motor axis for which all of it is free, radians, pi/2 if every tilt is;
-    `clearance`: smallest radial clearance for which all of it is free, mm.
+    `tilt`: largest tilt of the coupler over the rotation, radians; `axis_tilt`: largest tilt of the motor axis for
+    which all of it is free, radians, pi/2 if every tilt is; `clearance`: smallest radial clearance for which all of it
+    is free, mm; `part`: of the rotation in which the bearing binds, 0 to 1.
     """
 
     tilt: Array
-    part: Array
     axis_tilt: Array
     clearance: Array
+    part: Array
 
 
 def close_form(table: SurveyTable, lengths: NDArray[np.int64]) -> Jamming:
@@ -154,20 +152,16 @@ def close_form(table: SurveyTable, lengths: NDArray[np.int64]) -> Jamming:
         with np.errstate(divide="ignore", invalid="ignore"):
             kappa = np.where(height > 0.0, critical.sine / height, np.inf)
         part = np.where(kappa < 1.0 - 16 * 2.0**-52, 2.0 / math.pi * np.arccos(np.minimum(kappa, 1.0)), 0.0)
-        axis = _largest_axis_tilt(critical.sine / ratios, unit.axis)
+        # tilt of the axis at which the pin is as high as the critical tilt needs: q times the crank
+        q, inclination = critical.sine / ratios, unit.axis[0] ** 2 + unit.axis[1] ** 2
+        inside = np.minimum(q, 1.0)
+        deficit = inside * inside / (1.0 + np.sqrt((1.0 - inside) * (1.0 + inside)))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(deficit <= 2.0 * inclination, 0.5 * deficit / inclination, np.nan)
+        reached = np.isfinite(share) & (q < 1.0)
+        axis = np.where(reached, 2.0 * np.arcsin(np.sqrt(np.where(reached, share, 0.0))), 0.5 * math.pi)
     clearance = _smallest_clearance(sine, bearing.Rb, bearing.h, own.condition)
-    return Jamming(np.arcsin(sine)[which], part[which], axis[which], clearance[which])
-
-
-def _largest_axis_tilt(q: Array, axis: tuple[float, float, float]) -> Array:
-    """Tilt of the axis at which the pin is as high as the critical tilt needs: q times the crank."""
-    inclination = axis[0] ** 2 + axis[1] ** 2
-    inside = np.minimum(q, 1.0)
-    deficit = inside * inside / (1.0 + np.sqrt((1.0 - inside) * (1.0 + inside)))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(deficit <= 2.0 * inclination, 0.5 * deficit / inclination, np.nan)
-    reached = np.isfinite(share) & (q < 1.0)
-    return np.where(reached, 2.0 * np.arcsin(np.sqrt(np.where(reached, share, 0.0))), 0.5 * math.pi)
+    return Jamming(np.arcsin(sine)[which], axis[which], clearance[which], part[which])
 
 
 def _smallest_clearance(sine: Array, radius: float, half: float, condition: str) -> Array:

@@ -250,11 +250,7 @@ def findings(survey: Survey, certificates: tuple[Certificate, ...]) -> tuple[Fin
         found.append(Finding("of the best undecided", None, _number(proved[None])))
     if survey.failed:
         found.append(Finding("shards failed", False, _number(len(survey.failed))))
-    return (*found, *_edge(survey), *_sentences(survey))
-
-
-def _edge(survey: Survey) -> list[Finding]:
-    """Warn if lengths of the best set are the first or last of their ranges."""
+    # lengths of the best set that are the first or last of their ranges
     lattice, edges = survey.lattice, []
     for frame, _, coupler, rocker in lattice.lengths(np.array(survey.chosen[:1], dtype=np.int64)).tolist():
         lengths = (("frame", frame), ("coupler", coupler), ("rocker", rocker))
@@ -262,8 +258,10 @@ def _edge(survey: Survey) -> list[Finding]:
             if len(span) > 1 and length in (span[0], span[-1]):
                 end = "shortest" if length == span[0] else "longest"
                 edges.append(f"{name} {float(length * lattice.unit):.12g} is the {end}")
-    words = f"The best set is on the edge of the lattice ({', '.join(edges)} of its range)"
-    return [Finding(f"{words}: better ones may lie beyond; widen the range.", False)] if edges else []
+    if edges:
+        words = f"The best set is on the edge of the lattice ({', '.join(edges)} of its range)"
+        found.append(Finding(f"{words}: better ones may lie beyond; widen the range.", False))
+    return (*found, *_sentences(survey))
 
 
 def _number(count: int) -> str:

@@ -175,15 +175,9 @@ class Evaluated:
 
     def quantity(self, name: str) -> Array:
         """Return a margin of `QUANTITIES` by set, in its unit."""
-        angles = {
-            "transmission angle": self.moved.transmission,
-            "rocker swing": self.moved.swing,
-            "largest tilt": self.jamming.tilt,
-            "largest axis tilt": self.jamming.axis_tilt,
-        }
-        if name in angles:
-            return Unit.parse(QUANTITIES[name]).from_si(angles[name])
-        return {"size": self.size, "smallest clearance": self.jamming.clearance, "jammed part": self.jamming.part}[name]
+        values = (self.moved.transmission, self.moved.swing, self.size, *self.jamming)
+        found = dict(zip(QUANTITIES, values, strict=True))[name]
+        return Unit.parse("deg").from_si(found) if QUANTITIES[name] == "deg" else found
 
     def rounded(self, name: str) -> Array:
         """Return a margin to the 9 decimals by which sets are rejected, ranked and stored: rounding decides nothing.
@@ -280,10 +274,7 @@ def _maps(lattice: Lattice, done: Evaluated) -> dict[str, list[Any]]:
     turns = (done.kind == KINDS.index("full turn")).reshape(len(pairs), -1)
     by_pair = {
         name: np.where(mask, done.quantity(name).reshape(len(pairs), -1), -1.0).max(axis=1)
-        for name, mask in (
-            ("transmission angle", turns),
-            ("largest axis tilt", done.passes.reshape(len(pairs), -1)),
-        )
+        for name, mask in (("transmission angle", turns), ("largest axis tilt", done.passes.reshape(len(pairs), -1)))
     }
     kept = by_pair["transmission angle"] >= 0.0
     return {

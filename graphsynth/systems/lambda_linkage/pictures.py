@@ -60,18 +60,23 @@ def lambda_sketch(
         sketch.label((lower + upper) / 2, "cannot be assembled")
         return sketch
     a, b, m = (complex(float(p[0]), float(p[1])) for p in (here.A, here.B, here.M))
-    for p, q, colour in ((O, a, "b"), (C, b, "link"), (a, m, "link")):
+    offsets = (-18 + 8j, -14 + 10j, 18 + 8j, 20 - 4j, 14 + 14j)
+    _draw_links(sketch, (O, a, C, b, m), offsets if labels else (), ring)
+    return sketch
+
+
+def _draw_links(sketch: Sketch, places: Sequence[complex], offsets: Sequence[complex], ring: bool = False) -> None:
+    """Draw crank, rocker and coupler with the joints at O, A, C, B and the point M; name those with an offset."""
+    O, A, C, B, M = places
+    for p, q, colour in ((O, A, "b"), (C, B, "link"), (A, M, "link")):
         sketch.bar(p, q, colour)
     if ring:
-        sketch.dot(b, "jam", 10)
-    for p in (O, C, a, b):
+        sketch.dot(B, "jam", 10)
+    for p in (O, C, A, B):
         sketch.joint(p)
-    sketch.dot(m, "a", 5)
-    if labels:
-        names = {"O": (O, -18 + 8j), "A": (a, -14 + 10j), "C": (C, 18 + 8j), "B": (b, 20 - 4j), "M": (m, 14 + 14j)}
-        for name, (point, offset) in names.items():
-            sketch.label(point, name, offset)
-    return sketch
+    sketch.dot(M, "a", 5)
+    for name, place, offset in zip("OACBM", places, offsets):
+        sketch.label(place, name, offset)
 
 
 def _background(
@@ -188,15 +193,9 @@ def lambda_sketch_3d(
     for point in (here.A, here.M):
         sketch.trace([view(point), view(_flat(point))], "soft", 1.4, dash=(2.0, 3.0))
         sketch.dot(view(_flat(point)), "soft", 2.6)
-    for p, q, colour in ((O, here.A, "b"), (C, here.B, "link"), (here.A, here.M, "link")):
-        sketch.bar(view(p), view(q), colour)
-    for p in (O, C, here.A, here.B):
-        sketch.joint(view(p))
-    sketch.dot(view(here.M), "a", 5)
+    places = [view(point) for point in (O, here.A, C, here.B, here.M)]
+    _draw_links(sketch, places, (-16 - 10j, -14 + 11j, 16 - 9j, 18 - 3j, 14 + 12j))
     sketch.label(ends[1], "motor axis", 10j, "middle", "b", 12.5)
-    points = {"O": O, "A": here.A, "C": C, "B": here.B, "M": here.M}
-    for (name, point), offset in zip(points.items(), (-16 - 10j, -14 + 11j, 16 - 9j, 18 - 3j, 14 + 12j)):
-        sketch.label(view(point), name, offset)
     words = "heights to scale" if k == 1.0 else f"heights × {k:g}"
     sketch.label(complex(upper.real, lower.imag), words, -14j, "end", "note", 12.5)
     return sketch

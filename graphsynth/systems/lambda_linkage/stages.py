@@ -28,12 +28,9 @@ _C = Literal["A", "B"]
 
 @dataclass(frozen=True, slots=True)
 class LambdaMotion:
-    """One rotation of the crank.
+    """One rotation of the crank: motion without and with the tilt of the motor axis, at crank angles from 0 to 2 pi.
 
-    * `linkage`: with the tilted motor axis.
-    * `planar`, `tilted`: motion without and with the tilt at the same crank angles, from 0 to 2 pi.
-    * `residual`: largest relative error of the rod length in `tilted`, as recomputed from the positions (estimated
-      error).
+    `residual`: largest relative error of the rod length in `tilted`, recomputed from the positions (estimated).
     """
 
     linkage: TiltedFourBar

@@ -4,9 +4,3 @@ The state of a link at one sample is a row of eleven numbers: x, y, cos theta, s
 where gears need it), the velocity (x', y', theta') and the acceleration.  Over many samples the same numbers lie in
 arrays with the sample as last axis.
 """
-
-from graphsynth.kinematics.engine.kernels.loops import rrr
-from graphsynth.kinematics.engine.kernels.newton import newton
-from graphsynth.kinematics.engine.kernels.running import make_room, run
-
-__all__ = ["make_room", "newton", "rrr", "run"]

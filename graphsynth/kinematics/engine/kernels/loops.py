@@ -12,51 +12,39 @@ from graphsynth.kinematics.engine.kernels.rows import ends
 
 
 @kernel
-def dyad_ends(rows, rp, r0, own):
-    """Of an RRR dyad: links and points of A and B, the kept link's point at A and its arm to C, the other length."""
-    la, ax, ay, hx, hy = ends(rows, rp, r0, own)
-    lb, bx, by, ex, ey = ends(rows, rp, r0 + 2, own)
-    return la, ax, ay, lb, bx, by, hx, hy, ex - hx, ey - hy, rp[r0 + 2, H]
-
-
-@kernel
-def carried(L, ax, ay, px, py, i0, i1):
-    """Path of a point of a placed link."""
+def carried(state, link, ax, ay, T, k, i0, i1, derivs):
+    """Path of a point of a placed link, to two rows of T from k on; velocity and acceleration to four from 4 + 2 k."""
+    L, px, py = state.X[link], T[k], T[k + 1]
     x, y, c, s = L[0], L[1], L[2], L[3]
     for i in range(i0, i1):
         px[i] = x[i] + c[i] * ax - s[i] * ay
         py[i] = y[i] + s[i] * ax + c[i] * ay
+    if derivs:
+        V, W, r = state.V[link], state.W[link], 4 + 2 * k
+        v0, v1, o, w0, w1, al = V[0], V[1], V[2], W[0], W[1], W[2]
+        vx, vy, wx, wy = T[r], T[r + 1], T[r + 2], T[r + 3]
+        for i in range(i0, i1):
+            ux, uy = c[i] * ax - s[i] * ay, s[i] * ax + c[i] * ay
+            vx[i], vy[i] = v0[i] - o[i] * uy, v1[i] + o[i] * ux
+            wx[i], wy[i] = w0[i] - al[i] * uy - o[i] * o[i] * ux, w1[i] + al[i] * ux - o[i] * o[i] * uy
 
 
 @kernel
-def carried_rates(L, V, W, ax, ay, vx, vy, wx, wy, i0, i1):
-    """Velocity and acceleration of a point of a placed link."""
-    c, s, o, al = L[2], L[3], V[2], W[2]
-    v0, v1, w0, w1 = V[0], V[1], W[0], W[1]
-    for i in range(i0, i1):
-        ux, uy = c[i] * ax - s[i] * ay, s[i] * ax + c[i] * ay
-        vx[i], vy[i] = v0[i] - o[i] * uy, v1[i] + o[i] * ux
-        wx[i], wy[i] = w0[i] - al[i] * uy - o[i] * o[i] * ux, w1[i] + al[i] * ux - o[i] * o[i] * uy
-
-
-@kernel
-def pinned(L, px, py, hx, hy, i0, i1):
-    """Place an oriented link so that its point (hx, hy) follows a path."""
+def pinned(state, link, T, hx, hy, i0, i1, derivs):
+    """Place an oriented link, whose angle has rates, so that its point (hx, hy) follows the first path in T."""
+    L, px, py = state.X[link], T[0], T[1]
     x, y, c, s = L[0], L[1], L[2], L[3]
     for i in range(i0, i1):
         x[i] = px[i] - (c[i] * hx - s[i] * hy)
         y[i] = py[i] - (s[i] * hx + c[i] * hy)
-
-
-@kernel
-def pinned_rates(L, V, W, vx, vy, wx, wy, hx, hy, i0, i1):
-    """Rates of a link whose point (hx, hy) follows a path and whose angle has the rates V[2], W[2]."""
-    c, s, o, al = L[2], L[3], V[2], W[2]
-    v0, v1, w0, w1 = V[0], V[1], W[0], W[1]
-    for i in range(i0, i1):
-        fx, fy = c[i] * hx - s[i] * hy, s[i] * hx + c[i] * hy
-        v0[i], v1[i] = vx[i] + o[i] * fy, vy[i] - o[i] * fx
-        w0[i], w1[i] = wx[i] + al[i] * fy + o[i] * o[i] * fx, wy[i] - al[i] * fx + o[i] * o[i] * fy
+    if derivs:
+        V, W = state.V[link], state.W[link]
+        v0, v1, o, w0, w1, al = V[0], V[1], V[2], W[0], W[1], W[2]
+        vx, vy, wx, wy = T[4], T[5], T[6], T[7]
+        for i in range(i0, i1):
+            fx, fy = c[i] * hx - s[i] * hy, s[i] * hx + c[i] * hy
+            v0[i], v1[i] = vx[i] + o[i] * fy, vy[i] - o[i] * fx
+            w0[i], w1[i] = wx[i] + al[i] * fy + o[i] * o[i] * fx, wy[i] - al[i] * fx + o[i] * o[i] * fy
 
 
 @kernel
@@ -101,56 +89,12 @@ def apex_rates(T, gx, gy, c, s, o, al, i0, i1):
 
 
 @kernel
-def towards(T, gx, gy, c, s, i0, i1):
-    """Direction of a link whose vector (gx, gy) points from P to Q; T as for `apex`."""
-    px, py, qx, qy = T[0], T[1], T[2], T[3]
-    for i in range(i0, i1):
-        dx, dy = qx[i] - px[i], qy[i] - py[i]
-        re, im = gx * dx + gy * dy, gx * dy - gy * dx
-        f = 1.0 / math.sqrt(re * re + im * im)
-        c[i], s[i] = re * f, im * f
-
-
-@kernel
-def towards_rates(T, o, al, i0, i1):
-    """Rates of the angle of the way from P to Q, of constant length; T as for `apex_rates`."""
-    px, py, qx, qy = T[0], T[1], T[2], T[3]
-    vx, vy, wx, wy, ux, uy, zx, zy = T[4], T[5], T[6], T[7], T[8], T[9], T[10], T[11]
-    for i in range(i0, i1):
-        dx, dy = qx[i] - px[i], qy[i] - py[i]
-        f = 1.0 / (dx * dx + dy * dy)
-        o[i] = (dx * (uy[i] - vy[i]) - dy * (ux[i] - vx[i])) * f
-        al[i] = (dx * (zy[i] - wy[i]) - dy * (zx[i] - wx[i])) * f
-
-
-@kernel
 def turned(L, ca, sa, cq, sq, sign, c, s, i0, i1):
     """Direction of a link turned against link L by a fixed angle and by sign q, both given as cosine and sine."""
     cb, sb = L[2], L[3]
     for i in range(i0, i1):
         c1, s1 = cq[i] * ca - sign * sq[i] * sa, sign * sq[i] * ca + cq[i] * sa
         c[i], s[i] = cb[i] * c1 - sb[i] * s1, sb[i] * c1 + cb[i] * s1
-
-
-@kernel
-def slid(L, q, px, py, tx, ty, qx, qy, i0, i1):
-    """Path of a point that moves by q from (px, py) along (tx, ty), both given in link L."""
-    x, y, c, s = L[0], L[1], L[2], L[3]
-    for i in range(i0, i1):
-        ux, uy = px + q[i] * tx, py + q[i] * ty
-        qx[i], qy[i] = x[i] + c[i] * ux - s[i] * uy, y[i] + s[i] * ux + c[i] * uy
-
-
-@kernel
-def slid_rates(L, V, W, Q, px, py, tx, ty, T, i0, i1):
-    """Velocity and acceleration of that point; Q holds q, q', q''."""
-    for i in range(i0, i1):
-        c, s, o, al, q, q1, q2 = L[2, i], L[3, i], V[2, i], W[2, i], Q[0, i], Q[1, i], Q[2, i]
-        gx, gy = c * tx - s * ty, s * tx + c * ty
-        ux, uy = c * px - s * py + q * gx, s * px + c * py + q * gy
-        T[4, i], T[5, i] = V[0, i] - o * uy + q1 * gx, V[1, i] + o * ux + q1 * gy
-        T[6, i] = W[0, i] - al * uy - o * o * ux + q2 * gx - 2.0 * o * q1 * gy
-        T[7, i] = W[1, i] + al * ux - o * o * uy + q2 * gy + 2.0 * o * q1 * gx
 
 
 @kernel
@@ -161,73 +105,72 @@ def drive_loop(d, p, r, q, state, T, i0, i1, derivs, angles):
     px, py, sign, angle = p[r, 0], p[r, 1], p[r, 6], p[r, 7]
     ca, sa = math.cos(angle), math.sin(angle)
     Q, L, turning = q[k], X[link], d[r, 0] == DRIVE_R
+    B = X[base]
     if turning:
-        turned(X[base], ca, sa, Q[3], Q[4], sign, L[2], L[3], i0, i1)
-        carried(X[base], px, py, T[0], T[1], i0, i1)
-    else:
+        turned(B, ca, sa, Q[3], Q[4], sign, L[2], L[3], i0, i1)
+        carried(state, base, px, py, T, 0, i0, i1, derivs)
+    else:  # the point moves by q from (px, py) along (tx, ty), both given in the base
         for i in range(i0, i1):
             T[2, i], T[3, i] = 1.0, 0.0
-        turned(X[base], ca, sa, T[2], T[3], sign, L[2], L[3], i0, i1)
-        slid(X[base], Q[0], px, py, sign * p[r, 2], sign * p[r, 3], T[0], T[1], i0, i1)
-    pinned(L, T[0], T[1], p[r, 4], p[r, 5], i0, i1)
+        turned(B, ca, sa, T[2], T[3], sign, L[2], L[3], i0, i1)
+        tx, ty = sign * p[r, 2], sign * p[r, 3]
+        for i in range(i0, i1):
+            ux, uy = px + Q[0, i] * tx, py + Q[0, i] * ty
+            T[0, i], T[1, i] = B[0, i] + B[2, i] * ux - B[3, i] * uy, B[1, i] + B[3, i] * ux + B[2, i] * uy
+        for i in range(i0, i1 if derivs else i0):
+            c, s, o, al, v, q1, q2 = B[2, i], B[3, i], V[base, 2, i], W[base, 2, i], Q[0, i], Q[1, i], Q[2, i]
+            gx, gy = c * tx - s * ty, s * tx + c * ty
+            ux, uy = c * px - s * py + v * gx, s * px + c * py + v * gy
+            T[4, i], T[5, i] = V[base, 0, i] - o * uy + q1 * gx, V[base, 1, i] + o * ux + q1 * gy
+            T[6, i] = W[base, 0, i] - al * uy - o * o * ux + q2 * gx - 2.0 * o * q1 * gy
+            T[7, i] = W[base, 1, i] + al * ux - o * o * uy + q2 * gy + 2.0 * o * q1 * gx
     if angles:
         for i in range(i0, i1):
             TH[link, i] = TH[base, i] + angle + (sign * Q[0, i] if turning else 0.0)
     if derivs:
-        if turning:
-            carried_rates(X[base], V[base], W[base], px, py, T[4], T[5], T[6], T[7], i0, i1)
-        else:
-            slid_rates(X[base], V[base], W[base], Q, px, py, sign * p[r, 2], sign * p[r, 3], T, i0, i1)
         for i in range(i0, i1):
             V[link, 2, i] = V[base, 2, i] + (sign * Q[1, i] if turning else 0.0)
             W[link, 2, i] = W[base, 2, i] + (sign * Q[2, i] if turning else 0.0)
-        pinned_rates(L, V[link], W[link], T[4], T[5], T[6], T[7], p[r, 4], p[r, 5], i0, i1)
+    pinned(state, link, T, p[r, 4], p[r, 5], i0, i1, derivs)
 
 
 @kernel
 def rrr_loop(group, sign, state, M, T, i0, i1, derivs):
     """Place the kept link of an RRR dyad; T is room for twelve rows."""
-    X, V, W, own = state.X, state.V, state.W, group.core[group.c0]
-    la, ax, ay, lb, bx, by, hx, hy, gx, gy, l2 = dyad_ends(group.rows, group.rp, group.r0, own)
-    L = X[own]
-    carried(X[la], ax, ay, T[0], T[1], i0, i1)
-    carried(X[lb], bx, by, T[2], T[3], i0, i1)
-    apex(T, gx, gy, l2, sign, M, L[2], L[3], i0, i1)
-    pinned(L, T[0], T[1], hx, hy, i0, i1)
+    own = group.core[group.c0]
+    la, ax, ay, hx, hy = ends(group.rows, group.rp, group.r0, own)
+    lb, bx, by, ex, ey = ends(group.rows, group.rp, group.r0 + 2, own)
+    L, gx, gy = state.X[own], ex - hx, ey - hy
+    carried(state, la, ax, ay, T, 0, i0, i1, derivs)
+    carried(state, lb, bx, by, T, 2, i0, i1, derivs)
+    apex(T, gx, gy, group.rp[group.r0 + 2, H], sign, M, L[2], L[3], i0, i1)
     if derivs:
-        carried_rates(X[la], V[la], W[la], ax, ay, T[4], T[5], T[6], T[7], i0, i1)
-        carried_rates(X[lb], V[lb], W[lb], bx, by, T[8], T[9], T[10], T[11], i0, i1)
-        apex_rates(T, gx, gy, L[2], L[3], V[own, 2], W[own, 2], i0, i1)
-        pinned_rates(L, V[own], W[own], T[4], T[5], T[6], T[7], hx, hy, i0, i1)
+        apex_rates(T, gx, gy, L[2], L[3], state.V[own, 2], state.W[own, 2], i0, i1)
+    pinned(state, own, T, hx, hy, i0, i1, derivs)
 
 
 @kernel
 def bar_loop(e, a, b, p, r, state, T, i0, i1, derivs):
     """Place a link with two revolute joints between placed links a and b; T is room for twelve rows."""
-    X, V, W = state.X, state.V, state.W
-    L = X[e]
-    ax, ay, hx, hy, bx, by = p[r, 0], p[r, 1], p[r, 2], p[r, 3], p[r, 4], p[r, 5]
-    carried(X[a], ax, ay, T[0], T[1], i0, i1)
-    carried(X[b], bx, by, T[2], T[3], i0, i1)
-    towards(T, p[r, 6] - hx, p[r, 7] - hy, L[2], L[3], i0, i1)
-    pinned(L, T[0], T[1], hx, hy, i0, i1)
-    if derivs:
-        carried_rates(X[a], V[a], W[a], ax, ay, T[4], T[5], T[6], T[7], i0, i1)
-        carried_rates(X[b], V[b], W[b], bx, by, T[8], T[9], T[10], T[11], i0, i1)
-        towards_rates(T, V[e, 2], W[e, 2], i0, i1)
-        pinned_rates(L, V[e], W[e], T[4], T[5], T[6], T[7], hx, hy, i0, i1)
-
-
-@kernel
-def first_bad(M, i0, i1):
-    """First sample whose margin is negative or not a number, and its code; (i1, 0) if there is none."""
-    bad = 0
+    L, hx, hy = state.X[e], p[r, 2], p[r, 3]
+    carried(state, a, p[r, 0], p[r, 1], T, 0, i0, i1, derivs)
+    carried(state, b, p[r, 4], p[r, 5], T, 2, i0, i1, derivs)
+    # its vector (gx, gy) points from P (rows 0, 1) to Q (2, 3)
+    gx, gy, c, s, o, al = p[r, 6] - hx, p[r, 7] - hy, L[2], L[3], state.V[e, 2], state.W[e, 2]
+    px, py, qx, qy = T[0], T[1], T[2], T[3]
     for i in range(i0, i1):
-        bad += not M[i] >= 0.0
-    for i in range(i0 if bad else i1, i1):
-        if not M[i] >= 0.0:
-            return i, 1 if M[i] < 0.0 else 3
-    return i1, 0
+        dx, dy = qx[i] - px[i], qy[i] - py[i]
+        re, im = gx * dx + gy * dy, gx * dy - gy * dx
+        f = 1.0 / math.sqrt(re * re + im * im)
+        c[i], s[i] = re * f, im * f
+    if derivs:
+        vx, vy, wx, wy, ux, uy, zx, zy = T[4], T[5], T[6], T[7], T[8], T[9], T[10], T[11]
+        for i in range(i0, i1):
+            dx, dy = qx[i] - px[i], qy[i] - py[i]
+            f = 1.0 / (dx * dx + dy * dy)
+            o[i] = (dx * (uy[i] - vy[i]) - dy * (ux[i] - vx[i])) * f
+            al[i] = (dx * (zy[i] - wy[i]) - dy * (zx[i] - wx[i])) * f
+    pinned(state, e, T, hx, hy, i0, i1, derivs)
 
 
 @kernel

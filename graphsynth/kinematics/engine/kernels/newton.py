@@ -240,18 +240,6 @@ def predict(group, x, h, Lc, out):
     return math.sqrt(travel) / Lc
 
 
-@kernel(inline="always")
-def surprise(group, x, h, Lc, out):
-    """How far the velocities of the core links, over a step, carry from those that `predict` expected; scaled."""
-    total = 0.0
-    for k in range(group.nc):
-        link = group.core[group.c0 + k]
-        e = 4 + 3 * k
-        dx, dy, dt = x[link, 5] - out[e], x[link, 6] - out[e + 1], x[link, 7] - out[e + 2]
-        total += dx * dx + dy * dy + Lc * Lc * dt * dt
-    return abs(h) * math.sqrt(total) / Lc
-
-
 @kernel
 def anchors(group, x, P):
     """Of three distances to one link: far points with velocity and acceleration, near points (local), lengths."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from graphsynth.core.compilation import kernel
 from graphsynth.kinematics.engine import codes
-from graphsynth.kinematics.engine.kernels.loops import bar_loop, drive_loop, first_bad, rrr_loop
+from graphsynth.kinematics.engine.kernels.loops import bar_loop, drive_loop, rrr_loop
 from graphsynth.kinematics.engine.kernels.newton import (
     ROUNDED,
     anchors,
@@ -17,10 +17,17 @@ from graphsynth.kinematics.engine.kernels.newton import (
     platform,
     predict,
     rates,
-    surprise,
 )
-from graphsynth.kinematics.engine.kernels.rows import follow_angle, nearest_turn, world
-from graphsynth.kinematics.engine.kernels.single import closed_form, pin_to_neighbour, pivot_rates, place_eliminated
+from graphsynth.kinematics.engine.kernels.rows import (
+    follow_angle,
+    nearest_turn,
+    pin_to_neighbour,
+    pivot_rates,
+    place_eliminated,
+    slid_form,
+    turned_form,
+    world,
+)
 
 #: Turn of a line of centres between two samples, in radians, from which on its sense is in doubt if no speed tells it.
 BACKWARD = 2.0
@@ -82,30 +89,6 @@ def unwrap(link, u, state, i0, i1, derivs):
 
 
 @kernel
-def bars(elim, e0, ne, ep, wanted, need, u, state, T, i0, i1, derivs):
-    """Place the eliminated links with two revolute joints, those that are wanted."""
-    for k in range(e0, e0 + ne):
-        e = elim[k, 1]
-        if elim[k, 0] == codes.E_RR and wanted[e]:
-            bar_loop(e, elim[k, 2], elim[k, 3], ep, k, state, T, i0, i1, derivs)
-            if need[e]:
-                unwrap(e, u, state, i0, i1, derivs)
-
-
-@kernel
-def carry_centres(group, i, x, phi, PHI):
-    """Follow the direction of the line of centres of every gear pair of a step."""
-    rows, rp = group.rows, group.rp
-    for k in range(group.r0, group.r0 + group.nr):
-        if rows[k, 0] == codes.GEAR:
-            slot = int(rp[k, codes.SLOT])
-            ax, ay = world(x, rows[k, 1], rp[k, 0], rp[k, 1])
-            bx, by = world(x, rows[k, 2], rp[k, 2], rp[k, 3])
-            phi[slot] = nearest_turn(math.atan2(by - ay, bx - ax), phi[slot])
-            PHI[slot, i] = phi[slot]
-
-
-@kernel
 def centres_pass(group, x, phi, h, derivs):
     """Whether the line of centres of a gear pair turns in a way that nobody can know from both ends of a step.
 
@@ -142,7 +125,10 @@ def place(code, group, room, need, s, at, sizes):
         return solved(code, group, room, need, s, at, sizes)
     x, m, own = room.x, room.m, group.core[group.c0]
     near = x[own, 4] + (at.h * x[own, 7] if at.warm and at.derivs else 0.0)
-    m[s] = closed_form(code, group, at.sign, x, room.phi)
+    if code in (codes.P_DIST, codes.P_LINE):
+        m[s] = slid_form(code, group, at.sign, x)
+    else:
+        m[s] = turned_form(code, group, at.sign, x, room.phi)
     if code == codes.P_LINE:  # one mode; its determinant keeps its sign
         if m[s] == 0.0 or (at.warm and not m[s] * at.before > 0.0):
             return codes.UNREACHABLE
@@ -215,21 +201,18 @@ def solved(code, group, room, need, s, at, sizes):
     if warm and not (m[s] * at.before > 0.0 and abs(m[s]) > 0.5 * abs(at.before)):
         return codes.STEP_TOO_LONG
     # another branch has other speeds, even where its pose is met by chance
-    if warm and surprise(group, x, at.h, reach, out) > 0.3 * travel + 1e-9 + out[3]:
-        return codes.STEP_TOO_LONG
+    if warm:
+        total = 0.0
+        for k in range(nc):
+            link = core[c0 + k]
+            e = 4 + 3 * k
+            dx, dy, dt = x[link, 5] - out[e], x[link, 6] - out[e + 1], x[link, 7] - out[e + 2]
+            total += dx * dx + dy * dy + reach * reach * dt * dt
+        if abs(at.h) * math.sqrt(total) / reach > 0.3 * travel + 1e-9 + out[3]:
+            return codes.STEP_TOO_LONG
     if warm and centres_pass(group, x, phi, at.h, True):
         return codes.STEP_TOO_LONG
     return 0
-
-
-@kernel
-def seat(poses, centres, X, TH, PHI):
-    """Put the poses (x, y, theta) of all links, and directions of lines of centres, into the first sample."""
-    for k in range(poses.shape[0]):
-        X[k, 0, 0], X[k, 1, 0], TH[k, 0] = poses[k, 0], poses[k, 1], poses[k, 2]
-        X[k, 2, 0], X[k, 3, 0] = math.cos(poses[k, 2]), math.sin(poses[k, 2])
-    for k in range(PHI.shape[0]):
-        PHI[k, 0] = centres[k]
 
 
 @kernel
@@ -280,7 +263,15 @@ def walk(tables, ep, group, s, q, u, sign, room, state, span, sizes, derivs):
                 if need[e]:
                     follow_angle(e, x, near)
                 store(e, i, x, state, derivs)
-        carry_centres(group, i, x, phi, state.PHI)
+        # follow the direction of the line of centres of every gear pair
+        rows, rp = group.rows, group.rp
+        for k in range(group.r0, group.r0 + group.nr):
+            if rows[k, 0] == codes.GEAR:
+                slot = int(rp[k, codes.SLOT])
+                ax, ay = world(x, rows[k, 1], rp[k, 0], rp[k, 1])
+                bx, by = world(x, rows[k, 2], rp[k, 2], rp[k, 3])
+                phi[slot] = nearest_turn(math.atan2(by - ay, bx - ax), phi[slot])
+                state.PHI[slot, i] = phi[slot]
     return stop, 0
 
 
@@ -305,7 +296,13 @@ def run_set(tables, b, wanted, q, u, modes, state, room, limits, first, sizes, d
         group = codes.Group(tables.rows, rp, r0, steps[s, 2], tables.core, steps[s, 3], steps[s, 4])
         if kind == codes.R_DIST:
             rrr_loop(group, modes[s], state, state.M[s], room.T, first, stop, derivs)
-            end, reason = first_bad(state.M[s], first, stop)
+            M, bad, end, reason = state.M[s], 0, stop, 0
+            for i in range(first, stop):  # margins that are negative or not a number: counted first, without branches
+                bad += not M[i] >= 0.0
+            for i in range(first if bad else stop, stop):
+                if not M[i] >= 0.0:
+                    end, reason = i, codes.UNREACHABLE if M[i] < 0.0 else codes.NO_CONVERGENCE
+                    break
         else:
             end, reason = walk(tables, ep, group, s, q, u, modes[s], room, state, (first, stop), sizes, derivs)
         if reason:
@@ -314,8 +311,13 @@ def run_set(tables, b, wanted, q, u, modes, state, room, limits, first, sizes, d
         if kind == codes.R_DIST and need[own]:
             unwrap(own, u, state, first, stop, derivs)
         # the links eliminated from it, as far as it goes
-        e0, ne = steps[s, 5], steps[s, 6]
-        bars(tables.eliminated, e0, ne, ep, wanted, need, u, state, room.T, first, stop, derivs)
+        elim = tables.eliminated
+        for k in range(steps[s, 5], steps[s, 5] + steps[s, 6]):
+            e = elim[k, 1]
+            if elim[k, 0] == codes.E_RR and wanted[e]:
+                bar_loop(e, elim[k, 2], elim[k, 3], ep, k, state, room.T, first, stop, derivs)
+                if need[e]:
+                    unwrap(e, u, state, first, stop, derivs)
     return stop, code, at
 
 
@@ -343,7 +345,12 @@ def run(tables, wanted, q, u, modes, state, out, done, why, first, sizes, derivs
                 break
     for b in range(done.shape[0]):
         if out.poses.shape[0] > 0:
-            seat(out.poses[b], out.centres[b], state.X, state.TH, state.PHI)
+            for k in range(out.poses.shape[1]):
+                x, y, theta = out.poses[b, k, 0], out.poses[b, k, 1], out.poses[b, k, 2]
+                state.X[k, 0, 0], state.X[k, 1, 0], state.TH[k, 0] = x, y, theta
+                state.X[k, 2, 0], state.X[k, 3, 0] = math.cos(theta), math.sin(theta)
+            for k in range(state.PHI.shape[0]):
+                state.PHI[k, 0] = out.centres[b, k]
         done[b], why[b, 0], why[b, 1] = run_set(
             tables, b, wanted, q, u, modes, state, room, limits, first, sizes, derivs
         )

@@ -135,19 +135,6 @@ def solve(u, v, c0, c1, c2, c3, c4, c5):
 
 
 @kernel
-def reach(u, v, k, n, c, r, C, P1, P2, mark):
-    """Legs that end at u, v (n entries): squared distances, C, P1, P2 and their marks (0 reachable, 2, 3, HARD)."""
-    c0, c1, c2, c3, c4, c5 = c[k, 0], c[k, 1], c[k, 2], c[k, 3], c[k, 4], c[k, 5]
-    for i in range(n):
-        r[i], C[i], P1[i], P2[i] = solve(u[i], v[i], c0, c1, c2, c3, c4, c5)
-        size = r[i] + c2
-        narrow = NARROW * size
-        clear = (abs(P1[i]) > narrow) & (abs(P2[i]) > narrow) & (size < LARGEST) & (size > SMALLEST)
-        out = 2.0 if P1[i] < 0.0 else (3.0 if P2[i] < 0.0 else 0.0)
-        mark[i] = out if clear else 9.0
-
-
-@kernel
 def inverse(pose, D, b, consts, sigma, theta, status, S, deficit):
     """Legs of poses (n, 3): angles, status and, where wanted, S and deficit; returns the number of legs marked HARD.
 
@@ -173,7 +160,14 @@ def inverse(pose, D, b, consts, sigma, theta, status, S, deficit):
                 u[i] = pose[start + i, 0] + (cs[i] * bx - sn[i] * by) - dx
                 v[i] = pose[start + i, 1] + (cs[i] * by + sn[i] * bx) - dy
                 sg[i] = sigma[(start + i) * step, k]
-            reach(u, v, k, m, consts, r, C, P1, P2, mark)
+            c0, c1, c2, c3, c4, c5 = consts[k, 0], consts[k, 1], consts[k, 2], consts[k, 3], consts[k, 4], consts[k, 5]
+            for i in range(m):  # marks: 0 reachable, 2, 3, HARD
+                r[i], C[i], P1[i], P2[i] = solve(u[i], v[i], c0, c1, c2, c3, c4, c5)
+                size = r[i] + c2
+                narrow = NARROW * size
+                clear = (abs(P1[i]) > narrow) & (abs(P2[i]) > narrow) & (size < LARGEST) & (size > SMALLEST)
+                out = 2.0 if P1[i] < 0.0 else (3.0 if P2[i] < 0.0 else 0.0)
+                mark[i] = out if clear else 9.0
             # the angle on one branch, or on both
             for side in range(2 if modes > 1 else 1):
                 chosen = minus if side == 1 else plus

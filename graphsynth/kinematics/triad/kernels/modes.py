@@ -258,11 +258,9 @@ def modes(anchors, vertices, legs, problem, pose, determinant, counts, flags):
         b[0], b[1], b[2] = 0.0, (b2 - b1) * inverse, (b3 - b1) * inverse
         coefficients(a[0], a[1], b[1], b[2], l[0], l[1], l[2], g, q)
         # sizes of the terms of G; eta bounds its rounding
-        h1, h2, h3 = (
-            math.sqrt(g[1] ** 2 + g[2] ** 2),
-            math.sqrt(g[3] ** 2 + g[4] ** 2),
-            math.sqrt(g[5] ** 2 + g[6] ** 2),
-        )
+        h1 = math.sqrt(g[1] ** 2 + g[2] ** 2)
+        h2 = math.sqrt(g[3] ** 2 + g[4] ** 2)
+        h3 = math.sqrt(g[5] ** 2 + g[6] ** 2)
         sum0 = 2.0 * (h1 + h2 + h3)
         eta = 4e-15 * (abs(g[0]) + sum0)
         if abs(g[0]) > sum0 + 2.0 * eta:
