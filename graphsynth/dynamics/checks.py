@@ -306,29 +306,19 @@ def _units(compiled: Compiled, joint: object, place: Array) -> tuple[int, int, l
     if isinstance(joint, Revolute | Rigid):
         couple = [(0j, 1.0, at)] if isinstance(joint, Rigid) else []
         return a, b, [(1.0 + 0j, 0.0, at), (1j, 0.0, at), *couple]
-    if isinstance(joint, Gear):
-        return a, b, [_tooth(compiled, joint, place, at)]
-    if isinstance(joint, Cam):
-        return a, b, [(_cam_normal(compiled, joint, place, at), 0.0, at)]
+    if isinstance(joint, Gear):  # along the tangent at the pitch point, which divides the line of centres as the radii
+        centre = world(place, compiled, a, joint.at_a)
+        total = joint.radius_a + (-1.0 if joint.internal else 1.0) * joint.radius_b
+        apart = at - centre
+        return a, b, [(1j * apart / abs(apart), 0.0, centre + apart * (joint.radius_a / total))]
+    if isinstance(joint, Cam):  # along the normal of the pitch curve at the roller's centre
+        centre = world(place, compiled, a, joint.at_a)
+        out = (at - centre) / abs(at - centre)
+        rho, first, _ = joint.pitch_radius(math.atan2(out.imag, out.real) - place[a, 2] - joint.angle_a)
+        tangent = first * out + rho * 1j * out
+        return a, b, [(complex(-1j * tangent / abs(tangent)), 0.0, at)]
     normal = 1j * complex(np.exp(1j * (place[a, 2] + joint.angle_a)))  # type: ignore[attr-defined]
     return a, b, [(normal, 0.0, at), *([(0j, 1.0, at)] if isinstance(joint, Prismatic) else [])]
-
-
-def _tooth(compiled: Compiled, joint: Gear, place: Array, centre_b: complex) -> tuple[complex, float, complex]:
-    """Tangential tooth force at the pitch point that divides the line of centres as the radii."""
-    centre_a = world(place, compiled, joint.a, joint.at_a)
-    total = joint.radius_a + (-1.0 if joint.internal else 1.0) * joint.radius_b
-    apart = centre_b - centre_a
-    return 1j * apart / abs(apart), 0.0, centre_a + apart * (joint.radius_a / total)
-
-
-def _cam_normal(compiled: Compiled, joint: Cam, place: Array, roller: complex) -> complex:
-    """Return the normal of the pitch curve at the roller's centre, from the curve's tangent."""
-    centre = world(place, compiled, joint.a, joint.at_a)
-    out = (roller - centre) / abs(roller - centre)
-    rho, first, _ = joint.pitch_radius(math.atan2(out.imag, out.real) - place[joint.a, 2] - joint.angle_a)
-    tangent = first * out + rho * 1j * out
-    return complex(-1j * tangent / abs(tangent))
 
 
 def newton_euler_difference(

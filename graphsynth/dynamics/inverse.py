@@ -23,8 +23,8 @@ from graphsynth.dynamics.motors import torque_constant
 from graphsynth.dynamics.reactions import Reactions, reactions_from_multipliers
 from graphsynth.dynamics.result import MotorHistory
 from graphsynth.dynamics.tables import Compiled, compile_model
-from graphsynth.dynamics.values import applied_loads, jacobians
-from graphsynth.mechanism.joints import Prismatic
+from graphsynth.dynamics.values import applied_loads, jacobians, joint_coordinate
+from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
 
 if TYPE_CHECKING:
@@ -135,25 +135,12 @@ def inverse_dynamics(
     power_error = float(np.fmax.reduce(found.error, initial=0.0) / np.fmax.reduce(found.size, initial=1e-300))
     reactions = reactions_from_multipliers(compiled, q, v, lam, instants)
     efforts, power = _efforts(compiled, reactions, motion, rates, work)
-    equilibrium = _equilibrium_error(compiled, instants, (q, v, a, lam))
-    return InverseDynamics(
-        motion.inputs,
-        instants,
-        efforts,
-        reactions,
-        power,
-        power_error,
-        equilibrium,
-        _motors(model, motion, efforts, rates),
-    )
-
-
-def _equilibrium_error(compiled: Compiled, times: Array, states: tuple[Array, Array, Array, Array]) -> float:
-    """Difference to body-by-body equilibrium at up to 40 samples: coordinates, rates, accelerations, multipliers."""
-    good = np.flatnonzero(np.isfinite(states[3]).all(axis=1))
+    good = np.flatnonzero(np.isfinite(lam).all(axis=1))
     some = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), 40)).astype(int))] if len(good) else good
-    q, v, a, lam = (part[some] for part in states)
-    return newton_euler_difference(compiled, times[some], q, v, a, lam, np.zeros((len(some), 0)))
+    none = np.zeros((len(some), 0))
+    equilibrium = newton_euler_difference(compiled, instants[some], q[some], v[some], a[some], lam[some], none)
+    motors = _motors(model, motion, efforts, rates)
+    return InverseDynamics(motion.inputs, instants, efforts, reactions, power, power_error, equilibrium, motors)
 
 
 def _check(model: DynamicModel, motion: Motion) -> None:
@@ -299,9 +286,6 @@ def _efforts(
     compiled: Compiled, reactions: Reactions, motion: Motion, rates: Array, work: Array
 ) -> tuple[Array, Array]:
     """Efforts and power of the drivers; a driver alone has its effort from the virtual work, which loses no digits."""
-    from graphsynth.dynamics.values import joint_coordinate
-    from graphsynth.mechanism.joints import Revolute
-
     mechanism = motion.mechanism
     n, count = len(motion.inputs), len(mechanism.drivers)
     efforts, power = np.zeros((n, count)), np.zeros(n)

@@ -145,8 +145,10 @@ def reactions_from_multipliers(
         rows = slice(ends[index], ends[index + 1])
         link, sign, at = _application(compiled, index, place)
         points[index, there] = at
-        if isinstance(joints[index], Gear):
-            apart[index, there] = _separation(compiled, joints[index], place)
+        joint = joints[index]
+        if isinstance(joint, Gear):  # a wheel with outer teeth is pushed towards its own centre, a ring the other way
+            u = world(place, compiled, joint.b, joint.at_b) - world(place, compiled, joint.a, joint.at_a)
+            apart[index, there] = (-u if joint.internal else u) / np.where(u == 0.0, 1.0, np.abs(u))
         column = int(compiled.tables.column[link])
         own = -sign * J[:, rows, column : column + 3].swapaxes(1, 2)
         arm = at - (place[:, link, 0] + 1j * place[:, link, 1])
@@ -173,15 +175,6 @@ def reactions_from_multipliers(
             )
         )
     return Reactions(times, tuple(found))
-
-
-def _separation(compiled: Compiled, gear: Gear, place: Array) -> Complex:
-    """Return the unit vectors of the separating force on link b.
-
-    A wheel with outer teeth is pushed from the pitch point towards its own centre, a ring the other way.
-    """
-    u = world(place, compiled, gear.b, gear.at_b) - world(place, compiled, gear.a, gear.at_a)
-    return np.asarray((-u if gear.internal else u) / np.where(u == 0.0, 1.0, np.abs(u)))
 
 
 def kind_of(joint: Any) -> str:

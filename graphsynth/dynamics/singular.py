@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import Values, initial_slots
+from graphsynth.kinematics.engine import codes
 
 Array = NDArray[np.float64]
 PoseClass = Literal["regular", "redundant", "singular", "not tested"]
@@ -72,43 +73,35 @@ def _returned(values: Values, q: Array) -> Array | None:
 
 def branch_tangents(values: Values, q: Array, left: Array, null: Array) -> BranchTangents | None:
     """Solve the second-order equation ``l . C_qq(n, n) = 0`` for the directions of the branches."""
-    special = left
-    if null.shape[1] != 2 or special.shape[1] != 1:
+    if null.shape[1] != 2 or left.shape[1] != 1:
         return None
-    scale = values.compiled.unit
+    compiled, scale = values.compiled, values.compiled.unit
+    # the drivers' own accelerations do not count
+    still, kinds = values.system(np.zeros(compiled.n), np.zeros(compiled.n))[2], compiled.tables.rows[:, 0]
+    own = np.where((kinds == codes.DRIVE_ANGLE) | (kinds == codes.DRIVE_SLIDE), still, 0.0)
 
     def form(direction: Array) -> float:
-        gam = values.system(q, scale * direction)[2] + _driver_part(values)
-        return float(special[:, 0] @ (-gam / values.compiled.row_unit))
+        gam = values.system(q, scale * direction)[2] - own
+        return float(left[:, 0] @ (-gam / compiled.row_unit))
 
     n1, n2 = null[:, 0], null[:, 1]
     a, c = form(n1), form(n2)
     b = 0.5 * (form(n1 + n2) - a - c)
     discriminant = b * b - a * c
     size = max(abs(a), abs(b), abs(c))
+    none = np.empty((0, compiled.links, 3))
     if not size > 1e-9 or abs(discriminant) <= 1e-9 * size**2:
-        return BranchTangents("higher order", np.empty((0, values.compiled.links, 3)), discriminant)
+        return BranchTangents("higher order", none, discriminant)
     if discriminant < 0.0:
-        return BranchTangents("isolated", np.empty((0, values.compiled.links, 3)), discriminant)
-    root = np.sqrt(discriminant)
+        return BranchTangents("isolated", none, discriminant)
     # a s^2 + 2 b s t + c t^2 = 0 with (s, t) homogeneous, without cancellation
-    w = -(b + np.copysign(root, b))
-    pairs = [(w, a), (c, w)]
+    w = -(b + np.copysign(np.sqrt(discriminant), b))
     motions = []
-    for s, t in pairs:
+    for s, t in ((w, a), (c, w)):
         v = scale * (s * n1 + t * n2)
-        rate = values.compiled.to_links(q, v, np.zeros_like(v))[1]
+        rate = compiled.to_links(q, v, np.zeros_like(v))[1]
         motions.append(rate / rate.flat[int(np.argmax(np.abs(rate)))])
     return BranchTangents("change point", np.array(motions), discriminant)
-
-
-def _driver_part(values: Values) -> Array:
-    """Remove the drivers' own accelerations from the right side."""
-    zero = values.system(np.zeros(values.compiled.n), np.zeros(values.compiled.n))[2]
-    kinds = values.compiled.tables.rows[:, 0]
-    from graphsynth.kinematics.engine.codes import DRIVE_ANGLE, DRIVE_SLIDE
-
-    return np.where((kinds == DRIVE_ANGLE) | (kinds == DRIVE_SLIDE), -zero, 0.0)
 
 
 #: Masses farther apart than this (see `Compiled.spread`) may defeat double precision.
@@ -299,34 +292,29 @@ def passed_singular_pose(
     Kind, time, its uncertainty and a statement of the pose passed, if there is one.
     """
 
-    def pivot(t: float) -> float:
-        return float(form.pivot_at(t, np.asarray((first if t <= middle else second)(t)))[0])
+    def pivot(t: float) -> tuple[float, Array, Array]:
+        y = np.asarray((first if t <= middle else second)(t))
+        return *form.pivot_at(t, y), y
 
-    width = end - start
-    t, least = _lowest(pivot, start, end)
+    # a sharp bend there, kinks elsewhere: ever finer samples
+    width, t, least = end - start, start, np.inf
+    low, high, step = start, end, width / 40.0
+    for _ in range(_ZOOMS):
+        for at in np.arange(low, high + 0.5 * step, step):
+            value = pivot(float(at))[0]
+            if value < least:
+                t, least = float(at), value
+        low, high, step = max(t - step, low), min(t + step, high), 0.1 * step
     least /= largest
     if least > _NEARLY:
         return []
-    y = np.asarray((first if t <= middle else second)(t))
-    _, q = form.pivot_at(t, y)
+    _, q, y = pivot(t)
     n = form.compiled.n
     if least > _SINGULAR:
         text = f"nearly singular pose at t = {t:.9g} s: smallest pivot {least:.2g} of the largest; large reactions"
         return [("nearly singular pose", t, 1e-9 * width, text)]
     text = f"singular pose passed at t = {t:.9g} s"
     return [("singular pose", t, 1e-7 * width, text + _branches(form, t, q, y[n : 2 * n]))]
-
-
-def _lowest(pivot: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
-    """Return the minimum of a function with a sharp bend there, kinks elsewhere: by ever finer samples."""
-    t, least, step = low, np.inf, (high - low) / 40.0
-    for _ in range(_ZOOMS):
-        for at in np.arange(low, high + 0.5 * step, step):
-            value = pivot(float(at))
-            if value < least:
-                t, least = float(at), value
-        low, high, step = max(t - step, low), min(t + step, high), 0.1 * step
-    return t, least
 
 
 def _branches(form: Any, t: float, q: Array, v: Array) -> str:

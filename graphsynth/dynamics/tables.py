@@ -32,6 +32,8 @@ Row = tuple[int, int, int, list[float]]
 
 #: Kind of a rack row, beside those of :mod:`graphsynth.kinematics.engine.codes`.
 RACK = 20
+#: Kinds of rows that are angles.
+_ANGULAR = (codes.ANGLE, codes.DRIVE_ANGLE, codes.GEAR)
 #: Sense of sliding of a friction element that is given by the speed itself.
 BY_SPEED = 2.0
 
@@ -199,7 +201,7 @@ class Compiled:
         ints, table = _stacked(rows, T.table.shape[1])
         slots = np.concatenate([T.slots, np.full(len(rows), -1, dtype=np.int64)])
         tables = T._replace(rows=np.vstack([T.rows, ints]), table=np.vstack([T.table, table]), slots=slots)
-        more = (RowInfo(name, _angular(row[0]), joint) for (name, joint), row in zip(info, rows))
+        more = (RowInfo(name, row[0] in _ANGULAR, joint) for (name, joint), row in zip(info, rows))
         return replace(self, tables=tables, info=(*self.info, *more), held=tuple(float(x) for x in held))
 
     def driven(self, t: float) -> Array:
@@ -250,41 +252,13 @@ def compile_model(model: DynamicModel) -> Compiled:
     lower: Array = np.zeros((0, 0)) if model.massless else np.asarray(np.linalg.cholesky(mass), dtype=np.float64)
     springs, torsions, forces, sources = _loads(model, centres)
     motors, motor_table, modes = _motors(model)
-    tables = Tables(
-        column,
-        rows,
-        table,
-        slots,
-        mass,
-        lower,
-        diagonal,
-        np.array(model.gravity),
-        *springs,
-        *torsions,
-        *forces,
-        *sources,
-        motors,
-        motor_table,
-        modes,
-        *_frictions(model, joints, first),
-        _size(model),
-    )
-    applied = tuple(
-        element
-        for element in model.elements
-        if (isinstance(element, Force) and callable(element.force))
-        or (isinstance(element, Torque | TorqueSource) and callable(element.torque))
-    )
-    return Compiled(
-        model,
-        tables,
-        tuple(info),
-        tuple(joints),
-        tuple(first),
-        centres,
-        tuple(_Remembered(driver) for driver in model.prescribed),
-        applied,
-    )
+    rubbing, gravity = _frictions(model, joints, first), np.array(model.gravity)
+    loads: list[Any] = [*springs, *torsions, *forces, *sources, motors, motor_table, modes, *rubbing, _size(model)]
+    tables = Tables(column, rows, table, slots, mass, lower, diagonal, gravity, *loads)
+    loaded = (e for e in model.elements if isinstance(e, Force | Torque | TorqueSource))
+    applied = (e for e in loaded if callable(e.force if isinstance(e, Force) else e.torque))
+    laws = tuple(_Remembered(driver) for driver in model.prescribed)
+    return Compiled(model, tables, tuple(info), tuple(joints), tuple(first), centres, laws, tuple(applied))
 
 
 def _size(model: DynamicModel) -> float:
@@ -318,11 +292,9 @@ def _constraints(
             own = joint_rows(_moved(joint, centres))
         for kind, a, b, parameters in own:
             slots.append(sum(slot >= 0 for slot in slots) if kind in (codes.GEAR, RACK) else -1)
-            own_name = _row_name(kind, joint)
             number = index - len(model.mechanism.joints)
-            if 0 <= number < len(model.additional):
-                own_name = f"additional {number + 1}: {own_name}"
-            info.append(RowInfo(own_name, _angular(kind), index))
+            more = f"additional {number + 1}: " if 0 <= number < len(model.additional) else ""
+            info.append(RowInfo(more + _row_name(kind, joint), kind in _ANGULAR, index))
             found.append((kind, a, b, parameters))
     rows, table = _stacked(found, max([codes.ROW_WIDTH, *(len(row[3]) for row in found)]))
     own_slots = np.array(slots, dtype=np.int64)
@@ -402,10 +374,6 @@ def coordinate_row(compiled: Compiled, key: Sequence[Any], slot: int) -> Row:
     row[codes.SIGN], row[codes.SLOT] = 1.0, float(slot)
     row[codes.TX], row[codes.TY] = (1.0, 0.0) if two == "x" else (0.0, 1.0)
     return codes.DRIVE_ANGLE if two == "theta" else codes.DRIVE_SLIDE, frame, one, row
-
-
-def _angular(kind: int) -> bool:
-    return kind in (codes.ANGLE, codes.DRIVE_ANGLE, codes.GEAR)
 
 
 def _row_name(kind: int, joint: Any) -> str:
