@@ -39,10 +39,7 @@ VERDICTS = {
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How mechanisms are evaluated.
-
-    Raises `SpecError` for values out of these bounds.
-    """
+    """How mechanisms are evaluated; a `SpecError` refuses values out of these bounds."""
 
     seed: int = 0  # of the search for dimensions
     tries: int = 4  # searches for each mechanism, 1 to 1000
@@ -120,43 +117,30 @@ def tasks(
 ) -> Iterator[Task]:
     """Yield the mechanisms that are still to be evaluated, chain by chain, the simplest to assemble first."""
     sizes = dict(connection.execute("SELECT group_id, links FROM groups"))
-    families = [
-        row[0]
-        for row in connection.execute("SELECT family_id, links, mobility FROM families ORDER BY mobility, links")
-        if (links is None or row[1] in set(links)) and (mobility is None or row[2] in set(mobility))
-    ]
-    for family in families:
+    families = connection.execute("SELECT family_id, links, mobility FROM families ORDER BY mobility, links").fetchall()
+    for family, count, freedom in families:
+        if (links is not None and count not in set(links)) or (mobility is not None and freedom not in set(mobility)):
+            continue
         select = "SELECT chain_id, key FROM chains WHERE family_id = ? ORDER BY key"
         for number, key in connection.execute(select, (family,)).fetchall():
-            for frame, driver in _simplest(connection, number, sizes)[: per_chain or None]:
+            # those of small groups before those of large ones, then by class, frame, driver
+            select = "SELECT frame, driver, class, groups FROM mechanisms WHERE chain_id = ?"
+            ranked = sorted(
+                (max((sizes[int(group)] for group in groups.split()), default=0), own, frame, str(driver), driver)
+                for frame, driver, own, groups in connection.execute(select, (number,)).fetchall()
+            )
+            for _, _, frame, _, driver in ranked[: per_chain or None]:
                 task = _task(connection, number, key, frame, driver, settings)
                 if task is not None:
                     yield task
-
-
-def _simplest(connection: sqlite3.Connection, number: int, sizes: dict[int, int]) -> list[tuple[int, int | str]]:
-    """Mechanisms of a chain: those of small groups before those of large ones, then by class, frame, driver."""
-    rows = connection.execute(
-        "SELECT frame, driver, class, groups FROM mechanisms WHERE chain_id = ?", (number,)
-    ).fetchall()
-    ranked = sorted(
-        (max((sizes[int(group)] for group in groups.split()), default=0), own, frame, str(driver), driver)
-        for frame, driver, own, groups in rows
-    )
-    return [(frame, driver) for _, _, frame, _, driver in ranked]
 
 
 def _task(
     connection: sqlite3.Connection, number: int, key: str, frame: int, driver: int | str, settings: Settings
 ) -> Task | None:
     """Return what is left to do for a mechanism: nothing if it was evaluated with these settings."""
-    stored = {
-        kind: (status, data)
-        for kind, status, data in connection.execute(
-            "SELECT kind, status, data FROM evaluations WHERE (chain_id, frame, driver) = (?, ?, ?)",
-            (number, frame, driver),
-        )
-    }
+    select = "SELECT kind, status, data FROM evaluations WHERE (chain_id, frame, driver) = (?, ?, ?)"
+    stored = {kind: tuple(rest) for kind, *rest in connection.execute(select, (number, frame, driver))}
     status, data = stored.get("dimensions", ("", None))
     if status == "found" and data is not None:
         if settings.tilt is None or _has(stored.get("jamming"), _question(settings, data)):
@@ -178,10 +162,18 @@ def _has(row: tuple[str, str | None] | None, wanted: dict[str, Any]) -> bool:
 
 def evaluate_task(task: Task) -> list[Evaluation]:
     """Evaluate one mechanism (in the worker); the same task gives the same result."""
+    import graphsynth
+    from graphsynth.mechanism.model import Mechanism
+
     found = [] if task.known else _dimensions(task)
     text = task.known or next((item.text for item in found if item.status == "found"), None)
-    if text is not None and task.settings.tilt is not None:
-        found.append(_jamming(task, text))
+    tilt, limit = task.settings.tilt, task.settings.joint_limit
+    if text is not None and tilt is not None:
+        proof = jamming_proof(Mechanism.from_json(json.dumps(data_of(text)["mechanism"])), tilt, limit)
+        status, guarantee = VERDICTS.get(proof.verdict.name, ("undecided", None))
+        data = {**_question(task.settings, text), "reason": proof.reason, "version": graphsynth.__version__}
+        place = task.key, task.frame, task.driver
+        found.append(Evaluation(*place, "jamming", status, tilt, "rad", guarantee, data))
     return found
 
 
@@ -201,16 +193,16 @@ def _dimensions(task: Task) -> list[Evaluation]:
         return [Evaluation(*place, "dimensions", "not found", data={**settings, "statement": str(error)})]
     if not found.accepted or found.mechanism is None or found.motion is None or found.figures is None:
         return [Evaluation(*place, "dimensions", "not found", data={**settings, "statement": found.statement})]
-    goals = {
-        "min_transmission_angle": found.goals.min_transmission_angle,
-        "max_length_ratio": found.goals.max_length_ratio,
+    mechanism = json.loads(found.mechanism.to_json())
+    data: dict[str, Any] = {
+        **settings,
+        "statement": found.statement,
+        "goals": {name: getattr(found.goals, name) for name in ("min_transmission_angle", "max_length_ratio")},
+        "length_ratio": found.figures.length_ratio,
+        "mechanism": mechanism,
     }
-    data: dict[str, Any] = {**settings, "statement": found.statement, "goals": goals}
-    data["length_ratio"] = found.figures.length_ratio
-    data["mechanism"] = json.loads(found.mechanism.to_json())
-    named = fingerprint(data["mechanism"])
     guarantee = "certified" if turn_is_proved(found.motion) else "estimated"
-    angle, turn = found.figures.transmission_angle, {"range": [0.0, math.tau], "dimensions": named}
+    angle, turn = found.figures.transmission_angle, {"range": [0.0, math.tau], "dimensions": fingerprint(mechanism)}
     return [
         Evaluation(*place, "dimensions", "found", guarantee=guarantee, data=data),
         Evaluation(*place, "transmission", "found", angle, "rad", "estimated", turn),
@@ -249,20 +241,6 @@ def _question(settings: Settings, dimensions: str) -> dict[str, Any]:
     mechanism = mechanism_in(data_of(dimensions))
     named = None if mechanism is None else fingerprint(mechanism)
     return {"tilt": settings.tilt, "joint_limit": settings.joint_limit, "dimensions": named}
-
-
-def _jamming(task: Task, text: str) -> Evaluation:
-    """Judge a mechanism whose dimensions are known."""
-    import graphsynth
-    from graphsynth.mechanism.model import Mechanism
-
-    settings = task.settings
-    assert settings.tilt is not None
-    mechanism = Mechanism.from_json(json.dumps(data_of(text)["mechanism"]))
-    proof = jamming_proof(mechanism, settings.tilt, settings.joint_limit)
-    status, guarantee = VERDICTS.get(proof.verdict.name, ("undecided", None))
-    data = {**_question(settings, text), "reason": proof.reason, "version": graphsynth.__version__}
-    return Evaluation(task.key, task.frame, task.driver, "jamming", status, settings.tilt, "rad", guarantee, data)
 
 
 def jamming_proof(mechanism: Mechanism, tilt: float, joint_limit: float) -> TurnCertificate:

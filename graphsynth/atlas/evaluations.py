@@ -31,41 +31,19 @@ _MOST_DATA = 1_000_000
 class Evaluation:
     """One evaluation of one mechanism.
 
-    Parameters
-    ----------
-    chain : str
-        Key or label.
-    frame : int
-    driver : int or str
-        As in the table of mechanisms; text such as ``'1,3'`` for several.
-    kind : str
-        ``'dimensions'``, ``'transmission'``, ``'jamming'``, or another word, of at most 200 characters, as are the
-        next two.
-    status : str
-        One word: ``'found'``, ``'free'``, ``'undecided'``, ...
-    value : float, optional
-        A finite number in SI units or radians; None where there is none.
-    unit : str, optional
-    guarantee : {"exact", "certified", "estimated"}, optional
-    data : object, optional
-        Anything JSON holds: dimensions, settings, the evidence.
-
-    Raises
-    ------
-    SpecError
-        For a value that is not finite, an unknown guarantee, no words, or data that JSON does not hold or that are
-        longer than a million characters.
+    A `SpecError` refuses a value that is not finite, an unknown guarantee, no words, and data that JSON does not hold
+    or that are longer than a million characters.
     """
 
-    chain: str
+    chain: str  # key or label
     frame: int
-    driver: int | str
-    kind: str
-    status: str
-    value: float | None = None
+    driver: int | str  # as in the table of mechanisms; text such as ``'1,3'`` for several
+    kind: str  # ``'dimensions'``, ``'transmission'``, ``'jamming'``, or another word of at most 200 characters
+    status: str  # one such word: ``'found'``, ``'free'``, ``'undecided'``, ...
+    value: float | None = None  # a finite number in SI units or radians; None where there is none
     unit: str | None = None
-    guarantee: str | None = None
-    data: Any = None
+    guarantee: str | None = None  # one of `GUARANTEES`
+    data: Any = None  # anything JSON holds: dimensions, settings, the evidence
 
     def __post_init__(self) -> None:
         if self.value is not None and not math.isfinite(self.value):
@@ -118,32 +96,21 @@ def store(connection: sqlite3.Connection, evaluations: Iterable[Evaluation]) -> 
         for item in items:
             place = _mechanism(connection, item)
             if item.kind == "dimensions":
-                _drop_tied(connection, place, item)
+                mechanism = mechanism_in(item.data)
+                if mechanism is None or fingerprint(mechanism) != fingerprint_at(connection, place):
+                    drop = "DELETE FROM evaluations WHERE (chain_id, frame, driver, kind) = (?, ?, ?, ?)"
+                    connection.executemany(drop, [(*place, kind) for kind in TIED])  # found for other dimensions
             elif item.kind in TIED:
-                _check_tie(connection, place, item)
+                named = item.data.get("dimensions") if isinstance(item.data, dict) else None
+                if named is not None and named != fingerprint_at(connection, place):
+                    raise SpecError(
+                        f"the {item.kind} of {item.chain} with frame {item.frame} and driver {item.driver} is of the "
+                        f"dimensions {named!r}, which are not those stored: store its dimensions first, or compute it "
+                        "for the stored ones"
+                    )
             row = *place, item.kind, item.status, item.value, item.unit, item.guarantee, item.text
             connection.execute("INSERT OR REPLACE INTO evaluations VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
     return len(items)
-
-
-def _drop_tied(connection: sqlite3.Connection, place: tuple[int, int, int | str], item: Evaluation) -> None:
-    """Drop what was found for other dimensions than the new ones."""
-    mechanism = mechanism_in(item.data)
-    if mechanism is None or fingerprint(mechanism) != fingerprint_at(connection, place):
-        kinds = ", ".join("?" * len(TIED))
-        connection.execute(
-            f"DELETE FROM evaluations WHERE (chain_id, frame, driver) = (?, ?, ?) AND kind IN ({kinds})",
-            (*place, *TIED),
-        )
-
-
-def _check_tie(connection: sqlite3.Connection, place: tuple[int, int, int | str], item: Evaluation) -> None:
-    named = item.data.get("dimensions") if isinstance(item.data, dict) else None
-    if named is not None and named != fingerprint_at(connection, place):
-        raise SpecError(
-            f"the {item.kind} of {item.chain} with frame {item.frame} and driver {item.driver} is of the dimensions "
-            f"{named!r}, which are not those stored: store its dimensions first, or compute it for the stored ones"
-        )
 
 
 def _mechanism(connection: sqlite3.Connection, item: Evaluation) -> tuple[int, int, int | str]:

@@ -59,15 +59,11 @@ def _prepare(connection: sqlite3.Connection) -> None:
     """Give groups numbers that follow from their content."""
     connection.executescript(_RANKS)
     rank = dict(connection.execute("SELECT group_id, rank FROM temp.ranked_groups"))
-    found = connection.execute('SELECT structure_id, groups, class, "order" FROM structures').fetchall()
+    rows = []
+    for number, groups, *rest in connection.execute('SELECT structure_id, groups, class, "order" FROM structures'):
+        rows.append((number, " ".join(str(rank[int(group)]) for group in groups.split()), *rest))
     connection.execute("BEGIN")
-    connection.executemany(
-        "INSERT INTO temp.ranked_structures VALUES (?, ?, ?, ?)",
-        (
-            (number, " ".join(str(rank[int(group)]) for group in groups.split()), *rest)
-            for number, groups, *rest in found
-        ),
-    )
+    connection.executemany("INSERT INTO temp.ranked_structures VALUES (?, ?, ?, ?)", rows)
     connection.execute("COMMIT")
 
 
@@ -93,7 +89,6 @@ def export(connection: sqlite3.Connection, folder: Path, form: str) -> list[Path
     """Write every table to a file; see :meth:`graphsynth.atlas.catalogue.Catalogue.export`."""
     if form not in FORMS:
         raise SpecError(f"there is no form {form!r}; choose one of {', '.join(FORMS)}")
-    write = {"parquet": _write_parquet, "csv": _write_csv, "jsonl": _write_jsonl}[form]
     _prepare(connection)
     written: list[Path] = []
     try:
@@ -102,7 +97,7 @@ def export(connection: sqlite3.Connection, folder: Path, form: str) -> list[Path
             written.append(folder / f"{table}.{form}")
             cursor = connection.execute(select)
             with replacing(written[-1]) as fresh:
-                write(fresh, [column[0] for column in cursor.description], _blocks(cursor))
+                _write(fresh, form, [column[0] for column in cursor.description], _blocks(cursor))
     except OSError as error:
         place = error.filename or (written or [folder])[-1]
         raise GraphsynthError(
@@ -111,24 +106,20 @@ def export(connection: sqlite3.Connection, folder: Path, form: str) -> list[Path
     return written
 
 
-def _write_csv(path: Path, columns: list[str], blocks: Iterator[list[tuple[Any, ...]]]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        for block in blocks:
-            writer.writerows(block)
-
-
-def _write_jsonl(path: Path, columns: list[str], blocks: Iterator[list[tuple[Any, ...]]]) -> None:
-    with path.open("w", encoding="utf-8") as file:
-        for block in blocks:
-            file.writelines(json.dumps(dict(zip(columns, row))) + "\n" for row in block)
-
-
 _INTEGERS = {*re.findall(r'(\w+)"? INTEGER', SCHEMA), "group", "contracted_vertices"}
 
 
-def _write_parquet(path: Path, columns: list[str], blocks: Iterator[list[tuple[Any, ...]]]) -> None:
+def _write(path: Path, form: str, columns: list[str], blocks: Iterator[list[tuple[Any, ...]]]) -> None:
+    if form != "parquet":
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerows([columns] if form == "csv" else [])
+            for block in blocks:
+                if form == "csv":
+                    writer.writerows(block)
+                else:
+                    file.writelines(json.dumps(dict(zip(columns, row))) + "\n" for row in block)
+        return
     parquet = need("pyarrow.parquet", "parquet", "Parquet (csv and jsonl need nothing)")
     import pyarrow
 

@@ -14,17 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graphsynth.atlas.building import BuildStep, build_family, finish_family, open_family
 from graphsynth.atlas.facts import Rows, analyse_block, rows_of
 from graphsynth.atlas.schema import connect, settle
 from graphsynth.core.errors import SpecError, TooLargeError
+from graphsynth.synthesis.chunks import Chunk, estimates
 
 if TYPE_CHECKING:
-    from graphsynth.atlas.facts import Rows
-    from graphsynth.synthesis.chunks import Chunk
-    from graphsynth.synthesis.families import Family
     from graphsynth.synthesis.problem import Problem, WorkItem
 
 
@@ -78,9 +75,8 @@ def _family(
     if expected == 0 or not whole:
         return
     tasks = share_of(whole, shard)
-    part = f"{shard[0]}/{shard[1]}" if shard else "1/1"
-    question = mobility, links, int(fractionated)
-    family_id, complete = open_family(connection, question, (len(whole), fingerprint(problem, whole), part, expected))
+    row = len(whole), fingerprint(problem, whole), f"{shard[0]}/{shard[1]}" if shard else "1/1", expected
+    family_id, complete = open_family(connection, (mobility, links, int(fractionated)), row)
     if complete:
         return
 
@@ -91,7 +87,8 @@ def _family(
     def results(places: list[int]) -> Iterator[Rows]:
         return in_order(executor, rows_of_task, [tasks[at] for at in places])
 
-    build_family(connection, family_id, mobility, [(task.number, task.weight) for task in tasks], results, told)
+    pieces = [(task.number, task.piece.weight) for task in tasks]
+    build_family(connection, family_id, mobility, pieces, results, told)
     if not shard:
         finish_family(connection, family_id)
 
@@ -124,6 +121,7 @@ PIECE = 8000.0
 MOST_PIECES = 100_000
 
 _CHAINS_AT_ONCE = 1024
+_bounds = lru_cache(maxsize=2)(estimates)  # once for all pieces of a family
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,12 +131,7 @@ class Task:
     number: int
     links: int
     mobility: int
-    piece: WorkItem
-
-    @property
-    def weight(self) -> float:
-        """Bound on the work."""
-        return self.piece.weight
+    piece: WorkItem  # its weight bounds the work
 
 
 def problem_of(links: int, mobility: int, fractionated: bool) -> Problem:
@@ -161,15 +154,13 @@ def tasks_of(links: int, mobility: int, fractionated: bool) -> list[Task]:
 
 def _finer(piece: WorkItem, size: float) -> Iterator[WorkItem]:
     """Cut a piece of many contracted graphs at their bounds, and that of a single one by its search prefixes."""
-    from graphsynth.synthesis.chunks import Chunk
-
     if not isinstance(piece, Chunk) or piece.weight <= size:
         yield piece
         return
     if piece.stop - piece.start == 1:
         yield from _parts(piece, size)
         return
-    bounds = _bounds(piece.family)[piece.start : piece.stop]
+    bounds = _bounds(piece.family)[piece.start : piece.stop]  # on the chains of each contracted graph
     at = 0
     while at < len(bounds):
         sums = np.cumsum(bounds[at:])
@@ -178,14 +169,6 @@ def _finer(piece: WorkItem, size: float) -> Iterator[WorkItem]:
         part = replace(piece, start=piece.start + at, stop=piece.start + at + count, weight=float(sums[count - 1]))
         yield from _parts(part, size) if count == 1 else (part,)
         at += count
-
-
-@lru_cache(maxsize=2)
-def _bounds(family: Family) -> NDArray[np.float64]:
-    """Bounds on the chains of each contracted graph, computed once for all pieces of a family."""
-    from graphsynth.synthesis.chunks import estimates
-
-    return estimates(family)
 
 
 def _parts(piece: Chunk, size: float) -> Iterator[Chunk]:
@@ -198,7 +181,7 @@ def _parts(piece: Chunk, size: float) -> Iterator[Chunk]:
 
 def fingerprint(problem: Problem, tasks: list[Task]) -> str:
     """Short text that differs when the question or its cut differ: pieces of two cuts are never mixed."""
-    return sha256(f"{problem.signature} {len(tasks)} {[task.weight for task in tasks]}".encode()).hexdigest()[:16]
+    return sha256(f"{problem.signature} {len(tasks)} {[task.piece.weight for task in tasks]}".encode()).hexdigest()[:16]
 
 
 def share_of(tasks: list[Task], shard: tuple[int, int] | None) -> list[Task]:
@@ -214,19 +197,13 @@ def share_of(tasks: list[Task], shard: tuple[int, int] | None) -> list[Task]:
 
 def rows_of_task(task: Task) -> Rows:
     """Return the rows of all chains of a piece (computed in the worker)."""
+    if isinstance(task.piece, Chunk):
+        blocks = task.piece.packed()
+    else:
+        graphs = [graph.packed for graph in task.piece.graphs()]
+        blocks = iter([np.frombuffer(b"".join(graphs), np.uint8).reshape(len(graphs), -1)] if graphs else [])
     rows = Rows()
-    for packed in _packed(task.piece):
+    for packed in blocks:
         for at in range(0, len(packed), _CHAINS_AT_ONCE):
             rows_of(analyse_block(task.links, task.mobility, packed[at : at + _CHAINS_AT_ONCE]), rows)
     return rows
-
-
-def _packed(piece: WorkItem) -> Iterator[NDArray[np.uint8]]:
-    from graphsynth.synthesis.chunks import Chunk
-
-    if isinstance(piece, Chunk):
-        yield from piece.packed()
-        return
-    graphs = [graph.packed for graph in piece.graphs()]
-    if graphs:
-        yield np.frombuffer(b"".join(graphs), np.uint8).reshape(len(graphs), -1)

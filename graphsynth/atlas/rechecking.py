@@ -6,6 +6,7 @@ import json
 import math
 import sqlite3
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -71,29 +72,26 @@ class _Recheck:
         self.same("evaluations: graph of the dimensions", self.where, pairs, wanted)
         self.same("evaluations: frame of the dimensions", self.where, self.mechanism.frame, self.frame)
         self._turn(kinds.get("transmission"))
-        ratio = _length_ratio(self.data["mechanism"]["joints"])
+        places: dict[int, list[list[float]]] = {}
+        for joint in self.data["mechanism"]["joints"]:
+            places.setdefault(joint["a"], []).append(joint["at_a"])
+            places.setdefault(joint["b"], []).append(joint["at_b"])
+        lengths = [math.dist(p, q) for own in places.values() for p, q in combinations(own, 2)]
+        ratio = max(lengths) / min(lengths)
         self._close("length ratio", self.data["length_ratio"], ratio, 1e-9 * ratio)
-        self.same(
-            "evaluations: length ratio in bounds", self.where, ratio <= self._goal("max_length_ratio", 1e-6), True
-        )
-        if guarantee == "certified" and self.right and _has_flint():
+        inside = ratio <= float(self.data["goals"]["max_length_ratio"]) * (1.0 + 1e-6)
+        self.same("evaluations: length ratio in bounds", self.where, inside, True)
+        if guarantee == "certified" and self.right and find_spec("flint") is not None:
             proved = turn_is_proved(motion_of(self.mechanism, 721))
             self.same("evaluations: turn proved", self.where, proved, True)
-        self._ties(kinds)
-        jamming = kinds.get("jamming")
-        if self.right and jamming is not None and jamming[4] is not None:
-            self._jamming(jamming[0], jamming[3], data_of(jamming[4]))
-
-    def _ties(self, kinds: dict[str, tuple[Any, ...]]) -> None:
-        """Results that name their dimensions name these."""
         named = fingerprint(self.data["mechanism"])
-        for kind in TIED:
+        for kind in TIED:  # results that name their dimensions name these
             data = data_of(kinds[kind][4]) if kind in kinds and kinds[kind][4] else None
             if isinstance(data, dict) and "dimensions" in data:
                 self.same(f"evaluations: dimensions of {kind}", self.where, data["dimensions"], named)
-
-    def _goal(self, name: str, slack: float) -> float:
-        return float(self.data["goals"][name]) * (1.0 + slack)
+        jamming = kinds.get("jamming")
+        if self.right and jamming is not None and jamming[4] is not None:
+            self._jamming(jamming[0], jamming[3], data_of(jamming[4]))
 
     def _close(self, field: str, stored: Any, wanted: float, tolerance: float) -> None:
         """Compare numbers that two programs round differently."""
@@ -114,11 +112,13 @@ class _Recheck:
             angle = turning.transmission(poses, groups)
             self._close("transmission", transmission[1], angle, _ANGLE)
             self.same("evaluations: unit of transmission", self.where, transmission[2], "rad")
-            inside = angle >= self._goal("min_transmission_angle", 0.0) - _ANGLE
+            inside = angle >= float(self.data["goals"]["min_transmission_angle"]) - _ANGLE
             self.same("evaluations: transmission in bounds", self.where, inside, True)
 
     def _jamming(self, status: str, guarantee: str | None, question: dict[str, Any]) -> None:
         """Prove the verdict again; what is free must also be free in samples, by optimisation."""
+        from graphsynth.jamming.joints import JointLimits, Misalignment, assess_coupled
+
         if "tilt" not in question or "joint_limit" not in question:
             return
         tilt, limit = question["tilt"], question["joint_limit"]
@@ -126,45 +126,19 @@ class _Recheck:
         wanted = VERDICTS.get(proof.verdict.name, ("undecided", None))
         self.same("evaluations: jamming", self.where, (status, guarantee), wanted)
         if status == "free":
-            self.same("evaluations: free in samples", self.where, self._free_in_samples(tilt, limit), True)
-
-    def _free_in_samples(self, tilt: float, limit: float) -> bool:
-        from graphsynth.jamming.joints import JointLimits, Misalignment, assess_coupled
-
-        driver = self.mechanism.drivers[0]
-        motion = motion_of(self.mechanism, _SAMPLES)
-        for k in range(_DIRECTIONS):
-            motor = Misalignment(driver.base, driver.link, tilt, direction=k * math.pi / _DIRECTIONS)
-            if not (assess_coupled(motion, JointLimits(limit), motor).factor <= 1.0 + 1e-9).all():
-                return False
-        return True
-
-
-def _length_ratio(joints: list[dict[str, Any]]) -> float:
-    """Longest over shortest distance of two joints on one link."""
-    places: dict[int, list[list[float]]] = {}
-    for joint in joints:
-        places.setdefault(joint["a"], []).append(joint["at_a"])
-        places.setdefault(joint["b"], []).append(joint["at_b"])
-    lengths = [math.dist(p, q) for own in places.values() for p, q in combinations(own, 2)]
-    return max(lengths) / min(lengths)
-
-
-def _has_flint() -> bool:
-    from importlib.util import find_spec
-
-    return find_spec("flint") is not None
+            driver, motion = self.mechanism.drivers[0], motion_of(self.mechanism, _SAMPLES)
+            directions = (k * math.pi / _DIRECTIONS for k in range(_DIRECTIONS))
+            motors = (Misalignment(driver.base, driver.link, tilt, direction=angle) for angle in directions)
+            factors = (assess_coupled(motion, JointLimits(limit), motor).factor for motor in motors)
+            free = all((factor <= 1.0 + 1e-9).all() for factor in factors)
+            self.same("evaluations: free in samples", self.where, free, True)
 
 
 Array = NDArray[np.float64]
 
 #: Steps of a turn: half a degree, the grid of :mod:`graphsynth.kinematics.dimensional.verify`.
-_STEPS = 720
-
-_STRIDE = 10
-
+_STEPS, _STRIDE = 720, 10
 _ITERATIONS = 30
-
 #: Largest gap of a joint over the largest length, and largest change of an angle within a step, radians.
 _GAP, _JUMP = 1e-11, 0.1
 
@@ -172,18 +146,8 @@ _GAP, _JUMP = 1e-11, 0.1
 class Turning:
     """A mechanism of turning joints, as its JSON document gives it.
 
-    Parameters
-    ----------
-    document : dict
-        As :meth:`graphsynth.Mechanism.to_json` writes it; R joints, drivers that follow the input.
-    frame : int
-    drivers : tuple of int
-        Driven links, jointed to the frame.
-
-    Raises
-    ------
-    ValueError
-        If the document holds other drivers, or joints and laws of other kinds.
+    ``document`` is what :meth:`graphsynth.Mechanism.to_json` writes: R joints, and linear drivers that follow the
+    input; ``drivers`` are the driven links, jointed to the frame. A `ValueError` refuses other drivers, joints, laws.
     """
 
     def __init__(self, document: dict[str, Any], frame: int, drivers: tuple[int, ...]) -> None:

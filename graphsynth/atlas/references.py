@@ -5,6 +5,7 @@ Nothing here uses the kernels or the data structures that made the catalogue.
 
 from __future__ import annotations
 
+from base64 import urlsafe_b64encode
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -36,17 +37,12 @@ def search_key(links: int, pairs: list[tuple[int, int]], frame: int | None = Non
     found = CanonicalSearch(links, [list(graph.neighbours)], link_colours(graph)).run()
     place = {link: position for position, link in enumerate(found.order_of_vertices)}
     moved = graph.relabelled([place[link] for link in range(links)])
-    return _encoded(links, [(joint.a, joint.b) for joint in moved.joints], frame is not None)
-
-
-def _encoded(links: int, pairs: list[tuple[int, int]], framed: bool) -> str:
-    """Write the bits of a canonical graph as the reference page of keys says."""
-    from base64 import urlsafe_b64encode
-
-    held = set(pairs)
+    # the bits of the canonical graph, as the reference page of keys says
+    held = {(joint.a, joint.b) for joint in moved.joints}
     bits = "".join("01"[(a, b) in held] for b in range(links) for a in range(b))
     bits += "0" * (-len(bits) % 8)
-    data = bytes([links, 11 if framed else 3, *(int(bits[at : at + 8], 2) for at in range(0, len(bits), 8))])
+    head = links, 3 if frame is None else 11
+    data = bytes([*head, *(int(bits[at : at + 8], 2) for at in range(0, len(bits), 8))])
     return "1" + urlsafe_b64encode(data).decode().rstrip("=")
 
 
@@ -56,13 +52,6 @@ def group_key(links: int, pairs: tuple[tuple[int, int], ...]) -> str:
     from graphsynth.structure.graph import MechanismGraph
 
     return MechanismGraph(links + 1, pairs, frame=0).key
-
-
-def wanted_class(pairs: list[tuple[int, int]]) -> int:
-    """Class of a group with base 0 by the minimum cycle basis of networkx."""
-    from graphsynth.structure.assur import contour_class
-
-    return contour_class((a, b, 1) if a else (b, -1, 1) for a, b in pairs)
 
 
 @dataclass(frozen=True)
@@ -195,52 +184,39 @@ class Reference:
         return found
 
     def groups(self, frame: int, drivers: tuple[int, ...]) -> tuple[str, ...] | None:
-        """Keys of the groups by the definition: smallest sets of zero mobility, one after the other.
-
-        None if some set has more constraints than freedoms, or some link is never placed.
-        """
+        """Keys of the groups in the order of assembly; None as for `members`."""
         found = self.members(frame, drivers)
         if found is None:
             return None
-        placed, keys = _mask({frame, *drivers}), []
-        for group in map(_mask, found):
-            keys.append(self._key_of(group, placed))
+        placed, keys = {frame, *drivers}, []
+        for group in found:
+            number = {link: at for at, link in enumerate(sorted(group), 1)}
             placed |= group
+            joined = [(number[a], number.get(b, 0)) for a in group for b in self.graph[a] if b in placed]
+            pairs = {(min(pair), max(pair)) for pair in joined}
+            keys.append(group_key(len(group), tuple(sorted(pairs))))
         return tuple(keys)
 
     def members(self, frame: int, drivers: tuple[int, ...]) -> list[set[int]] | None:
-        """Links of the groups in the order of assembly; None as for `groups`."""
-        placed = _mask({frame, *drivers})
+        """Links of the groups by the definition: smallest sets of zero mobility, one after the other.
+
+        None if some set has more constraints than freedoms, or some link is never placed.
+        """
+        placed = sum(1 << link for link in {frame, *drivers})
         everything = (1 << self.links) - 1
         found = []
         while placed != everything:
-            group = self._next_group(everything & ~placed, placed)
-            if group is None:
+            sets = _subsets(everything & ~placed)
+            constraints = 2 * (self.edges_inside[sets | placed] - self.edges_inside[placed])
+            freedoms = 3 * _sizes(self.links)[sets]
+            tight = [int(own) for own in sets[constraints == freedoms]]
+            if (constraints > freedoms).any() or not tight:
                 return None
+            smallest = [own for own in tight if not any(other != own and other & ~own == 0 for other in tight)]
+            group = min(smallest, key=lambda own: own & -own)
             found.append(set(_members(group)))
             placed |= group
         return found
-
-    def _next_group(self, free: int, placed: int) -> int | None:
-        sets = _subsets(free)
-        constraints = 2 * (self.edges_inside[sets | placed] - self.edges_inside[placed])
-        freedoms = 3 * _sizes(self.links)[sets]
-        if (constraints > freedoms).any():
-            return None
-        tight = [int(own) for own in sets[constraints == freedoms]]
-        smallest = [own for own in tight if not any(other != own and other & ~own == 0 for other in tight)]
-        return min(smallest, key=lambda own: own & -own, default=None)
-
-    def _key_of(self, group: int, placed: int) -> str:
-        members = [link for link in range(self.links) if group >> link & 1]
-        number = {link: at for at, link in enumerate(members, 1)}
-        pairs = {
-            (min(number[a], number.get(b, 0)), max(number[a], number.get(b, 0)))
-            for a in members
-            for b in self.graph[a]
-            if b in number or placed >> b & 1
-        }
-        return group_key(len(members), tuple(sorted(pairs)))
 
 
 @lru_cache(maxsize=4096)
@@ -250,10 +226,6 @@ def _subsets(mask: int) -> Masks:
     for link in _members(mask):
         sets = np.concatenate([sets, sets | 1 << link])
     return sets[1:]
-
-
-def _mask(links: set[int]) -> int:
-    return sum(1 << link for link in links)
 
 
 def _members(mask: int) -> Iterator[int]:

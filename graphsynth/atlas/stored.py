@@ -47,12 +47,8 @@ def data_of(text: str) -> Any:
         depth += 1
         if depth > _DEEPEST:
             raise ValueError(f"its data are more than {_DEEPEST} lists and objects deep")
-        level = [
-            own
-            for one in level
-            for own in (one.values() if isinstance(one, dict) else one)
-            if isinstance(own, dict | list)
-        ]
+        inside = (own for one in level for own in (one.values() if isinstance(one, dict) else one))
+        level = [own for own in inside if isinstance(own, dict | list)]
     return data
 
 
@@ -65,10 +61,7 @@ def mechanism_in(data: Any) -> dict[str, Any] | None:
 def fingerprint(mechanism: dict[str, Any]) -> str:
     """Return what names a set of dimensions: 128 bits of SHA-256 over every key and digit.
 
-    Parameters
-    ----------
-    mechanism : dict
-        As :meth:`graphsynth.Mechanism.to_json` writes it.
+    ``mechanism`` is as :meth:`graphsynth.Mechanism.to_json` writes it.
 
     >>> fingerprint({"a": 1.0, "b": 2}) == fingerprint({"b": 2, "a": 1.0}) != fingerprint({"a": 1.5, "b": 2})
     True
@@ -110,14 +103,14 @@ def stored_mechanisms(connection: sqlite3.Connection, chain_id: int | None = Non
 
 def entry(connection: sqlite3.Connection, chain: dict[str, Any]) -> dict[str, Any]:
     """Return everything known of a chain, ready for JSON; see :meth:`graphsynth.atlas.catalogue.Catalogue.entry`."""
-    number = chain["chain_id"]
 
-    def rows(select: str, value: Any = number) -> list[dict[str, Any]]:
-        return _rows(connection, select, value)
+    def rows(select: str, value: Any = chain["chain_id"]) -> list[dict[str, Any]]:
+        cursor = connection.execute(select, (value,))
+        names = [column[0] for column in cursor.description]
+        return [dict(zip(names, row)) for row in cursor]
 
-    found: dict[str, Any] = {
-        name: value for name, value in chain.items() if name not in ("chain_id", "family_id", "contracted_id")
-    }
+    hidden = ("chain_id", "family_id", "contracted_id")
+    found: dict[str, Any] = {name: value for name, value in chain.items() if name not in hidden}
     found |= {"planar": bool(chain["planar"]), "fractionated": bool(chain["fractionated"])}
     shape = "SELECT vertices, edges FROM contracted WHERE contracted_id = ?"
     found["contracted"] = rows(shape, chain["contracted_id"])[0]
@@ -143,10 +136,3 @@ def entry(connection: sqlite3.Connection, chain: dict[str, Any]) -> dict[str, An
         row["groups"] = [rows(group, int(own))[0] for own in row["groups"].split()]
         row["evaluations"] = dict.fromkeys(KINDS, NOT_COMPUTED) | evaluated.get((row["frame"], row["driver"]), {})
     return found
-
-
-def _rows(connection: sqlite3.Connection, select: str, value: Any) -> list[dict[str, Any]]:
-    """Rows with names."""
-    cursor = connection.execute(select, (value,))
-    names = [column[0] for column in cursor.description]
-    return [dict(zip(names, row)) for row in cursor]

@@ -6,18 +6,18 @@ import random
 import sqlite3
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 from graphsynth.atlas.evaluations import GUARANTEES
-from graphsynth.atlas.rechecking import recheck
-from graphsynth.atlas.references import Reference, wanted_class
+from graphsynth.atlas.rechecking import Same, recheck
+from graphsynth.atlas.references import Reference
 from graphsynth.atlas.sealing import broken_seal
 from graphsynth.atlas.stored import data_of, mechanism_in
 from graphsynth.atlas.tables import wrong_rows
-from graphsynth.structure.assur import is_assur_group
+from graphsynth.structure.assur import contour_class, is_assur_group
 
 _SHOWN = 1000
 
@@ -34,19 +34,10 @@ _KNOWN = {
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """Result of checking a catalogue.
+    """Result of checking a catalogue."""
 
-    Parameters
-    ----------
-    compared : dict of str to int
-        How many values of each field were recomputed and compared.
-    differences : tuple of str
-        One sentence for each difference (the first thousand).
-    seconds : float
-    """
-
-    compared: dict[str, int]
-    differences: tuple[str, ...]
+    compared: dict[str, int]  # how many values of each field were recomputed and compared
+    differences: tuple[str, ...]  # one sentence for each difference (the first thousand)
     seconds: float
 
     @property
@@ -82,6 +73,11 @@ class _Checks:
         if (stored != wanted or type(stored) is not type(wanted)) and len(self.differences) < _SHOWN:
             self.differences.append(f"{where}: {field} is {stored!r}, recomputed {wanted!r}")
 
+    def same_rows(self, field: str, where: str, stored: list[Any], wanted: list[Any]) -> None:
+        self.same(f"{field}: number", where, len(stored), len(wanted))
+        for own, right in zip(stored, wanted):
+            self.same(field, where, own, right)
+
 
 def verify(connection: sqlite3.Connection, chains: int | None, seed: int, quick: bool) -> Verification:
     """Check a catalogue; see :meth:`graphsynth.atlas.catalogue.Catalogue.verify`."""
@@ -107,7 +103,9 @@ def _check_values(connection: sqlite3.Connection, checks: _Checks, chains: int |
     if checks.differences:
         return  # whatever values of another form would have computed
     with checks.whatever("families"):
-        check_families(connection, checks.same, chains is None)
+        select = "SELECT family_id, mobility, links, fractionated, pieces, cut, shard, expected, complete FROM families"
+        for row in connection.execute(select).fetchall():
+            _check_family(connection, checks.same, chains is None, row)
     with checks.whatever("labels"):
         _check_labels(connection, checks)
     with checks.whatever("groups"):
@@ -117,9 +115,14 @@ def _check_values(connection: sqlite3.Connection, checks: _Checks, chains: int |
     with checks.whatever("evaluations"):
         _check_evaluations(connection, checks)
     with checks.whatever("chains"):
-        for number in _chosen(connection, chains, seed):
-            with checks.whatever(f"chain {number}"):
-                _check_chain(connection, checks, number, groups, shapes)
+        for (family,) in connection.execute("SELECT family_id FROM families ORDER BY mobility, links").fetchall():
+            select = "SELECT chain_id FROM chains WHERE family_id = ? ORDER BY key"
+            numbers = [row[0] for row in connection.execute(select, (family,))]
+            if chains is not None and chains < len(numbers):
+                numbers = random.Random(seed).sample(numbers, chains)
+            for number in numbers:
+                with checks.whatever(f"chain {number}"):
+                    _check_chain(connection, checks, number, groups, shapes)
 
 
 def _check_file(connection: sqlite3.Connection, checks: _Checks) -> None:
@@ -135,18 +138,15 @@ def _check_file(connection: sqlite3.Connection, checks: _Checks) -> None:
 
 def _check_labels(connection: sqlite3.Connection, checks: _Checks) -> None:
     rank: Counter[str] = Counter()
-    rows = connection.execute(
-        "SELECT label, mobility, links, assortment FROM chains JOIN families USING (family_id, mobility, links) "
-        "WHERE complete = 1"
-    )
     early = "SELECT COUNT(label) FROM chains JOIN families USING (family_id) WHERE complete = 0"
     checks.same("labels", "of families that are not complete", connection.execute(early).fetchone()[0], 0)
-    held = {row[0] for row in rows.fetchall()}
+    held = set()
     for key, label, mobility, links, assortment in connection.execute(
         "SELECT key, label, mobility, links, assortment FROM chains JOIN families USING (family_id, mobility, links) "
         "WHERE complete = 1 ORDER BY CAST(key AS BLOB)"
     ):
         stem = f"{mobility}.{links}.{assortment}"
+        held.add(label)
         rank[stem] += 1
         checks.same("chains.label", key, label, f"{stem}.{rank[stem]}")
     checks.same("distinct labels", "chains", len(held), sum(rank.values()))
@@ -165,7 +165,8 @@ def _check_groups(connection: sqlite3.Connection, checks: _Checks, found: dict[i
             continue
         checks.same("groups.key", key, is_assur_group(graph), True)
         checks.same("groups.order", key, order, sum(1 for a, _ in pairs if a == 0))
-        checks.same("groups.class", key, own, wanted_class(pairs))
+        bases = ((a, b, 1) if a else (b, -1, 1) for a, b in pairs)
+        checks.same("groups.class", key, own, contour_class(bases))  # by the minimum cycle basis of networkx
         keys[number], facts[number] = key, (own, order)
     for number, groups, own, order in connection.execute('SELECT structure_id, groups, class, "order" FROM structures'):
         members = [int(group) for group in groups.split()]
@@ -225,34 +226,22 @@ def _check_evaluations(connection: sqlite3.Connection, checks: _Checks) -> None:
         checks.same("evaluations.status", where, status in statuses, True)
         checks.same("evaluations.unit", where, unit in (None, own), True)
         checks.same("evaluations.guarantee", where, guarantee is None or guarantee in GUARANTEES, True)
-        checks.same("evaluations.data", where, text is None or _is_json(text), True)
-        if kind == "dimensions" and text is not None and _is_json(text):
-            has = mechanism_in(data_of(text)) is not None
+        right = True
+        try:
+            data = None if text is None else data_of(text)
+        except ValueError:
+            right = False
+        checks.same("evaluations.data", where, right, True)
+        if kind == "dimensions" and text is not None and right:
+            has = mechanism_in(data) is not None
             checks.same("evaluations: dimensions found", where, status == "found", has)
-
-
-def _is_json(text: str) -> bool:
-    try:
-        data_of(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _chosen(connection: sqlite3.Connection, count: int | None, seed: int) -> Iterable[int]:
-    """Numbers of the chains to check: all, or some of each family."""
-    families = [row[0] for row in connection.execute("SELECT family_id FROM families ORDER BY mobility, links")]
-    for family in families:
-        select = "SELECT chain_id FROM chains WHERE family_id = ? ORDER BY key"
-        numbers = [row[0] for row in connection.execute(select, (family,))]
-        if count is not None and count < len(numbers):
-            numbers = random.Random(seed).sample(numbers, count)
-        yield from numbers
 
 
 def _check_chain(
     connection: sqlite3.Connection, checks: _Checks, number: int, structures: dict[int, str], shapes: dict[int, Any]
 ) -> None:
+    import networkx
+
     cursor = connection.execute("SELECT * FROM chains WHERE chain_id = ?", (number,))
     row = dict(zip((column[0] for column in cursor.description), cursor.fetchone()))
     where = f"chain {row['label'] or row['key']}"
@@ -263,8 +252,11 @@ def _check_chain(
         return
     for field, wanted in reference.facts().items():
         checks.same(f"chains.{field}", where, row[field], wanted)
-    shape = shapes.get(row["contracted_id"])
-    checks.same("chains.contracted_id", where, shape is not None and _same_shape(shape, _simple(reference)), True)
+    shape, whole = networkx.Graph(), reference.contracted()
+    shape.add_nodes_from(whole.nodes)
+    shape.add_edges_from((a, b, {"times": whole.number_of_edges(a, b)}) for a, b in set(whole.edges()))
+    held = shapes.get(row["contracted_id"])
+    checks.same("chains.contracted_id", where, held is not None and _same_shape(held, shape), True)
 
     def rows(select: str) -> list[tuple[Any, ...]]:
         return connection.execute(select, (number,)).fetchall()
@@ -272,47 +264,19 @@ def _check_chain(
     parents = [parent for (parent,) in rows("SELECT parent_key FROM dyads WHERE chain_id = ? ORDER BY parent_key")]
     checks.same("dyads", where, parents, reference.parents())
     inversions = rows("SELECT frame, frame_joints, levels FROM inversions WHERE chain_id = ? ORDER BY frame")
-    _same_rows(checks, "inversions", where, inversions, reference.inversions())
+    checks.same_rows("inversions", where, inversions, reference.inversions())
     stored = [
         (frame, tuple(int(link) for link in str(driver).split(",")), structures.get(structure, ""))
         for frame, driver, structure in rows("SELECT frame, driver, structure_id FROM driven WHERE chain_id = ?")
     ]
     wanted_rows = [(frame, drivers, " ".join(groups)) for frame, drivers, groups in reference.mechanisms()]
-    _same_rows(checks, "mechanisms", where, sorted(stored), sorted(wanted_rows))
+    checks.same_rows("mechanisms", where, sorted(stored), sorted(wanted_rows))
     recheck(connection, checks.same, number, reference)
 
 
-def _same_rows(checks: _Checks, field: str, where: str, stored: list[Any], wanted: list[Any]) -> None:
-    checks.same(f"{field}: number", where, len(stored), len(wanted))
-    for own, right in zip(stored, wanted):
-        checks.same(field, where, own, right)
-
-
-def _simple(reference: Reference) -> Any:
-    """Contracted multigraph of a chain as a graph with multiplicities."""
-    import networkx
-
-    whole = reference.contracted()
-    shape = networkx.Graph()
-    shape.add_nodes_from(whole.nodes)
-    shape.add_edges_from((a, b, {"times": whole.number_of_edges(a, b)}) for a, b in set(whole.edges()))
-    return shape
-
-
-#: ``same(field, where, stored, recomputed)``
-Same = Callable[[str, str, Any, Any], None]
-
-
-def check_families(connection: sqlite3.Connection, same: Same, remade: bool) -> None:
-    """Compare every family with its cut, its count and what is published; if ``remade``, the keys of each piece too."""
-    for row in connection.execute(
-        "SELECT family_id, mobility, links, fractionated, pieces, cut, shard, expected, complete FROM families"
-    ).fetchall():
-        _check_family(connection, same, remade, row)
-
-
 def _check_family(connection: sqlite3.Connection, same: Same, remade: bool, row: tuple[Any, ...]) -> None:
-    from graphsynth.atlas.making import fingerprint, problem_of, share_of, tasks_of
+    """Compare a family with its cut, its count and what is published; if ``remade``, the keys of each piece too."""
+    from graphsynth.atlas.making import fingerprint, problem_of, rows_of_task, share_of, tasks_of
     from graphsynth.atlas.statement import PUBLISHED
     from graphsynth.synthesis import count_chains
 
@@ -347,31 +311,15 @@ def _check_family(connection: sqlite3.Connection, same: Same, remade: bool, row:
     if shard == "1/1":
         same("pieces", where, len(held), pieces)
     same("pieces.chains", where, sum(chains for _, _, chains in held), listed)
-    _check_places(connection, same, number, where, held)
-    if remade:
-        for piece, first, chains in held:
-            if piece in own:
-                _remake(connection, same, f"{where}, piece {piece}", own[piece], first, chains)
-
-
-def _check_places(
-    connection: sqlite3.Connection, same: Same, number: int, where: str, held: list[tuple[int, int, int]]
-) -> None:
-    """Pieces lie one behind the other, and in each there are as many chains of the family as it says."""
     end = 1
     for piece, first, chains in held:
+        # pieces lie one behind the other, and in each there are as many chains of the family as it says
         place = f"{where}, piece {piece}"
         same("pieces.first_chain", place, first >= end, True)
         end = first + chains
-        select = "SELECT COUNT(*) FROM chains WHERE family_id = ? AND chain_id BETWEEN ? AND ?"
-        found = connection.execute(select, (number, first, end - 1)).fetchone()[0]
-        same("pieces.first_chain", place, found, chains)
-
-
-def _remake(connection: sqlite3.Connection, same: Same, where: str, task: Any, first: int, chains: int) -> None:
-    """Compare the keys of a piece with those made now."""
-    from graphsynth.atlas.making import rows_of_task
-
-    select = "SELECT key FROM chains WHERE chain_id BETWEEN ? AND ? ORDER BY chain_id"
-    stored = [row[0] for row in connection.execute(select, (first, first + chains - 1))]
-    same("pieces.piece", where, stored, [chain[0] for chain in rows_of_task(task).chains])
+        select = "SELECT key, family_id FROM chains WHERE chain_id BETWEEN ? AND ? ORDER BY chain_id"
+        stored = connection.execute(select, (first, end - 1)).fetchall()
+        same("pieces.first_chain", place, sum(family == number for _, family in stored), chains)
+        if remade and piece in own:
+            keys = [chain[0] for chain in rows_of_task(own[piece]).chains]
+            same("pieces.piece", place, [key for key, _ in stored], keys)

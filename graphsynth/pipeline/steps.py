@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from operator import le
 from typing import TYPE_CHECKING, Any
@@ -69,81 +69,57 @@ def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> Iterato
 
     A `TooLargeError` says that there are more than ``limit``, a `SceneError` that there is none.
     """
-    count = 0
-    for graph in _mechanisms(context):
-        _refuse_more(context, count)
-        count += 1
-        yield Candidate(count, graph, assortment_text(graph))
-    _refuse_none(context, count, solutions)
+    for number, graph in enumerate(mechanisms(context, solutions), 1):
+        yield Candidate(number, graph, assortment_text(graph))
 
 
-def check_count(context: Context, solutions: tuple[LinkAssortment, ...]) -> None:
-    """List the candidates once without keeping them, and refuse what `generate` would, before its first candidate."""
-    count = 0
-    for _ in _mechanisms(context):
-        _refuse_more(context, count)
-        count += 1
-    _refuse_none(context, count, solutions)
+def mechanisms(context: Context, solutions: tuple[LinkAssortment, ...]) -> Iterator[MechanismGraph]:
+    """Yield what passes the filters, as long as listing alone does not use up the time of ``[budget]``.
 
-
-def _refuse_more(context: Context, count: int) -> None:
-    limit = _structure(context).generate.limit
-    if count == limit:
-        raise TooLargeError(
-            f"{context.scene.place / 'structure' / 'generate'} the question has more than limit = {limit} "
-            "mechanisms; raise the limit, or fix more variables of the question"
-        )
-
-
-def _refuse_none(context: Context, count: int, solutions: tuple[LinkAssortment, ...]) -> None:
-    if not count:
+    It raises what `generate` raises.
+    """
+    budget, limit = context.scene.budget.time, _structure(context).generate.limit
+    spent, listed = 0.0, 0
+    start = time.perf_counter()
+    for graph in _filtered(context):
+        spent += time.perf_counter() - start
+        if budget is not None and spent > budget:
+            raise SceneError(
+                f"{context.scene.place / 'budget'} stops the run while candidates are listed ({listed} so far): the "
+                f"time of {budget:g} s is used up; raise it, or fix more variables of the question"
+            )
+        if listed == limit:
+            raise TooLargeError(
+                f"{context.scene.place / 'structure' / 'generate'} the question has more than limit = {limit} "
+                "mechanisms; raise the limit, or fix more variables of the question"
+            )
+        listed += 1
+        yield graph
+        start = time.perf_counter()
+    if not listed:
         raise SceneError(
             f"{context.scene.place / 'structure'} gives no candidate ({len(solutions)} integer solutions): nothing "
             "passes the filters of [structure.generate]; relax them"
         )
 
 
-def _mechanisms(context: Context) -> Iterator[MechanismGraph]:
-    """Yield what passes the filters, as long as listing alone does not use up the time of ``[budget]``."""
-    budget = context.scene.budget.time
-    spent, listed, source = 0.0, 0, _filtered(context)
-    while True:
-        start = time.perf_counter()
-        graph = next(source, None)
-        spent += time.perf_counter() - start
-        if graph is None:
-            return
-        if budget is not None and spent > budget:
-            raise SceneError(
-                f"{context.scene.place / 'budget'} stops the run while candidates are listed ({listed} so far): the "
-                f"time of {budget:g} s is used up; raise it, or fix more variables of the question"
-            )
-        listed += 1
-        yield graph
-
-
 def _filtered(context: Context) -> Iterator[MechanismGraph]:
-    options = _structure(context).generate
-    fixed = options.fixed_moving_links
-    for graph in _all(context):
-        if fixed is not None and not has_threefold_symmetry(graph, fixed):
-            continue
-        if not options.planar or graph.is_planar:
-            yield graph
-
-
-def _all(context: Context) -> Iterator[MechanismGraph]:
-    """Yield the graphs that are given, or drawn, or all that answer the question."""
+    """Yield of the graphs that are given, or drawn, or answer the question those that pass the filters."""
     from graphsynth.synthesis import enumerate_mechanisms, sample_mechanisms
 
-    table = _structure(context)
+    table, options = _structure(context), _structure(context).generate
+    found: Iterable[MechanismGraph]
     if table.graphs:
-        yield from (_read(context, i, text) for i, text in enumerate(table.graphs))
-    elif table.generate.sample is not None:
-        drawn = sample_mechanisms(_spec(context), table.generate.sample, context.scene.scene.seed)
-        yield from {graph.key: graph for graph in drawn}.values()
+        found = (_read(context, i, text) for i, text in enumerate(table.graphs))
+    elif options.sample is not None:
+        drawn = sample_mechanisms(_spec(context), options.sample, context.scene.scene.seed)
+        found = {graph.key: graph for graph in drawn}.values()
     else:
-        yield from enumerate_mechanisms(_spec(context), symmetry=table.generate.symmetry)
+        found = enumerate_mechanisms(_spec(context), symmetry=options.symmetry)
+    fixed = options.fixed_moving_links
+    for graph in found:
+        if (fixed is None or has_threefold_symmetry(graph, fixed)) and (not options.planar or graph.is_planar):
+            yield graph
 
 
 def _read(context: Context, place: int, text: str) -> MechanismGraph:
@@ -217,7 +193,6 @@ def has_threefold_symmetry(graph: MechanismGraph, fixed_moving_links: int) -> bo
 #: Words, whether they are good news, and margins, from the value of an outcome.
 Verdict = Callable[[Any], tuple[str, bool, tuple[Quantity, ...]]]
 
-
 #: The reason of a candidate that no module knows: not a failure.
 UNKNOWN = "no kinematic module yet recognises this graph"
 
@@ -236,18 +211,17 @@ def records_of(
 ) -> tuple[Record, ...]:
     """Return one record per candidate, in their order; `verdict` reads the value of an outcome."""
     by_number = {outcome.candidate.number: outcome for outcome in outcomes}
-    return tuple(_record(item, by_number.get(item.candidate.number), verdict) for item in recognised)
-
-
-def _record(item: Recognised, outcome: Attempt | None, verdict: Verdict) -> Record:
-    candidate = item.candidate
-    number, key, solution = candidate.number, candidate.graph.key, candidate.solution
-    if outcome is None or item.module is None:
-        return Record(number, key, solution, "not recognised", reason=item.reason)
-    if outcome.failed:
-        return Record(number, key, solution, "failed", item.module, reason=outcome.reason)
-    words, good, margins = verdict(outcome.value)
-    return Record(number, key, solution, "assessed", item.module, words, good, margins)
+    found = []
+    for item in recognised:
+        outcome = by_number.get(item.candidate.number)
+        own = item.candidate.number, item.candidate.key, item.candidate.solution
+        if outcome is None or item.module is None:
+            found.append(Record(*own, "not recognised", reason=item.reason))
+        elif outcome.failed:
+            found.append(Record(*own, "failed", item.module, reason=outcome.reason))
+        else:
+            found.append(Record(*own, "assessed", item.module, *verdict(outcome.value)))
+    return tuple(found)
 
 
 def records(context: Context, outcomes: tuple[Outcome, ...]) -> tuple[Record, ...]:
@@ -257,21 +231,14 @@ def records(context: Context, outcomes: tuple[Outcome, ...]) -> tuple[Record, ..
     ... # doctest: +ELLIPSIS
     Record(number=2, key='k', ..., status='rejected', ..., reason='too long: 3 m', cause='goals: too long')
     """
-    return tuple(map(_record_of, outcomes))
-
-
-def _record_of(outcome: Outcome) -> Record:
-    if outcome.status == "assessed":
-        record: Record = outcome.products["record"]
-        return replace(record, number=outcome.number, key=outcome.key, solution=outcome.solution)
-    return Record(
-        outcome.number,
-        outcome.key,
-        outcome.solution,
-        outcome.status,
-        reason=outcome.reason,
-        cause=f"{outcome.stage}: {outcome.cause}",
-    )
+    found = []
+    for outcome in outcomes:
+        own = outcome.number, outcome.key, outcome.solution
+        record = Record(*own, outcome.status, reason=outcome.reason, cause=f"{outcome.stage}: {outcome.cause}")
+        if outcome.status == "assessed":
+            record = replace(outcome.products["record"], number=own[0], key=own[1], solution=own[2])
+        found.append(record)
+    return tuple(found)
 
 
 _MOST = 60  # more is not a contact sheet any more
@@ -281,29 +248,21 @@ def pictures(
     context: Context, candidates: tuple[object, ...], recognised: tuple[Recognised, ...]
 ) -> tuple[Picture, ...]:
     """Draw every candidate by adjacency levels, the recognised ones first and larger; at most sixty."""
-    chosen = sorted(recognised, key=lambda r: (r.module is None, r.candidate.number))[:_MOST]
-    return tuple(_picture(item) for item in chosen)
-
-
-def _picture(item: Recognised) -> Picture:
     from graphsynth.drawing.graphs import draw_levels
 
-    graph, known = item.candidate.graph, item.module is not None
-    title = f"No. {item.candidate.number}"
-    caption = (
-        f"Recognised as {item.module}; {item.candidate.solution}, levels of {_sizes(graph)} links" if known else ""
-    )
-    return Picture(
-        title, draw_levels(graph, 460 if known else 210, f"{title}, by levels"), caption, "wide" if known else "small"
-    )
-
-
-def _sizes(graph: object) -> str:
-    return ", ".join(str(len(level)) for level in graph.levels)  # type: ignore[attr-defined]
+    found = []
+    for item in sorted(recognised, key=lambda r: (r.module is None, r.candidate.number))[:_MOST]:
+        graph, title, known = item.candidate.graph, f"No. {item.candidate.number}", item.module is not None
+        svg = draw_levels(graph, 460 if known else 210, f"{title}, by levels")
+        sizes = ", ".join(str(len(level)) for level in graph.levels)
+        caption = f"Recognised as {item.module}; {item.candidate.solution}, levels of {sizes} links" if known else ""
+        found.append(Picture(title, svg, caption, "wide" if known else "small"))
+    return tuple(found)
 
 
 #: Decimals of a score: what differs by rounding alone is a tie.
 DIGITS = 12
+_SIGNS = {"min": 1.0, "max": -1.0}
 
 
 def rank(context: Context, records: tuple[Record, ...]) -> Ranking:
@@ -349,7 +308,10 @@ def ranking_of(objectives: tuple[Objective, ...], records: Sequence[Record]) -> 
             unranked.append((record.number, "no " + ", no ".join(lacking)))
         else:
             values[record.number] = row
-    losses = {number: tuple(map(_loss, objectives, row)) for number, row in values.items()}
+    losses = {}  # what is to be small
+    for number, row in values.items():
+        pairs = zip(objectives, row, strict=True)
+        losses[number] = tuple(x * _SIGNS[o.goal] if isinstance(o.goal, str) else abs(x - o.goal) for o, x in pairs)
     scores = _scores(objectives, losses)
     front = set(_front(losses))
     columns = [sorted(column) for column in zip(*losses.values(), strict=True)]
@@ -365,13 +327,6 @@ def ranking_of(objectives: tuple[Objective, ...], records: Sequence[Record]) -> 
         len(numbers),
         len(front),
     )
-
-
-def _loss(objective: Objective, value: float) -> float:
-    """Return what is to be small."""
-    if isinstance(objective.goal, str):
-        return value if objective.goal == "min" else -value
-    return abs(value - objective.goal)
 
 
 def _scores(objectives: Sequence[Objective], losses: dict[int, tuple[float, ...]]) -> dict[int, float]:
@@ -393,11 +348,8 @@ def _front(losses: dict[int, tuple[float, ...]]) -> list[int]:
 
     In lexicographic order a row can only be beaten by an earlier one, and if so then by one of the front.
     """
-    front: list[int] = []
-    rows: list[tuple[float, ...]] = []  # of the front
-    for number in sorted(losses, key=lambda n: (losses[n], n)):
-        row = losses[number]
-        if not any(all(map(le, other, row)) and other != row for other in rows):
-            front.append(number)
-            rows.append(row)
-    return front
+    front: dict[int, tuple[float, ...]] = {}
+    for row, number in sorted((row, number) for number, row in losses.items()):
+        if not any(all(map(le, other, row)) and other != row for other in front.values()):
+            front[number] = row
+    return list(front)

@@ -48,10 +48,8 @@ class SiteReport:
     chains, motions : int
         Chains shown, and those of them shown in motion.
     files : int
-    size : int
-        Bytes in all.
-    first_load : int
-        Bytes that a browser reads before the page can be used.
+    size, first_load : int
+        Bytes in all, and those that a browser reads before the page can be used.
     """
 
     page: Path
@@ -131,9 +129,15 @@ def _write(
     watch: Watch | None,
 ) -> tuple[int, int, int, int, int]:
     """Write all files; return what a report holds after its page."""
+    from graphsynth.core.ordered import in_order
+
     data = folder / "data"
     data.mkdir()
-    stored = _best_stored(catalogue) if motion_links else {}
+    stored: dict[int, str] = {}  # the mechanism that ``catalogue.mechanism`` gives, as JSON, for each chain with one
+    if motion_links:
+        with catalogue.reading():
+            for own in stored_mechanisms(catalogue.connection):
+                stored.setdefault(own.chain_id, own.text)
     tasks = [
         MotionTask(row["label"], row["key"], stored.get(row["chain_id"]), family.links <= motion_links)
         for family in found
@@ -143,10 +147,24 @@ def _write(
     chains = sum(len(family.rows) for family in found)
     # a motion takes about as long as ten sketches
     progress = _Progress(chains + 10 * len(tasks), watch)
-    motions = dict(_motions(folder, tasks, executor, progress))
-    _write_families(catalogue, found, data, executor, progress)
+    motions: dict[str, dict[str, Any]] = {}
+    (folder / "motions").mkdir()
+    for shown in in_order(executor, motion_of, tasks):
+        if shown.page:
+            _put(folder / "motions" / f"{shown.label}.html", shown.page)
+            _put(folder / "motions" / f"{shown.label}.toml", shown.mechanism)
+        progress.add("motions", 10)
+        motions[shown.label] = shown.facts
+    places = {row["key"]: (family.name, k) for family in found for k, row in enumerate(family.rows)}
     first, room = [], _FIRST_LOAD
     for family in found:
+        with catalogue.reading():
+            text, relatives = family_script(family), relatives_script(catalogue.connection, family, places)
+        _put(data / f"family-{family.name}.js", text)
+        _put(data / f"relatives-{family.name}.js", relatives)
+        for name, sketches, count in sketch_scripts(family, executor):
+            _put(data / name, sketches)
+            progress.add("sketches", count)
         size = (data / f"family-{family.name}.js").stat().st_size
         if size <= room:
             room -= size
@@ -159,48 +177,9 @@ def _write(
     loaded = [*_write_pages(folder, first), data / "contents.js", *(data / f"family-{name}.js" for name in first)]
     _put(folder / MARK, "This folder is written by 'graphsynth catalog site' and replaced by it.\n")
     everything = [path for path in folder.rglob("*") if path.is_file()]
-    shown = sum("frame" in facts for facts in motions.values())
+    moving = sum("frame" in facts for facts in motions.values())
     size, first_load = (sum(path.stat().st_size for path in paths) for paths in (everything, loaded))
-    return chains, shown, len(everything), size, first_load
-
-
-def _best_stored(catalogue: Catalogue) -> dict[int, str]:
-    """Return the mechanism that ``catalogue.mechanism`` gives, as JSON, for each chain that has one."""
-    found: dict[int, str] = {}
-    with catalogue.reading():
-        for own in stored_mechanisms(catalogue.connection):
-            found.setdefault(own.chain_id, own.text)
-    return found
-
-
-def _motions(
-    folder: Path, tasks: list[MotionTask], executor: Executor | None, progress: _Progress
-) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Write the pages of motions; yield label and facts."""
-    from graphsynth.core.ordered import in_order
-
-    place = folder / "motions"
-    place.mkdir()
-    for shown in in_order(executor, motion_of, tasks):
-        if shown.page:
-            _put(place / f"{shown.label}.html", shown.page)
-            _put(place / f"{shown.label}.toml", shown.mechanism)
-        progress.add("motions", 10)
-        yield shown.label, shown.facts
-
-
-def _write_families(
-    catalogue: Catalogue, found: list[Family], data: Path, executor: Executor | None, progress: _Progress
-) -> None:
-    places = {row["key"]: (family.name, k) for family in found for k, row in enumerate(family.rows)}
-    for family in found:
-        with catalogue.reading():
-            own, relatives = family_script(family), relatives_script(catalogue.connection, family, places)
-        _put(data / f"family-{family.name}.js", own)
-        _put(data / f"relatives-{family.name}.js", relatives)
-        for name, text, count in sketch_scripts(family, executor):
-            _put(data / name, text)
-            progress.add("sketches", count)
+    return chains, moving, len(everything), size, first_load
 
 
 def _write_pages(folder: Path, first: list[str]) -> list[Path]:
@@ -257,20 +236,17 @@ def replaced(folder: Path) -> Iterator[tuple[Path, Path]]:
         new.mkdir()
         yield target, new
         _check(folder, target)  # it may have changed meanwhile
-        _exchange(target, new, beside / "old")
+        old = beside / "old"
+        try:
+            if target.exists():
+                target.rename(old)
+            new.rename(target)
+        except OSError as error:
+            if old.exists() and not target.exists():
+                old.rename(target)
+            raise unwritten(error, target) from None
     finally:
         shutil.rmtree(beside, ignore_errors=True)
-
-
-def _exchange(target: Path, new: Path, old: Path) -> None:
-    try:
-        if target.exists():
-            target.rename(old)
-        new.rename(target)
-    except OSError as error:
-        if old.exists() and not target.exists():
-            old.rename(target)
-        raise unwritten(error, target) from None
 
 
 def unwritten(error: OSError, place: Path) -> GraphsynthError:
@@ -290,21 +266,18 @@ def _check(folder: Path, target: Path) -> None:
         raise GraphsynthError(f"{folder} is a file; name a folder")
     if target.is_mount() or target == parent:
         raise GraphsynthError(f"{folder} is the root of a file system, which cannot be replaced; name a folder in it")
-    if target.is_dir() and any(target.iterdir()):
-        other = _other(target)
-        if other:
-            raise GraphsynthError(f"{folder} holds other files ({other}); name an empty or a new folder")
+    others = (own.name for own in target.iterdir()) if target.is_dir() else iter(())
+    if (target / MARK).is_file():
+        others = (str(own.relative_to(target)) for own in sorted(target.rglob("*")) if not _is_of_page(own, target))
+    other = min(others, default="")
+    if other:
+        raise GraphsynthError(f"{folder} holds other files ({other}); name an empty or a new folder")
 
 
-def _other(target: Path) -> str:
-    """First thing in a folder that is not of a page; empty if there is none."""
-    if not (target / MARK).is_file():
-        return min(own.name for own in target.iterdir())
-    for own in sorted(target.rglob("*")):
-        inside = own.relative_to(target)
-        plain = not own.is_symlink()
-        if own.is_dir() and plain and str(inside) in _OWN:
-            continue
-        if not (own.is_file() and plain and (str(inside) == MARK or own.suffix in _OWN.get(str(inside.parent), ()))):
-            return str(inside)
-    return ""
+def _is_of_page(own: Path, target: Path) -> bool:
+    inside = own.relative_to(target)
+    if own.is_symlink():
+        return False
+    if own.is_dir():
+        return str(inside) in _OWN
+    return own.is_file() and (str(inside) == MARK or own.suffix in _OWN.get(str(inside.parent), ()))

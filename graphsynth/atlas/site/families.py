@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 from graphsynth.structure.canonical import decode_key
@@ -32,12 +33,12 @@ WHERE family_id = ? AND label IS NOT NULL
 """
 
 
-def _rank(label: str) -> int:
-    return int(label.rsplit(".", 1)[1])
+def _rank(row: sqlite3.Row) -> int:
+    return int(row["label"].rsplit(".", 1)[1])
 
 
 def _order(row: sqlite3.Row) -> tuple[list[int], int]:
-    return [-int(count) for count in row["assortment"].split("-")], _rank(row["label"])
+    return [-int(count) for count in row["assortment"].split("-")], _rank(row)
 
 
 def families(connection: sqlite3.Connection) -> list[Family]:
@@ -81,16 +82,6 @@ def script(call: str, *arguments: Any) -> str:
     return f"Atlas.{call}({','.join(texts)});\n"
 
 
-def _runs(family: Family) -> list[list[Any]]:
-    """Assortments with the number of their chains, in order."""
-    found: list[list[Any]] = []
-    for row in family.rows:
-        if not found or found[-1][0] != row["assortment"]:
-            found.append([row["assortment"], 0])
-        found[-1][1] += 1
-    return found
-
-
 def family_script(family: Family) -> str:
     """Write what browsing needs: columns over the chains of a family.
 
@@ -98,12 +89,12 @@ def family_script(family: Family) -> str:
     chain of an assortment has rank k.
     """
     rows = family.rows
-    runs = _runs(family)
-    ranks = [rank for _, count in runs for rank in range(1, count + 1)]
+    runs = [[kind, len(list(own))] for kind, own in groupby(row["assortment"] for row in rows)]
+    ranks = [_rank(row) for row in rows]
     data = {
         "keys": "".join(row["key"] for row in rows),
         "assortments": runs,
-        "ranks": None if ranks == [_rank(row["label"]) for row in rows] else [_rank(row["label"]) for row in rows],
+        "ranks": None if ranks == [rank for _, count in runs for rank in range(1, count + 1)] else ranks,
         "symmetry": [row["automorphisms"] for row in rows],
         "inversions": [row["inversions"] for row in rows],
         "girth": "".join(_digit(row["girth"]) for row in rows),
@@ -140,16 +131,13 @@ def relatives_script(connection: sqlite3.Connection, family: Family, places: dic
     downwards = "SELECT key FROM dyads JOIN chains USING (chain_id) WHERE parent_key = ?"
     parents = [listed(upwards, row["chain_id"], smaller) for row in family.rows]
     children = [listed(downwards, row["key"], larger) for row in family.rows]
-    data = {"parents": parents, "children": children, "evaluations": _evaluations(connection, family)}
-    return script("takeRelatives", family.name, data)
-
-
-def _evaluations(connection: sqlite3.Connection, family: Family) -> dict[int, list[list[Any]]]:
-    """Return what the catalogue has evaluated: by place, [frame, drivers, kind, status, value, unit, guarantee]."""
     query = """SELECT frame, driver, kind, status, value, unit, guarantee FROM evaluations WHERE chain_id = ?
                ORDER BY frame, driver, kind"""
-    found = {k: connection.execute(query, (row["chain_id"],)).fetchall() for k, row in enumerate(family.rows)}
-    return {k: [[frame, str(driver), *rest] for frame, driver, *rest in rows] for k, rows in found.items() if rows}
+    evaluations: dict[int, list[list[Any]]] = {}  # by place
+    for k, row in enumerate(family.rows):
+        for frame, driver, *rest in connection.execute(query, (row["chain_id"],)):
+            evaluations.setdefault(k, []).append([frame, str(driver), *rest])
+    return script("takeRelatives", family.name, {"parents": parents, "children": children, "evaluations": evaluations})
 
 
 def groups_script(connection: sqlite3.Connection) -> str:
@@ -211,9 +199,6 @@ def sketch_scripts(family: Family, executor: Executor | None) -> Iterator[tuple[
         done += len(places)
         if len(held) == PER_FILE or done == len(keys):
             number = (done - 1) // PER_FILE
-            yield (
-                f"sketches-{family.name}-{number}.js",
-                script("takeSketches", family.name, number, "".join(held)),
-                len(held),
-            )
+            text = script("takeSketches", family.name, number, "".join(held))
+            yield f"sketches-{family.name}-{number}.js", text, len(held)
             held = []

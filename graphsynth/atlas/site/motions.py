@@ -61,11 +61,9 @@ def motion_of(task: MotionTask) -> ShownMotion:
     Deterministic.  Where nothing is accepted the page is empty and the statement says why.
     """
     shown = _stored(task) if task.stored is not None else None
-    if shown is not None:
-        return shown
-    if not task.search:
+    if shown is None and not task.search:
         return ShownMotion(task.label, "", "", {"statement": "those of the catalogue make no full turn"})
-    return _searched(task.label, task.key)
+    return shown or _searched(task.label, task.key)
 
 
 def _stored(task: MotionTask) -> ShownMotion | None:
@@ -87,9 +85,8 @@ def _stored(task: MotionTask) -> ShownMotion | None:
         return None
     if not motion.completed:
         return None
-    return _shown(
-        task.label, motion, "dimensions of the catalogue", smallest_transmission(motion), length_ratio(mechanism)
-    )
+    figures = smallest_transmission(motion), length_ratio(mechanism)
+    return _shown(task.label, motion, "dimensions of the catalogue", *figures)
 
 
 def _shown(label: str, motion: Motion, statement: str, transmission: float, ratio: float) -> ShownMotion:
@@ -124,8 +121,7 @@ def _searched(label: str, key: str) -> ShownMotion:
         framed = MechanismGraph(chain.links, chain.joints, frame=frame)
         found = embody(framed, driver=[(frame, link) for link in drivers], tries=_TRIES)
         statement = statement or found.statement
-        if not found.accepted or found.motion is None or found.mechanism is None or found.figures is None:
-            continue
-        figures = found.figures
-        return _shown(label, found.motion, found.statement, figures.transmission_angle, figures.length_ratio)
+        if found.accepted and found.motion is not None and found.figures is not None:
+            figures = found.figures.transmission_angle, found.figures.length_ratio
+            return _shown(label, found.motion, found.statement, *figures)
     return ShownMotion(label, "", "", {"statement": statement})

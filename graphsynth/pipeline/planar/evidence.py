@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 #: Candidates that are given dimensions before the first that moved is taken.
 _LOOKED_AT = 12
+_FIXED = "Not the target of the scene, whose best answer is unknown, but a fixed one, whose best answer is known."
 
 
 def positions(context: Any, effort: Effort) -> Problem:
@@ -73,29 +74,27 @@ def dimensions(context: Any, effort: Effort) -> Problem:
     """Measure the search for a straight line."""
     from graphsynth.evidence.embodiment import line_problem
 
-    return _fixed(line_problem(effort))
+    problem = line_problem(effort)
+    return replace(problem, note=f"{_FIXED} {problem.note}")
 
 
 def path_dimensions(context: Any, effort: Effort) -> Problem:
     """Measure the search for a path."""
     from graphsynth.evidence.embodiment import path_problem
 
-    return _fixed(path_problem(effort))
-
-
-def _fixed(problem: Problem) -> Problem:
-    own = "Not the target of the scene, whose best answer is unknown, but a fixed one, whose best answer is known."
-    return replace(problem, note=f"{own} {problem.note}")
+    problem = path_problem(effort)
+    return replace(problem, note=f"{_FIXED} {problem.note}")
 
 
 def _own(context: Any) -> tuple[Mechanism, str, float]:
     """Return a mechanism of the scene, its name, and the range of its input, radians.
 
-    Raises
-    ------
-    GeometryError
-        If none of the first candidates gets dimensions and moves, or the reference knows none of their joints.
+    Raises `GeometryError` if none of the first candidates gets dimensions and moves, or the 50-digit reference knows
+    none of their joints.
     """
+    import numpy as np
+
+    from graphsynth.evidence.position import precise_points
     from graphsynth.pipeline.planar.stages import embody, move, take
     from graphsynth.structure.assur import decompose
 
@@ -105,7 +104,7 @@ def _own(context: Any) -> tuple[Mechanism, str, float]:
         try:
             built = embody(context, design)
             move(context, built)
-            _known(built.mechanism)
+            precise_points(built.mechanism, np.array([0.0]))
         except SceneError:
             raise
         except Exception as error:  # as in a run: whatever goes wrong with one candidate does not stop the others
@@ -121,12 +120,3 @@ def _own(context: Any) -> tuple[Mechanism, str, float]:
     if first is None:
         raise GeometryError(f"none of the first {_LOOKED_AT} candidates of the scene can be measured: {why}")
     return first
-
-
-def _known(mechanism: Mechanism) -> None:
-    """Refuse what the 50-digit reference does not know."""
-    import numpy as np
-
-    from graphsynth.evidence.position import precise_points
-
-    precise_points(mechanism, np.array([0.0]))

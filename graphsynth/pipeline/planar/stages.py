@@ -16,7 +16,6 @@ from graphsynth.pipeline.stages import Context
 if TYPE_CHECKING:
     from graphsynth.dynamics.elements import MotorDrive
     from graphsynth.dynamics.model import Body, DynamicModel
-    from graphsynth.jamming.joints.limits import Misalignment
     from graphsynth.kinematics.dimensional.goals import Goals, Target
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.laws import Driver
@@ -62,14 +61,15 @@ def take(context: Context) -> Iterator[Candidate | FileCandidate]:
     table: PlanarTable = context.scene.mechanism
     if table.files:
         return iter([_read(context, i, name) for i, name in enumerate(table.files)])
-    from graphsynth.pipeline.steps import check_count, generate, solve
+    from graphsynth.pipeline.steps import generate, mechanisms as listed, solve
 
     try:
         goals_of(table.embody)
     except GraphsynthError as error:
         raise (context.scene.place / "mechanism" / "embody").error(f"asks for what cannot be: {error}") from error
     solutions = solve(context)
-    check_count(context, solutions)
+    for _ in listed(context, solutions):
+        pass  # what `generate` refuses is refused before its first candidate
     return generate(context, solutions)
 
 
@@ -116,24 +116,19 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
 
 def goals_of(table: EmbodyTable) -> Goals:
     """Return the goals of ``[mechanism.embody]``."""
-    from graphsynth.kinematics.dimensional.goals import Goals
+    from graphsynth.kinematics.dimensional.goals import FunctionGoal, Goals, LineGoal, PathGoal, PosesGoal
 
-    return Goals(table.span, table.min_transmission, table.max_length_ratio, _target(table))
-
-
-def _target(table: EmbodyTable) -> Target | None:
-    from graphsynth.kinematics.dimensional.goals import FunctionGoal, LineGoal, PathGoal, PosesGoal
-
+    target: Target | None = None
     if (line := table.line) is not None:
-        return LineGoal(line.length, line.span, line.link, line.on_bar, line.tolerance)
+        target = LineGoal(line.length, line.span, line.link, line.on_bar, line.tolerance)
     if (path := table.path) is not None:
-        return PathGoal(path.points, path.inputs or None, path.link, path.tolerance)
+        target = PathGoal(path.points, path.inputs or None, path.link, path.tolerance)
     if (poses := table.poses) is not None:
         rows = tuple((*p, a) for p, a in zip(poses.points, poses.angles, strict=True))
-        return PosesGoal(rows, poses.inputs, poses.link, poses.tolerance)
+        target = PosesGoal(rows, poses.inputs, poses.link, poses.tolerance)
     if (wanted := table.function) is not None:
-        return FunctionGoal(wanted.inputs, wanted.outputs, wanted.link, wanted.tolerance)
-    return None
+        target = FunctionGoal(wanted.inputs, wanted.outputs, wanted.link, wanted.tolerance)
+    return Goals(table.span, table.min_transmission, table.max_length_ratio, target)
 
 
 def _crank(mechanism: Mechanism) -> float:
@@ -158,7 +153,7 @@ def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
     def times(point: tuple[float, float]) -> tuple[float, float]:
         return point[0] * factor, point[1] * factor
 
-    joints = tuple(replace(joint, at_a=times(joint.at_a), at_b=times(joint.at_b)) for joint in mechanism.joints)
+    joints = tuple(replace(j, at_a=times(j.at_a), at_b=times(j.at_b)) for j in mechanism.joints)
     points = {name: (point.link, times(point.at)) for name, point in mechanism.points.items()}
     pose = mechanism.pose and tuple((x * factor, y * factor, angle) for x, y, angle in mechanism.pose)
     return Mechanism(mechanism.graph, joints, mechanism.drivers, points, pose)  # type: ignore[arg-type]
@@ -179,25 +174,18 @@ def move(context: Context, built: Built) -> Moved:
     if angle < table.motion.min_transmission:
         degrees, least = math.degrees(angle), math.degrees(table.motion.min_transmission)
         raise Rejected("the transmission angle is too small", f"{degrees:.2f} deg, {least:.10g} is asked")
+    # the size: the diagonal of the box that holds all joints and named points over the range
+    places = [motion.point(joint.a, joint.at_a).position for joint in built.mechanism.joints]
+    places += [motion.point(name).position for name in built.mechanism.points]
+    extent = float(np.hypot(*np.ptp(np.concatenate(places), axis=0)))
     margins = (
         *built.margins,
         Quantity.of_si("transmission angle", angle, "deg"),
         Quantity("distance to singularity", float(motion.singularity_distance.min())),
-        Quantity("size", _extent(motion) / _crank(built.mechanism)),
+        Quantity("size", extent / _crank(built.mechanism)),
         exact("links", built.mechanism.graph.links),
     )
     return Moved(built.name, motion, margins)
-
-
-def _extent(motion: Motion) -> float:
-    """Diagonal of the box that holds all joints and named points over the range."""
-    import numpy as np
-
-    mechanism = motion.mechanism
-    places = [motion.point(joint.a, joint.at_a).position for joint in mechanism.joints]
-    places += [motion.point(name).position for name in mechanism.points]
-    low, high = np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
-    return float(np.hypot(*(high - low)))
 
 
 def assess(context: Context, moved: Moved, *parts: Part) -> Record:
@@ -218,14 +206,9 @@ def write(context: Context, moved: Moved) -> dict[str, Any]:
 def mechanisms(context: Context, written: tuple[Outcome, ...]) -> Columns:
     """Lay out the mechanisms that were built, each in the JSON of ``Mechanism.from_json``."""
     built = [outcome for outcome in written if outcome.status == "assessed"]
-    return Columns(
-        "mechanisms",
-        {
-            "number": [outcome.number for outcome in built],
-            "key": [outcome.key for outcome in built],
-            "mechanism": [outcome.products["written"]["mechanism"] for outcome in built],
-        },
-    )
+    texts = [outcome.products["written"]["mechanism"] for outcome in built]
+    columns = {"number": [own.number for own in built], "key": [own.key for own in built], "mechanism": texts}
+    return Columns("mechanisms", columns)
 
 
 def restored(outcome: Outcome) -> Mechanism:
@@ -257,13 +240,21 @@ def jamming(context: Context, moved: Moved) -> Part:
     It is `Rejected` if they jam (or, with ``certify``, are not proved free) and ``must_be_free`` is true.
     """
     from graphsynth.jamming.bearing.bearing import Bearing
-    from graphsynth.jamming.joints import assess_coupled, bearing_limits, certify_coupled
+    from graphsynth.jamming.joints import Misalignment, assess_coupled, bearing_limits, certify_coupled
     from graphsynth.jamming.verdict import Verdict
 
     table: BearingsTable = context.scene.mechanism.bearings
     bearing = Bearing(table.radius_mm, table.height_mm, table.clearance_mm)
     limits = bearing_limits(bearing, table.condition, clearance_tolerance=table.clearance_tolerance_mm)
-    tilt = _tilt(table, moved.motion.mechanism)
+    driver, alpha, spread = moved.motion.mechanism.drivers[0], table.alpha, table.alpha_tolerance
+    tilt = Misalignment(
+        driver.base,
+        driver.link,
+        alpha,
+        table.direction,
+        alpha_range=(max(alpha - spread, 0.0), alpha + spread) if spread else None,
+        direction_range=(0.0, math.tau) if table.any_direction else None,
+    )
     report = assess_coupled(moved.motion, limits, tilt, condition=table.condition)
     verdict, reason = report.verdict, report.reason
     if table.certify:
@@ -286,21 +277,6 @@ def jamming(context: Context, moved: Moved) -> Part:
         Quantity.of_si("worst input", report.worst_input, "deg"),
     )
     return Part(f"bearings: {verdict.value}", good, margins, reason if verdict is Verdict.UNDECIDED else "")
-
-
-def _tilt(table: BearingsTable, mechanism: Mechanism) -> Misalignment:
-    from graphsynth.jamming.joints.limits import Misalignment
-
-    driver = mechanism.drivers[0]
-    alpha, spread = table.alpha, table.alpha_tolerance
-    return Misalignment(
-        driver.base,
-        driver.link,
-        alpha,
-        table.direction,
-        alpha_range=(max(alpha - spread, 0.0), alpha + spread) if spread else None,
-        direction_range=(0.0, math.tau) if table.any_direction else None,
-    )
 
 
 def dynamics(context: Context, moved: Moved) -> Part:

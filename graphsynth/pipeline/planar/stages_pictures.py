@@ -31,27 +31,23 @@ def sketches(
     context: Context, written: tuple[Outcome, ...], ranking: Ranking, records: tuple[Record, ...]
 ) -> tuple[Picture, ...]:
     """Draw the best candidates where their joints are well apart."""
+    import numpy as np
+
     from graphsynth.drawing.diagram import mechanism_svg
 
     by_number = {record.number: record for record in records}
     pictures = []
     for place, (number, motion) in enumerate(_best(context, written, ranking), 1):
-        svg = mechanism_svg(motion, _clear(motion), width=420, height=320, title=f"Place {place}")
+        # the sample in which the nearest two joints of different links are farthest apart
+        joints = np.stack([motion.point(j.a, j.at_a).position for j in motion.mechanism.joints], axis=1)
+        apart = np.linalg.norm(joints[:, :, None] - joints[:, None], axis=-1) + 1e9 * np.eye(joints.shape[1])
+        clear = int(apart.min(axis=(1, 2)).argmax())
+        svg = mechanism_svg(motion, clear, width=420, height=320, title=f"Place {place}")
         record = by_number[number]
         margins = ", ".join(f"{m.name} {m.value:.3g}{' ' + m.unit if m.unit else ''}" for m in record.margins[:5])
         text = f"{record.verdict[:1].upper()}{record.verdict[1:]}: {margins}."
         pictures.append(Picture(f"Place {place}: candidate {number}", svg, text))
     return tuple(pictures)
-
-
-def _clear(motion: Motion) -> int:
-    """Return the sample in which the nearest two joints of different links are farthest apart."""
-    import numpy as np
-
-    places = np.stack([motion.point(j.a, j.at_a).position for j in motion.mechanism.joints], axis=1)
-    apart = np.linalg.norm(places[:, :, None] - places[:, None], axis=-1)
-    apart += 1e9 * np.eye(places.shape[1])
-    return int(apart.min(axis=(1, 2)).argmax())
 
 
 def animations(
@@ -64,9 +60,8 @@ def animations(
     pictures = []
     for place, (number, motion) in enumerate(_best(context, written, ranking), 1):
         title = f"Place {place}: candidate {number}"
-        svg = animated_svg(
-            with_trace_points(motion), frames=_FRAMES, title=title, seconds=4.0, width=420.0, height=320.0
-        )
+        traced = with_trace_points(motion)
+        svg = animated_svg(traced, frames=_FRAMES, title=title, seconds=4.0, width=420.0, height=320.0)
         pictures.append(Picture(title, svg, next(r.solution for r in records if r.number == number)))
     return tuple(pictures)
 

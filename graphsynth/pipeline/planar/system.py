@@ -51,11 +51,6 @@ SYSTEM = System(
     ),
     more=_more,
     evidence=plans(
-        f"{_HERE}.evidence",
-        "positions",
-        "coupled-joints",
-        "linkage-dynamics",
-        "dimensions",
-        "path-dimensions",
+        f"{_HERE}.evidence", "positions", "coupled-joints", "linkage-dynamics", "dimensions", "path-dimensions"
     ),
 )
