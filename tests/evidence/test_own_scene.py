@@ -85,7 +85,7 @@ def _nothing():
 
 def test_the_platform_is_the_one_that_the_stage_moves():
     context = Context(load_scene("didenko"))
-    found, table = platform._mechanism(context), context.scene.mechanism
+    found, table = platform.platform_of(context), context.scene.mechanism
     assert found.crank == table.crank and found.l1 == (table.arm,) * 3
     assert (found.gears.z1, found.gears.z2) == (table.pinion_teeth, table.wheel_teeth)
 

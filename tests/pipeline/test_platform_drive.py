@@ -160,11 +160,11 @@ def test_the_real_machine_has_its_motor_in_its_own_scene() -> None:
     from graphsynth.pipeline.scene import load_scene
     from graphsynth.pipeline.stages import Context
     from graphsynth.systems.platform.motor_stages import drive_machine, tables
-    from graphsynth.systems.platform.stages import PlatformMotion, _mechanism
+    from graphsynth.systems.platform.stages import PlatformMotion, platform_of
 
     scene = load_scene("didenko")
     assert {"drive_tables", "drive_curves"} <= set(scene.outputs.products)
-    machine = _mechanism(scene.mechanism)
+    machine = platform_of(Context(scene))
     moved = PlatformMotion(machine, *[None] * 8)  # type: ignore[arg-type]  # the drive needs the mechanism alone
     runs = drive_machine(Context(scene), (Attempt(None, moved),))  # type: ignore[arg-type]
     assert [item.label for item in runs] == ["5 ohm", "20 ohm"]

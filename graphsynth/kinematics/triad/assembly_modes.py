@@ -342,8 +342,12 @@ class Sextic(NamedTuple):
     d: tuple[Any, Any]
 
 
-def coefficients(A: Sequence[Any], b: Sequence[Any], lengths: Sequence[Any], c: Callable[[Any], Any]) -> Sextic:
-    """Coefficients for three anchors, vertices and leg lengths; c is the complex conjugate in their arithmetic."""
+_Three = Sequence[Any]
+_Map = Callable[[Any], Any]
+
+
+def coefficients(A: _Three, b: _Three, lengths: _Three, c: _Map, i: _Map = lambda x: 1j * x) -> Sextic:
+    """Coefficients for anchors, vertices and leg lengths; c conjugates in their arithmetic, i multiplies by i."""
 
     def square(z: Any) -> Any:
         return z.real * z.real + z.imag * z.imag
@@ -351,13 +355,13 @@ def coefficients(A: Sequence[Any], b: Sequence[Any], lengths: Sequence[Any], c: 
     def offset(k: int, a: Any, v: Any) -> Any:
         return (lengths[k] - lengths[0]) * (lengths[k] + lengths[0]) - square(a) - square(v)
 
-    a2, a3, b2, b3, L = A[1] - A[0], A[2] - A[0], b[1] - b[0], b[2] - b[0], lengths[0] ** 2
+    a2, a3, b2, b3, L = A[1] - A[0], A[2] - A[0], b[1] - b[0], b[2] - b[0], lengths[0] * lengths[0]
     w20, w30, w21, w31 = offset(1, a2, b2), offset(2, a3, b3), b2 * c(a2), b3 * c(a3)
     n2 = w21 * b3 - w31 * b2
     n1 = w20 * b3 - w21 * a3 - w30 * b2 + w31 * a2
     n0 = -w20 * a3 + c(w21) * b3 + w30 * a2 - c(w31) * b2
     nm = -c(w21) * a3 + c(w31) * a2
-    d0, de = 2j * (c(b2) * b3 + c(a2) * a3).imag, b2 * c(a3) - c(a2) * b3
+    d0, de = i(2 * (c(b2) * b3 + c(a2) * a3).imag), b2 * c(a3) - c(a2) * b3
     g0 = square(n2) + square(n1) + square(n0) + square(nm) - L * (square(d0) + 2 * square(de))
     g1 = n2 * c(n1) + n1 * c(n0) + n0 * c(nm) + 2 * L * d0 * de
     g2 = n2 * c(n0) + n1 * c(nm) + L * de * de

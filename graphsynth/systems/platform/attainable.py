@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,10 +48,8 @@ def ellipticity(phasor: ArrayLike, Lc: float) -> float:
     >>> ellipticity([1.0, 1j, 0.0], 45.0), ellipticity([1.0, 2.0, 0.0], 45.0)
     (1.0, 0.0)
     """
-    first, second, third = (
-        plane_point(f"phasor of {n}", v) for n, v in zip(("x", "y", "alpha"), three("phasor", phasor))
-    )
-    scaled = np.array([first, second, third]) * np.array([1.0, 1.0, positive("Lc", Lc)])
+    parts = zip(("x", "y", "alpha"), three("phasor", phasor))
+    scaled = np.array([plane_point(f"phasor of {name}", v) for name, v in parts]) * [1.0, 1.0, positive("Lc", Lc)]
     axes = np.linalg.svd(np.column_stack([scaled.real, scaled.imag]), compute_uv=False)
     return float(axes[1] / axes[0]) if axes[0] > 0.0 else 0.0
 
@@ -118,34 +115,21 @@ def lengths_only_design(
     >>> lengths_only_design(legs, [2.0, 1.0, 0.0]).error < 1e-3
     True
     """
-    target = _wanted(wanted)
-    theory = small_crank(mechanism)
+    target, theory = _wanted(wanted), small_crank(mechanism)
     scale = np.array([1.0, 1.0, mechanism.Lc])
     G = _gains(mechanism)
     stacked = np.concatenate([G.real, G.imag])
     if free_phase:
-        target = target * _best_phase(stacked, target * scale)
+        left, values, _ = np.linalg.svd(stacked, full_matrices=False)
+        basis = left[:, values > 1e-12 * values[0]]  # of the span that the product shall be nearest to
+        pair = [np.concatenate([w.real, w.imag]) for w in (target * scale, 1j * target * scale)]
+        best = complex(*np.linalg.svd(basis.T @ np.column_stack(pair))[2][0])
+        target = target * (best if best.real >= 0.0 else -best)
     right = target * scale
     lengths = np.linalg.lstsq(stacked, np.concatenate([right.real, right.imag]), rcond=1e-12)[0]
     phase = np.array(mechanism.phase) + np.where(lengths < 0.0, np.pi, 0.0)
-    size = np.abs(lengths)
-    designed = replace(
-        mechanism,
-        crank=(float(size[0]), float(size[1]), float(size[2])),
-        phase=(float(phase[0]), float(phase[1]), float(phase[2])),
-    )
+    designed = replace(mechanism, crank=tuple(np.abs(lengths).tolist()), phase=tuple(phase.tolist()))
     return assess_design(designed, target, theory.home, samples=samples)
-
-
-def _best_phase(stacked: Array, wanted: Complex) -> complex:
-    """Return the unit factor of ``wanted`` whose product is nearest to the span of the columns."""
-    left, values, _ = np.linalg.svd(stacked, full_matrices=False)
-    basis = left[:, values > 1e-12 * values[0]]
-    pair = np.column_stack([np.concatenate([w.real, w.imag]) for w in (wanted, 1j * wanted)])
-    cosine, sine = np.linalg.svd(basis.T @ pair)[2][0]
-    if cosine < 0.0:
-        cosine, sine = -cosine, -sine
-    return complex(cosine, sine)
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,96 +180,59 @@ def two_pose_design(
     if any(pose.shape != (3,) for pose in poses):
         raise GeometryError("first and second must hold three numbers each: x, y, alpha")
     still = replace(mechanism, crank=(0.0, 0.0, 0.0))
-    sigma = tuple(int(s) for s in mechanism.platform.working_mode(still.home_pose(0.0), still.drive(0.0).theta))
-    ends = []
-    for name, pose in zip(("first", "second"), poses):
-        solution = mechanism.platform.inverse(pose, sigma)
-        if not np.isfinite(solution.theta).all():
-            leg = int(np.flatnonzero(~np.isfinite(solution.theta))[0])
-            reason = f"leg {leg + 1} does not reach the {name} pose; {solution.deficit[leg]:.6g} missing"
-            return _rejected(None, reason)
-        ends.append(_rocker_ends(mechanism, solution.theta))
-    designed, notes, other = _drives(mechanism, ends[0], ends[1])
-    if designed is None:
-        return _rejected(None, notes[0])
-    return _verified(designed, sigma, poses, notes, other, samples)
+    platform, turn = mechanism.platform, np.exp(1j * np.array(mechanism.frame_angle))
+    sigma = tuple(int(s) for s in platform.working_mode(still.home_pose(0.0), still.drive(0.0).theta))
+    solutions = [platform.inverse(pose, sigma) for pose in poses]
+    for name, solution in zip(("first", "second"), solutions):
+        for leg in np.flatnonzero(~np.isfinite(solution.theta))[:1]:
+            missing = f"{solution.deficit[leg]:.6g} missing"
+            return _rejected(None, f"leg {leg + 1} does not reach the {name} pose; {missing}")
+    base = (np.array(mechanism.pivot) - np.array(mechanism.axis)) * turn
+    ends = np.array([solution.theta - np.array(mechanism.delta) for solution in solutions])
+    plus, minus = base + np.array(mechanism.rocker) * np.exp(1j * ends)  # from the wheel axes to the joints C
+    far, near = np.abs(plus), np.abs(minus)
+    for k in np.flatnonzero(far + near == 0.0)[:1]:
+        return _rejected(None, f"drive {k + 1}: both rocker ends lie on the wheel axis")
+    held = np.abs(far - near) <= 2e-15 * (far + near)
+    with np.errstate(all="ignore"):
+        other = np.where(held, np.nan, math.pi + np.angle(minus / plus))
+    crank = np.where(held, 0.0, 0.5 * np.abs(far - near))
+    phase = np.where(held, 0.0, np.angle(plus) + np.where(far > near, 0.0, math.pi))
+    notes = [f"leg {k + 1} must not move: its crank length is 0" for k in np.flatnonzero(held)]
+    if held.all():
+        notes.append("both poses need the same rocker distances: all cranks are zero (trivial)")
+    lengths = {"crank": crank, "coupler": 0.5 * (far + near), "phase": phase}
+    changes: dict[str, Any] = {name: tuple(values.tolist()) for name, values in lengths.items()}
+    return _verified(replace(mechanism, **changes), solutions[0].theta, poses, tuple(notes), other, samples)
 
 
 def _rejected(mechanism: SingleMotorPlatform | None, reason: str, notes: tuple[str, ...] = ()) -> TwoPoseDesign:
     return TwoPoseDesign(mechanism, False, reason, notes, np.full(3, np.nan), math.nan, math.nan, math.nan, None)
 
 
-def _rocker_ends(mechanism: SingleMotorPlatform, theta: Array) -> list[complex]:
-    """Vectors from the wheel axes to the joints C, fixed frame."""
-    turn = np.exp(1j * np.array(mechanism.frame_angle))
-    phi = theta - np.array(mechanism.delta)
-    C = (np.array(mechanism.pivot) - np.array(mechanism.axis)) * turn + np.array(mechanism.rocker) * np.exp(1j * phi)
-    return [complex(c) for c in C]
-
-
-def _drives(
-    mechanism: SingleMotorPlatform, plus: list[complex], minus: list[complex]
-) -> tuple[SingleMotorPlatform | None, tuple[str, ...], Array]:
-    crank, coupler, phase, notes, other = [], [], [], [], []
-    for k, (a, b) in enumerate(zip(plus, minus)):
-        far, near = abs(a), abs(b)
-        if far + near == 0.0:
-            return None, (f"drive {k + 1}: both rocker ends lie on the wheel axis",), np.full(3, np.nan)
-        length = 0.5 * abs(far - near)
-        still = length <= 1e-15 * (far + near)
-        crank.append(0.0 if still else length)
-        coupler.append(0.5 * (far + near))
-        phase.append(0.0 if still else cmath.phase(a) + (0.0 if far > near else math.pi))
-        other.append(math.nan if still else math.pi + cmath.phase(b / a))
-        if still:
-            notes.append(f"leg {k + 1} must not move: its crank length is 0")
-    if not any(crank):
-        notes.append("both poses need the same rocker distances: all cranks are zero (trivial)")
-    built = replace(
-        mechanism,
-        crank=(crank[0], crank[1], crank[2]),
-        coupler=(coupler[0], coupler[1], coupler[2]),
-        phase=(phase[0], phase[1], phase[2]),
-    )
-    return built, tuple(notes), np.array(other)
-
-
 def _verified(
     designed: SingleMotorPlatform,
-    sigma: tuple[int, ...],
+    start: Array,
     poses: list[Array],
     notes: tuple[str, ...],
     other: Array,
     samples: int,
 ) -> TwoPoseDesign:
-    weight = np.array([1.0, 1.0, designed.Lc])
+    """Follow a design over a rotation; ``start``: rocker angles in the first pose."""
     for number, turn in enumerate(designed.drive_turns(), start=1):
         if turn.kind != "full turn":
-            return _rejected(designed, f"drive {number} makes no full turn ({turn.kind})", notes)
-    start = designed.platform.inverse(poses[0], sigma).theta
-    gap = np.exp(1j * (designed.drive(0.0).theta - start)) - 1.0
-    for k in range(3):
-        if abs(gap[k]) > 1e-6:
-            text = f"drive {k + 1} reaches the first pose on the other branch, tau = {-designed.tau[k]}"
-            return _rejected(designed, text, notes)
-    psi = np.linspace(0.0, math.tau, 2 * (samples // 2) + 1)
-    motion = designed.full_turn(psi, start=poses[0])
+            return _rejected(designed, f"drive {number} makes no full rotation ({turn.kind})", notes)
+    gap = np.abs(np.exp(1j * (designed.drive(0.0).theta - start)) - 1.0)
+    for k in np.flatnonzero(gap > 1e-6)[:1]:
+        text = f"drive {k + 1} reaches the first pose on the other branch, tau = {-designed.tau[k]}"
+        return _rejected(designed, text, notes)
+    motion = designed.full_turn(np.linspace(0.0, math.tau, 2 * (samples // 2) + 1), start=poses[0])
     if not motion.complete:
         return _rejected(designed, motion.stop_reason() or "the tracked pose is not an assembly mode", notes)
     reason = "" if motion.working_mode_constant else "a leg passes its boundary: the working mode changes"
-    path = (motion.pose - poses[0]) * weight
-    line = (poses[1] - poses[0]) * weight
-    size = float(np.linalg.norm(line))
-    unit = line / size if size > 0.0 else line
+    weight = np.array([1.0, 1.0, designed.Lc])
+    path, line = (motion.pose - poses[0]) * weight, (poses[1] - poses[0]) * weight
+    unit = line / (np.linalg.norm(line) or 1.0)
     off = float(np.linalg.norm(path - (path @ unit)[:, None] * unit, axis=1).max())
-    return TwoPoseDesign(
-        designed,
-        not reason,
-        reason,
-        notes,
-        other,
-        float(np.linalg.norm(path[0])),
-        float(np.linalg.norm((motion.pose[samples // 2] - poses[1]) * weight)),
-        off,
-        motion,
-    )
+    first, second = (float(np.linalg.norm(gap)) for gap in (path[0], path[samples // 2] - line))
+    return TwoPoseDesign(designed, not reason, reason, notes, other, first, second, off, motion)

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import three
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals.reading import Gaussian, ball, complex_ball, gaussian, precision, rational
+from graphsynth.kinematics.triad.assembly_modes import Sextic
 from graphsynth.systems.platform.certified_exact_modes import (
-    SexticBalls,
+    direction,
     exact_roots,
     isolate,
     mirror_count,
@@ -136,10 +137,8 @@ class _Problem:
         vertices, lengths = [complex_ball(v) for v in self.vertices], [ball(v) for v in self.lengths]
         if self.arms is None:
             return [complex_ball(v) for v in self.anchors], vertices, lengths
-        anchors = []
-        for pivot, arm, angle in zip(*self.arms):
-            s, c = ball(angle).sin_cos()
-            anchors.append(complex_ball(pivot) + ball(arm) * flint.acb(c, s))
+        arms = zip(*self.arms)
+        anchors = [complex_ball(pivot) + ball(arm) * direction(ball(angle)) for pivot, arm, angle in arms]
         return anchors, vertices, lengths
 
 
@@ -227,41 +226,56 @@ def certify_direct(
 
 
 def _points(name: str, values: Sequence[Any]) -> list[Any]:
-    acb = flint.acb
-    return [v if isinstance(v, acb) else gaussian(f"{name} {k}", v) for k, v in enumerate(three(name, values), 1)]
+    found = enumerate(three(name, values), 1)
+    return [v if isinstance(v, flint.acb) else gaussian(f"{name} {k}", v) for k, v in found]
 
 
 def _lengths(values: Sequence[Any]) -> list[Any]:
-    values = three("lengths", values)
-    arb = flint.arb
-    found = [v if isinstance(v, arb) else rational(f"length of leg {k}", v) for k, v in enumerate(values, 1)]
-    for k, value in enumerate(found, 1):
-        if value < 0:
-            raise GeometryError(f"length of leg {k} = {values[k - 1]} must be zero or more; correct the value")
+    found = []
+    for k, given in enumerate(three("lengths", values), 1):
+        found.append(given if isinstance(given, flint.arb) else rational(f"length of leg {k}", given))
+        if found[-1] < 0:
+            raise GeometryError(f"length of leg {k} = {given} must be zero or more; correct the value")
     return found
 
 
 def _certify(problem: _Problem, max_bits: int, cross_check: bool) -> AssemblyCertificate:
     begin = perf_counter()
+    verdict, method, statement, checked = AssemblyVerdict.UNDECIDED, "subdivision", "", None
+    modes: list[ModeEnclosure] | None = None
     reason, bits = "max_bits is less than 64; raise it", 0
     for bits in (b for b in _LADDER if b <= max_bits):
         with precision(bits):
             modes, reason = _subdivide(problem, bits)
             if modes is not None:
-                checked = _cross_check(problem, modes) if cross_check else None
-                return _certificate(modes, bits, "subdivision", checked, begin)
-    if problem.exact:
+                count = mirror_count(sextic_balls(*problem.balls())) if cross_check else None
+                checked = None if count is None else count == len(modes)
+                break
+    if modes is None and problem.exact:
         with precision(max(bits, 128)):
             if self_motion(problem.anchors, problem.vertices, problem.lengths):
-                text = "at one orientation the platform translates on a circle: congruent triangles and equal legs"
-                return AssemblyCertificate(
-                    AssemblyVerdict.SELF_MOTION, (), text, bits, "exact", None, perf_counter() - begin, text
+                verdict, method = AssemblyVerdict.SELF_MOTION, "exact"
+                statement = reason = (
+                    "at one orientation the platform translates on a circle: congruent triangles and equal legs"
                 )
-            modes, reason = _decide_exactly(problem, reason)
-            if modes is not None:
-                return _certificate(modes, bits, "exact polynomial", None, begin)
+            else:
+                modes, reason = _decide_exactly(problem, reason)
+                method = method if modes is None else "exact polynomial"
+    if checked is False:
+        modes, reason = None, "subdivision and root isolation give different counts; please report these data"
+    if modes is not None:
+        verdict, merged = AssemblyVerdict.CERTIFIED, sum(mode.multiplicity > 1 for mode in modes)
+        statement = f"certified: exactly {len(modes)} assembly modes, each enclosed"
+        statement += f"; {merged} of them multiple roots (type-II singularity)" if merged else ""
     return AssemblyCertificate(
-        AssemblyVerdict.UNDECIDED, (), reason, bits, "subdivision", None, perf_counter() - begin, f"undecided: {reason}"
+        verdict,
+        tuple(modes or ()),
+        reason,
+        bits,
+        method,
+        checked,
+        perf_counter() - begin,
+        statement or f"undecided: {reason}",
     )
 
 
@@ -269,11 +283,11 @@ def _subdivide(problem: _Problem, bits: int) -> tuple[list[ModeEnclosure] | None
     """All modes at one precision, or None and the reason why it does not decide."""
     A, b, lengths = problem.balls()
     s = sextic_balls(A, b, lengths)
-    found = isolate(s, bits)
-    if found.reason:
-        return None, found.reason
+    roots, reason = isolate(s, bits)
+    if reason:
+        return None, reason
     modes = []
-    for low, high in found.roots:
+    for low, high in roots:
         mode = _pose(s, A, b, refine(s, low, high, bits))
         if mode is None:
             return None, "Delta may vanish at a mode: its position is not determined by its orientation alone"
@@ -285,12 +299,11 @@ def _subdivide(problem: _Problem, bits: int) -> tuple[list[ModeEnclosure] | None
     return sorted(modes, key=lambda mode: float(mode.alpha)), ""
 
 
-def _pose(s: SexticBalls, A: list[Any], b: list[Any], alpha: Any) -> ModeEnclosure | None:
+def _pose(s: Sextic, A: list[Any], b: list[Any], alpha: Any) -> ModeEnclosure | None:
     """Pose of a root; None if Delta may be zero."""
-    sine, cosine = alpha.sin_cos()
-    z, back = flint.acb(cosine, sine), flint.acb(cosine, -sine)
-    n2, n1, n0, nm = s.n
-    Delta = s.d[0] + s.d[1] * z - flint.acb(s.d[1].real, -s.d[1].imag) * back
+    z = direction(alpha)
+    back, (n2, n1, n0, nm) = z.conjugate(), s.n
+    Delta = s.d[0] + s.d[1] * z - s.d[1].conjugate() * back
     if Delta.contains(0):
         return None
     N = (n2 * z + n1) * z + n0 + nm * back
@@ -324,33 +337,10 @@ def _decide_exactly(problem: _Problem, reason: str) -> tuple[list[ModeEnclosure]
             continue
         positions = None if root.z is None else parallel_positions(*data, root.z)
         if positions is None:
-            where = float(root.alpha)
-            return (
-                None,
-                f"Delta may vanish at the root alpha = {where:.15g}, so the position is not determined; {reason}",
-            )
+            where = f"Delta may vanish at the root alpha = {float(root.alpha):.15g}"
+            return None, f"{where}, so the position is not determined; {reason}"
         for p in positions:
             mode = _enclosure(A, b, p, complex_ball(root.z), root.alpha)
             regular = not mode.determinant.contains(0)
             modes.append(replace(mode, multiplicity=1 if regular else root.multiplicity))
     return modes, ""
-
-
-def _cross_check(problem: _Problem, modes: list[ModeEnclosure]) -> bool | None:
-    count = mirror_count(sextic_balls(*problem.balls()))
-    return None if count is None else count == len(modes)
-
-
-def _certificate(
-    modes: list[ModeEnclosure], bits: int, method: str, checked: bool | None, begin: float
-) -> AssemblyCertificate:
-    seconds = perf_counter() - begin
-    if checked is False:
-        reason = "subdivision and root isolation give different counts; please report these data"
-        return AssemblyCertificate(
-            AssemblyVerdict.UNDECIDED, (), reason, bits, method, checked, seconds, f"undecided: {reason}"
-        )
-    merged = sum(mode.multiplicity > 1 for mode in modes)
-    text = f"certified: exactly {len(modes)} assembly modes, each enclosed"
-    text += f"; {merged} of them multiple roots (type-II singularity)" if merged else ""
-    return AssemblyCertificate(AssemblyVerdict.CERTIFIED, tuple(modes), "", bits, method, checked, seconds, text)

@@ -1,7 +1,7 @@
-"""`certify_full_turn`: proof that the single-motor platform makes a full turn on one branch.
+"""`certify_full_turn`: proof that the single-motor platform makes a full rotation on one branch.
 
-Drives by the exact condition of theory/platform-drive 5; the platform by moving boxes that cover
-the turn, linked, and closed at exactly 2 pi; the working mode by enclosures of the reach of every leg over these boxes.
+Drives by the exact condition of theory/platform-drive 5; the platform by linked moving boxes that cover the rotation
+and close at exactly 2 pi; the working mode by enclosures of the reach of every leg over these boxes.
 
 Unknowns: the angles ``phi_k`` of the drive arms in the fixed frame, and the pose ``(x, y, alpha)``; the input is the
 wheel angle psi.  Equations ``h_k = |C_k - B_k|^2 - l_BC^2`` and ``f_k = |F_k - A_k|^2 - l2^2``.  Every angle of the
@@ -29,6 +29,9 @@ Array = NDArray[np.float64]
 
 #: Angles of the dimensions are meant within this many radians.
 ANGLE = 5e-16
+_NODES = 73
+_SPLIT = 12
+Arcs = tuple[tuple[int, float, float, bool], ...]
 
 
 class _Vectors(NamedTuple):
@@ -41,15 +44,6 @@ class _Vectors(NamedTuple):
     leg: Balls  # F - A
     vertex: Balls  # F - p
     reach: Balls  # F - D
-
-
-class LegBounds(NamedTuple):
-    """Enclosures (N, 3): ``P1``, ``P2`` (both positive inside the reach), ``JT`` of the legs and ``h_phi``."""
-
-    P1: Balls
-    P2: Balls
-    JT: Balls
-    h_phi: Balls
 
 
 class PlatformSystem:
@@ -97,7 +91,7 @@ class PlatformSystem:
         v, n = self._vectors(x, u, units), self.lengths
         h = _square(v.link) - n["coupler"] * n["coupler"]
         f = _square(v.leg) - n["l2"] * n["l2"]
-        return Balls(np.concatenate([h.mid, f.mid], axis=1), np.concatenate([h.rad, f.rad], axis=1))
+        return _beside(h, f)
 
     def derivatives(self, x: Balls, u: Balls, units: Balls) -> tuple[Balls, Balls]:
         """Jacobian (N, 6, 6) and derivative by psi (N, 6)."""
@@ -105,26 +99,27 @@ class PlatformSystem:
         h_phi, f_phi = 2.0 * _cross(v.arm, v.link), -(2.0 * _cross(v.rocker, v.leg))
         columns = stack([2.0 * v.leg.real, 2.0 * v.leg.imag, 2.0 * _cross(v.vertex, v.leg)])
         h_psi = -(2.0 * _cross(v.crank, v.link))
-        N = len(x.mid)
-        mid, rad = np.zeros((N, 6, 6)), np.zeros((N, 6, 6))
-        for k in range(3):
-            mid[:, k, k], rad[:, k, k] = h_phi.mid[:, k], h_phi.rad[:, k]
-            mid[:, 3 + k, k], rad[:, 3 + k, k] = f_phi.mid[:, k], f_phi.rad[:, k]
-        mid[:, 3:, 3:], rad[:, 3:, 3:] = columns.mid, columns.rad
-        zero = np.zeros((N, 3))
-        rate = Balls(np.concatenate([h_psi.mid, zero], axis=1), np.concatenate([h_psi.rad, zero], axis=1))
-        return Balls(mid, rad), rate
+        N, k = len(x.mid), np.arange(3)
+        jacobian = Balls(np.zeros((N, 6, 6)), np.zeros((N, 6, 6)))
+        for part in ("mid", "rad"):
+            of, h, f, legs = (getattr(value, part) for value in (jacobian, h_phi, f_phi, columns))
+            of[:, k, k], of[:, 3 + k, k], of[:, 3:, 3:] = h, f, legs
+        return jacobian, _beside(h_psi, exact(np.zeros((N, 3))))
 
     def branch(self, x: Balls, u: Array) -> tuple[NDArray[np.int64], Balls]:
         """Nothing is counted: all angles enter through their directions."""
         return np.zeros((len(x.mid), 0), dtype=np.int64), exact(np.zeros((len(x.mid), 0)))
 
-    def bounds(self, x: Balls, u: Balls) -> LegBounds:
-        """Quantities whose signs are the working mode and the drive branches, over boxes."""
+    def bounds(self, x: Balls, u: Balls) -> tuple[Balls, Balls, Balls, Balls]:
+        """Enclosures (N, 3) of ``P1``, ``P2`` (both positive inside the reach), ``JT`` of the legs and ``h_phi``."""
         v, n = self._vectors(x, u, self.units(x.mid, u.mid)), self.lengths
         rho2, total, gap = _square(v.reach), n["l1"] + n["l2"], n["l1"] - n["l2"]
         JT, h_phi = -(2.0 * _cross(v.rocker, v.leg)), 2.0 * _cross(v.arm, v.link)
-        return LegBounds(total * total - rho2, rho2 - gap * gap, JT, h_phi)
+        return total * total - rho2, rho2 - gap * gap, JT, h_phi
+
+
+def _beside(a: Balls, b: Balls) -> Balls:
+    return Balls(np.concatenate([a.mid, b.mid], axis=1), np.concatenate([a.rad, b.rad], axis=1))
 
 
 def _near(angles: tuple[float, float, float]) -> Balls:
@@ -140,24 +135,18 @@ def _square(z: Balls) -> Balls:
     return z.real * z.real + z.imag * z.imag
 
 
-Arc = tuple[float, float]
-
-_NODES = 73
-_SPLIT = 12
-
-
 class TurnVerdict(StrEnum):
-    """Outcome for a full turn of the wheels."""
+    """Outcome for a full rotation of the wheels."""
 
-    CERTIFIED_FULL_TURN = "certified full turn"
-    NOT_FULL_TURN = "proved: no full turn"
+    CERTIFIED_FULL_TURN = "certified full rotation"
+    NOT_FULL_TURN = "proved: no full rotation"
     CHANGE_POINT = "proved: change point"
     UNDECIDED = "undecided"
 
 
 @dataclass(frozen=True, eq=False)
 class FullTurnCertificate:
-    """What is proved about a full turn.
+    """What is proved about a full rotation.
 
     Attributes
     ----------
@@ -179,7 +168,7 @@ class FullTurnCertificate:
     boxes : int
         Moving boxes tested.
     reason : str
-        Why the verdict is UNDECIDED, or what forbids the turn; empty for a certified turn.
+        Why the verdict is UNDECIDED, or what forbids it; empty if it is certified.
     seconds : float
     statement : str
     """
@@ -189,7 +178,7 @@ class FullTurnCertificate:
     covered: float
     sigma: tuple[int, int, int]
     working_mode_constant: bool | None
-    mode_arcs: tuple[tuple[int, float, float, bool], ...]
+    mode_arcs: Arcs
     boxes: int
     reason: str
     seconds: float
@@ -198,7 +187,7 @@ class FullTurnCertificate:
 
     @property
     def certified(self) -> bool:
-        """Whether the full turn is certified."""
+        """Whether the full rotation is certified."""
         return self.verdict is TurnVerdict.CERTIFIED_FULL_TURN
 
     def enclosure(self, psi: float) -> tuple[Array, Array]:
@@ -226,7 +215,7 @@ class FullTurnCertificate:
 def certify_full_turn(
     mechanism: SingleMotorPlatform, *, start: ArrayLike | None = None, max_boxes: int = 100_000, seconds: float = 60.0
 ) -> FullTurnCertificate:
-    """Prove or disprove a full turn of the wheels on the branch through a pose.
+    """Prove or disprove a full rotation of the wheels on the branch through a pose.
 
     Parameters
     ----------
@@ -262,39 +251,29 @@ def certify_full_turn(
         raise GeometryError(f"{type(mechanism).__name__} is not a SingleMotorPlatform; certify proves other motions")
     kinds = [turn.kind for turn in mechanism.drive_turns()]
     drives = (kinds[0], kinds[1], kinds[2])
-    for verdict, bad in (
-        (TurnVerdict.NOT_FULL_TURN, ("limited", "immovable", "never assembled")),
+    verdict, reason, motion = TurnVerdict.UNDECIDED, "", None
+    for outcome, bad in (
         (TurnVerdict.CHANGE_POINT, ("change point",)),
+        (TurnVerdict.NOT_FULL_TURN, ("limited", "immovable", "never assembled")),
     ):
         legs = [str(k) for k, kind in enumerate(drives, 1) if kind in bad]
         words = " and ".join(dict.fromkeys(kind for kind in drives if kind in bad))
         if legs:
-            return _without_cover(verdict, drives, f"drive {', '.join(legs)}: {words}, decided exactly", begin)
-    try:
-        motion = mechanism.full_turn(_NODES, start)
-    except GeometryError as error:
-        return _without_cover(TurnVerdict.UNDECIDED, drives, f"there is no start pose: {error}", begin)
-    system = PlatformSystem(mechanism)
-    delta = np.array(mechanism.delta)
-    nodes = _nodes(system, motion.psi, np.column_stack([motion.theta - delta, motion.pose]), motion.complete)
+            verdict, reason = outcome, f"drive {', '.join(legs)}: {words}, decided exactly"
+    if not reason:
+        try:
+            motion = mechanism.full_turn(_NODES, start)
+        except GeometryError as error:
+            reason = f"there is no start pose: {error}"
+    if motion is None:
+        took, text = perf_counter() - begin, f"{verdict}: {reason}"
+        return FullTurnCertificate(verdict, drives, 0.0, (0, 0, 0), None, (), 0, reason, took, text)
+    system, u = PlatformSystem(mechanism), exact(motion.psi)
+    if motion.complete:  # it ends at exactly 2 pi
+        u.rad[-1] = (tau_times(1.0) - exact(motion.psi[-1])).size
+    nodes = prove_nodes(system, u, np.column_stack([motion.theta - np.array(mechanism.delta), motion.pose]))
     found = cover(system, nodes, Budget(max_boxes, seconds), begin)
     return _conclude(system, nodes, found, drives, motion.stop_reason(), begin)
-
-
-def _without_cover(
-    verdict: TurnVerdict, drives: tuple[str, str, str], reason: str, begin: float
-) -> FullTurnCertificate:
-    return FullTurnCertificate(
-        verdict, drives, 0.0, (0, 0, 0), None, (), 0, reason, perf_counter() - begin, f"{verdict}: {reason}"
-    )
-
-
-def _nodes(system: PlatformSystem, psi: Array, guess: Array, complete: bool) -> Nodes:
-    """Prove the poses that the motion suggests; the last one at exactly 2 pi."""
-    u = exact(psi)
-    if complete:
-        u.rad[-1] = (tau_times(1.0) - exact(psi[-1])).size
-    return prove_nodes(system, u, guess)
 
 
 @np.errstate(all="ignore")
@@ -304,13 +283,27 @@ def _conclude(
     whole = not stopped and bool(found.covered.all())
     covered, boxes = _covered(nodes, found, whole)
     closed = whole and whole_turns(nodes, np.array([True, True, True, False, False, True])) is not None
-    sigma, branches = _signs(system, nodes)
-    constant, arcs = _working_mode(system, boxes) if boxes is not None else (None, ())
-    right_drives = branches == system.platform.tau
-    if closed and right_drives:
-        verdict, reason = TurnVerdict.CERTIFIED_FULL_TURN, ""
+    signs = np.zeros((2, 3), dtype=int)  # working mode and drive branches at the first node; 0 where not proved
+    first = nodes.take(np.array([0]))
+    if bool(first.proof.proved[0]):
+        bounds = system.bounds(exact(first.x).wider(first.proof.tight), first.u)[2:]
+        signs = np.array([np.where(b.least > 0.0, np.sign(b.mid), 0.0)[0] for b in bounds], dtype=int)
+    sigma = (int(signs[0, 0]), int(signs[0, 1]), int(signs[0, 2]))
+    constant, arcs = _working_mode(system, *boxes) if boxes is not None else (None, ())
+    verdict, reason = TurnVerdict.UNDECIDED, ""
+    if stopped:
+        reason = f"the motion itself ends: {stopped}"
+    elif found.exhausted:
+        reason = f"the limit of work was reached after {found.tested} boxes"
+    elif not whole:
+        a, b = sorted(found.undecided)[0]
+        reason = f"no single regular branch is proved between psi = {a:.12g} and {b:.12g}"
+    elif tuple(signs[1]) != system.platform.tau:
+        reason = "the drive branch is unclear"
+    elif not closed:
+        reason = "the pose after the rotation is not proved to be the start pose"
     else:
-        verdict, reason = TurnVerdict.UNDECIDED, _reason(stopped, found, whole, right_drives)
+        verdict = TurnVerdict.CERTIFIED_FULL_TURN
     text = f"{verdict}: {reason}; proved from psi = 0 to {covered:.9g}" if reason else f"{verdict}: one regular branch"
     if constant is not None:
         text += "; the working mode is proved constant" if constant else "; a change of the working mode is proved"
@@ -320,101 +313,51 @@ def _conclude(
     )
 
 
-def _reason(stopped: str, found: Cover, whole: bool, right_drives: bool) -> str:
-    if stopped:
-        return f"the motion itself ends: {stopped}"
-    if found.exhausted:
-        return f"the limit of work was reached after {found.tested} boxes"
-    if not whole:
-        a, b = sorted(found.undecided)[0]
-        return f"no single regular branch is proved between psi = {a:.12g} and {b:.12g}"
-    return (
-        "the pose after the turn is not proved to be the start pose" if right_drives else "the drive branch is unclear"
-    )
-
-
 def _covered(nodes: Nodes, found: Cover, whole: bool) -> tuple[float, tuple[Boxes, Array] | None]:
     """End of the arc proved without a gap from the first node, and its boxes in order."""
-    if not found.boxes:
-        return 0.0, None
     limit = float(nodes.u.mid[-1])
     if not whole:
-        gaps = [a for a, _ in found.undecided]
-        limit = min([limit, *gaps])
-    boxes = [part for part, _ in found.boxes]
-    u = Balls(np.concatenate([b.u.mid for b in boxes]), np.concatenate([b.u.rad for b in boxes]))
-    x, V = (np.concatenate([getattr(b, name) for b in boxes]) for name in ("x", "V"))
-    tight = np.concatenate([t for _, t in found.boxes])
-    order = np.argsort(u.mid)
-    order = order[u.mid[order] < limit]
-    if order.size == 0:
+        limit = min([limit, *(a for a, _ in found.undecided)])
+    if not found.boxes:
         return 0.0, None
-    return limit, (Boxes(u[order], x[order], V[order]), tight[order])
+    boxes, tight = found.boxes[0]
+    for part, radius in found.boxes[1:]:
+        boxes, tight = boxes.join(part), np.concatenate([tight, radius])
+    order = np.argsort(boxes.u.mid)
+    order = order[boxes.u.mid[order] < limit]
+    return (limit, (boxes.take(order), tight[order])) if order.size else (0.0, None)
 
 
-def _signs(system: PlatformSystem, nodes: Nodes) -> tuple[tuple[int, int, int], tuple[int, ...]]:
-    """Proved working mode and drive branches at the first node; 0 where the sign is not proved."""
-    first = nodes.take(np.array([0]))
-    if not bool(first.proof.proved[0]):
-        return (0, 0, 0), (0, 0, 0)
-    bounds = system.bounds(exact(first.x).wider(first.proof.tight), first.u)
-    a, b, c = (int(s) for s in _sign(bounds.JT)[0])
-    return (a, b, c), tuple(int(s) for s in _sign(bounds.h_phi)[0])
+def _working_mode(system: PlatformSystem, boxes: Boxes, tight: Array) -> tuple[bool | None, Arcs]:
+    """Decide by enclosures of P1, P2 and JT whether a leg passes its boundary; halve the slices that do not decide.
 
-
-def _sign(value: Balls) -> Array:
-    return np.where(value.least > 0.0, np.sign(value.mid), 0.0)
-
-
-def _working_mode(
-    system: PlatformSystem, cover: tuple[Boxes, Array]
-) -> tuple[bool | None, tuple[tuple[int, float, float, bool], ...]]:
-    """Decide by enclosures of P1, P2 and JT whether a leg passes its boundary; halve the slices that do not decide."""
-    boxes, tight = cover
+    Slices that stay undecided are merged into arcs; the proved signs on both sides of each are compared.
+    """
     slices = np.column_stack([boxes.u.mid - boxes.u.rad, boxes.u.mid + boxes.u.rad])
     own = np.arange(len(slices))
-    clear = np.zeros((0, 3), dtype=bool)
-    kept = np.zeros((0, 2))
-    signs = np.zeros((0, 3))
+    kept = []  # start and stop of a slice; for each leg whether it is clear, and its proved sign
     for depth in range(_SPLIT + 1):
         middle = 0.5 * (slices[:, 0] + slices[:, 1])
         u = Balls(middle, np.maximum(slices[:, 1] - middle, middle - slices[:, 0]) * UP + TINY)
-        part = boxes.take(own)
-        centre = part.at(u)
-        b = system.bounds(centre.wider(tight[own]), u)
+        P1, P2, JT, _ = system.bounds(boxes.take(own).at(u).wider(tight[own]), u)
         # JT^2 = P1 P2 on the closure: either form may decide
-        good = (b.JT.least > 0.0) | ((b.P1.mid > b.P1.rad * UP) & (b.P2.mid > b.P2.rad * UP))
+        good = (JT.least > 0.0) | ((P1.mid > P1.rad * UP) & (P2.mid > P2.rad * UP))
+        signs = np.where(good, np.sign(JT.mid) * (JT.least > 0.0), 0.0)
         done = good.all(axis=1) | (depth == _SPLIT)
-        kept, clear = np.concatenate([kept, slices[done]]), np.concatenate([clear, good[done]])
-        signs = np.concatenate([signs, np.where(good, np.sign(b.JT.mid) * (b.JT.least > 0.0), 0.0)[done]])
-        slices, own = slices[~done], own[~done]
+        kept.append(np.column_stack([slices, good, signs])[done])
+        middle, slices, own = middle[~done], slices[~done], np.tile(own[~done], 2)
         if own.size == 0:
             break
-        half = 0.5 * (slices[:, 0] + slices[:, 1])
-        slices = np.concatenate([np.column_stack([slices[:, 0], half]), np.column_stack([half, slices[:, 1]])])
-        own = np.concatenate([own, own])
-    order = np.argsort(kept[:, 0])
-    return _arcs(kept[order], clear[order], signs[order])
-
-
-def _arcs(
-    slices: Array, clear: NDArray[np.bool_], signs: Array
-) -> tuple[bool | None, tuple[tuple[int, float, float, bool], ...]]:
-    """Merge the slices that do not decide into arcs, and compare the proved signs on both sides of each."""
+        slices = np.concatenate([np.column_stack([slices[:, 0], middle]), np.column_stack([middle, slices[:, 1]])])
+    rows = np.concatenate(kept)
+    rows = rows[np.argsort(rows[:, 0])]
     found = []
     for leg in range(3):
-        k, n = 0, len(slices)
-        while k < n:
-            if clear[k, leg]:
-                k += 1
-                continue
-            stop = k
-            while stop + 1 < n and not clear[stop + 1, leg]:
-                stop += 1
-            before = next((s for s in signs[:k, leg][::-1] if s), 0.0)
-            after = next((s for s in signs[stop + 1 :, leg] if s), 0.0)
-            found.append((leg + 1, float(slices[k, 0]), float(slices[stop, 1]), bool(before * after < 0.0)))
-            k = stop + 1
-    if not found:
-        return True, ()
-    return (False if any(arc[3] for arc in found) else None), tuple(found)
+        clear, signs = rows[:, 2 + leg], rows[:, 5 + leg]
+        edges = np.flatnonzero(np.diff(clear, prepend=1.0, append=1.0)).reshape(-1, 2)
+        for first, stop in edges.tolist():
+            before = next((s for s in signs[:first][::-1] if s), 0.0)
+            after = next((s for s in signs[stop:] if s), 0.0)
+            found.append((leg + 1, float(rows[first, 0]), float(rows[stop - 1, 1]), bool(before * after < 0.0)))
+    changes = any(change for *_, change in found)
+    return (True if not found else False if changes else None), tuple(found)

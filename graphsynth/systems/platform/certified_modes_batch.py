@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,9 @@ from graphsynth.core.checks import triples
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals.balls import TINY, UP, Balls, exact, join, tau_times, unit
 from graphsynth.intervals.guard import check_rounding
+from graphsynth.kinematics.triad.assembly_modes import Sextic, coefficients
+from graphsynth.systems.platform.certified_assembly_modes import certify_assembly_modes, certify_direct
+from graphsynth.systems.platform.certified_exact_modes import slope, value
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
 Array = NDArray[np.float64]
@@ -24,7 +27,6 @@ Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
 
 _NODES = 32
-_LEVELS = 20
 _SHIFT = 2.0**-9  # turns; no simple fraction of a turn is a node
 _CHUNK = 4096
 
@@ -50,42 +52,15 @@ class AssemblyCertificateBatch:
         return np.asarray(self.counts >= 0)
 
 
-class _Coefficients(NamedTuple):
-    """G, N and Delta of all problems as balls, each of shape (N,)."""
-
-    g: tuple[Balls, Balls, Balls, Balls]
-    n: tuple[Balls, Balls, Balls, Balls]
-    d: tuple[Balls, Balls]
-
-    def take(self, i: Index) -> _Coefficients:
-        """Return some problems, with repetitions."""
-        g0, g1, g2, g3 = (c[i] for c in self.g)
-        n2, n1, n0, nm = (c[i] for c in self.n)
-        return _Coefficients((g0, g1, g2, g3), (n2, n1, n0, nm), (self.d[0][i], self.d[1][i]))
-
-    def value(self, z: Balls) -> Balls:
-        """Return G at points of the circle."""
-        g0, g1, g2, g3 = self.g
-        return g0 + 2.0 * (z * (g1 + z * (g2 + z * g3))).real
-
-    def slope(self, z: Balls) -> Balls:
-        """Return the derivative of G by alpha."""
-        _, g1, g2, g3 = self.g
-        return -2.0 * (z * (g1 + z * (2.0 * g2 + z * (3.0 * g3)))).imag
-
-    def bend(self) -> Array:
-        """Bound of ``|G''|``."""
-        _, g1, g2, g3 = self.g
-        return np.asarray(2.0 * (g1.size + 4.0 * g2.size + 9.0 * g3.size) * UP)
+def _some(s: Sextic, i: Index) -> Sextic:
+    """Coefficients of some problems, with repetitions."""
+    parts: Any = (tuple(c[i] for c in part) for part in s)
+    return Sextic(*parts)
 
 
-class _Arcs(NamedTuple):
-    """Arcs of problems: first node, in units of the finest grid; signs of G at both ends; width in turns is common."""
-
-    problem: Index
-    low: NDArray[np.int64]
-    at_low: Balls
-    at_high: Balls
+def _bend(s: Sextic) -> Array:
+    """Bound of ``|G''|``."""
+    return np.asarray(2.0 * (s.g[1].size + 4.0 * s.g[2].size + 9.0 * s.g[3].size) * UP)
 
 
 def certify_assembly_modes_batch(
@@ -173,33 +148,16 @@ def _batch(
             raise GeometryError(f"{name} hold a number that is not finite; give finite numbers only")
     if (l2 < 0.0).any():
         raise GeometryError(f"lengths hold {float(l2.min())}; a leg length must be zero or more")
-    parts: list[list[NDArray[np.generic]]] = []
+    parts = []
     counts = np.full(len(A.mid), -1, dtype=np.intp)
     for k in range(0, len(A.mid), _CHUNK):
         key = slice(k, k + _CHUNK)
         with np.errstate(all="ignore"):
-            problem, poses, radii, signs, decided = _decide(A[key], b[key], l2[key])
-        counts[key][decided] = np.bincount(problem, minlength=decided.size)[decided]
-        parts.append([problem + k, poses, radii, signs])
-    parts.append(_one_by_one(np.flatnonzero(counts < 0), A, b, l2, given, counts))
-    problem, poses, radii, signs = (np.concatenate(column) for column in zip(*parts))
-    order = np.lexsort((poses[:, 2], problem))
-    return AssemblyCertificateBatch(problem[order], poses[order], radii[order], signs[order], counts)
-
-
-def _one_by_one(
-    left: Index,
-    A: Balls,
-    b: NDArray[np.complex128],
-    l2: Array,
-    given: tuple[ParallelPlatform, Array] | None,
-    counts: Index,
-) -> list[NDArray[np.generic]]:
-    """Decide the rest with more digits; ``counts`` is filled in."""
-    from graphsynth.systems.platform.certified_assembly_modes import certify_assembly_modes, certify_direct
-
-    rows: list[tuple[int, Array, Array, int]] = []
-    for i in left.tolist():
+            rows, decided = _decide(A[key], b[key], l2[key])
+        counts[key][decided] = np.bincount(rows[:, 0].astype(np.intp), minlength=decided.size)[decided]
+        rows[:, 0] += k
+        parts.append(rows)
+    for i in np.flatnonzero(counts < 0).tolist():  # with more digits
         if given is None:
             found = certify_assembly_modes(A.mid[i].tolist(), b[i].tolist(), l2[i].tolist(), cross_check=False)
         else:
@@ -207,173 +165,127 @@ def _one_by_one(
         if found.certified:
             counts[i] = len(found)
             for mode in found.modes:
-                sign = 1 if mode.determinant > 0 else -1 if mode.determinant < 0 else 0
-                rows.append((i, mode.pose, mode.radius, sign))
-    return [
-        np.array([row[0] for row in rows], dtype=np.intp),
-        np.array([row[1] for row in rows]).reshape(-1, 3),
-        np.array([row[2] for row in rows]).reshape(-1, 3),
-        np.array([row[3] for row in rows], dtype=np.int8),
-    ]
-
-
-def _coefficients(A: Balls, b: Balls, l2: Balls) -> _Coefficients:
-    """theory/platform-direct 1, for every problem."""
-    a2, a3, b2, b3 = A[:, 1] - A[:, 0], A[:, 2] - A[:, 0], b[:, 1] - b[:, 0], b[:, 2] - b[:, 0]
-    squares = l2 * l2
-    L = squares[:, 0]
-    w20 = squares[:, 1] - L - _square(a2) - _square(b2)
-    w30 = squares[:, 2] - L - _square(a3) - _square(b3)
-    w21, w31 = b2 * a2.conj, b3 * a3.conj
-    n2 = w21 * b3 - w31 * b2
-    n1 = w20 * b3 - w21 * a3 - w30 * b2 + w31 * a2
-    n0 = w21.conj * b3 - w20 * a3 + w30 * a2 - w31.conj * b2
-    nm = w31.conj * a2 - w21.conj * a3
-    d0 = (2.0 * (b2.conj * b3 + a2.conj * a3).imag).times_i
-    de = b2 * a3.conj - a2.conj * b3
-    g3 = n2 * nm.conj
-    g2 = n2 * n0.conj + n1 * nm.conj + L * de * de
-    g1 = n2 * n1.conj + n1 * n0.conj + n0 * nm.conj + 2.0 * L * d0 * de
-    g0 = _square(n2) + _square(n1) + _square(n0) + _square(nm) - L * (_square(d0) + 2.0 * _square(de))
-    return _Coefficients((g0, g1, g2, g3), (n2, n1, n0, nm), (d0, de))
-
-
-def _square(z: Balls) -> Balls:
-    return z.real * z.real + z.imag * z.imag
+                sign = bool(mode.determinant > 0) - bool(mode.determinant < 0)
+                parts.append(np.array([[i, *mode.pose, *mode.radius, sign]]))
+    rows = np.concatenate([np.zeros((0, 8)), *parts])
+    rows = rows[np.lexsort((rows[:, 3], rows[:, 0]))]
+    problem, signs = rows[:, 0].astype(np.intp), rows[:, 7].astype(np.int8)
+    return AssemblyCertificateBatch(problem, rows[:, 1:4].copy(), rows[:, 4:7].copy(), signs, counts)
 
 
 @cache
 def _fine() -> Balls:
-    """``exp(2 pi i j / 2^25)`` for j = 0 .. 1023 and, behind them, for j = 1024 * (0 .. 1023) and 2^20 * (0 .. 31).
-
-    The last part holds the shift of the nodes.  Products of three entries are the nodes of every level.
-    """
+    """``exp(2 pi i j / 2^25)`` for j = 0 .. 1023, j = 1024 * (0 .. 1023), and j = 2^20 * (0 .. 31) with the shift."""
     turns = np.concatenate([np.arange(1024.0) * 2.0**-25, np.arange(1024.0) * 2.0**-15, np.arange(32.0) / 32 + _SHIFT])
     return unit(tau_times(turns))
 
 
 def _node(j: NDArray[np.int64]) -> Balls:
-    """Point of the circle at ``j / 2^25`` of a turn from the first node."""
+    """Point of the circle at ``j / 2^25`` of a turn from the first node, as a product of three in the table."""
     table = _fine()
     j = j % (1 << 25)
     return table[j & 1023] * table[1024 + ((j >> 10) & 1023)] * table[2048 + (j >> 20)]
 
 
-def _decide(A: Balls, b: NDArray[np.complex128], l2: Array) -> tuple[Index, Array, Array, NDArray[np.int8], Mask]:
-    """Modes of the problems that double precision decides, and which these are."""
+def _decide(A: Balls, b: NDArray[np.complex128], l2: Array) -> tuple[Array, Mask]:
+    """Modes of the problems that double precision decides, and which these are.
+
+    A row for each mode: problem, pose, radii, sign of ``det JX``.
+    """
     size = np.maximum(np.abs(A.mid - A.mid[:, :1]).max(axis=1), np.abs(b - b[:, :1]).max(axis=1))
     power: Array = np.ldexp(1.0, np.frexp(np.maximum(size, l2.max(axis=1)))[1])
-    unit_length = power[:, None]
-    unit_length = np.where(np.isfinite(unit_length) & (unit_length > 0.0), unit_length, 1.0)
+    unit_length = np.where(np.isfinite(power) & (power > 0.0), power, 1.0)[:, None]
     scaled = Balls(A.mid / unit_length, A.rad / unit_length * UP + TINY)  # a power of two: exact
     vertices, legs = exact(b / unit_length), exact(l2 / unit_length)
-    s = _coefficients(scaled, vertices, legs)
+    anchors, corners, sides = ([rows[:, k] for k in range(3)] for rows in (scaled, vertices, legs))
+    s = coefficients(anchors, corners, sides, lambda z: z.conj, lambda x: x.times_i)
     # beyond these sizes products of lengths leave the range of doubles
     decided = np.asarray((power > 2.0**-150) & (power < 2.0**150))
     problem, low, width = _isolate(s, decided)
-    alpha = _refine(s.take(problem), low, width)
-    x, y, determinant = _poses(s.take(problem), scaled[problem], vertices[problem], alpha)
-    scale = unit_length[problem, 0]
-    mid = np.stack([x.mid * scale, y.mid * scale, _principal(alpha.mid)], axis=-1)
-    turned = (Balls(mid[:, 2], np.zeros(len(mid))) - alpha).size  # a whole turn and its rounding
-    turned = np.where(turned > 1.0, (exact(mid[:, 2]) - alpha + tau_times(np.sign(alpha.mid))).size, turned)
-    radius = np.stack([x.rad * scale * UP, y.rad * scale * UP, turned], axis=-1)
+    own = _some(s, problem)
+    alpha = _refine(own, low, width)
+    x, y, determinant = _poses(own, scaled[problem], vertices[problem], alpha)
+    scale, principal = unit_length[problem, 0], np.pi - np.mod(np.pi - alpha.mid, 2.0 * np.pi)
+    turned = (exact(principal) - alpha).size  # a whole turn and its rounding
+    turned = np.where(turned > 1.0, (exact(principal) - alpha + tau_times(np.sign(alpha.mid))).size, turned)
+    radii = [x.rad * scale * UP, y.rad * scale * UP, turned]
     sign = np.where(determinant.least > 0.0, np.sign(determinant.mid), 0.0)
-    bad = ~np.isfinite(radius).all(axis=1) | (sign == 0.0)
-    decided[problem[bad]] = False
-    balance = np.bincount(problem, weights=sign, minlength=len(l2))
-    decided &= balance == 0.0
-    keep = decided[problem]
-    return problem[keep], mid[keep], radius[keep], sign[keep].astype(np.int8), decided
+    decided[problem[~np.isfinite(radii).all(axis=0) | (sign == 0.0)]] = False
+    decided &= np.bincount(problem, weights=sign, minlength=len(l2)) == 0.0
+    rows = np.column_stack([problem, x.mid * scale, y.mid * scale, principal, *radii, sign])
+    return rows[decided[problem]], decided
 
 
-def _isolate(s: _Coefficients, decided: Mask) -> tuple[Index, NDArray[np.int64], Array]:
+def _isolate(s: Sextic, decided: Mask) -> tuple[Index, NDArray[np.int64], Array]:
     """Arcs with exactly one simple root: problem, first node, width in units of the finest grid.
 
     ``decided`` is set to False where a sign or a count is not proved.
     """
-    count = len(decided)
     step = 1 << 20
-    grid = _node(np.arange(_NODES, dtype=np.int64) * step)
-    each = np.repeat(np.arange(count), _NODES)
-    values = s.take(each).value(Balls(np.tile(grid.mid, count), np.tile(grid.rad, count)))
-    following = np.roll(np.arange(count * _NODES).reshape(count, _NODES), -1, axis=1).ravel()
-    arcs = _Arcs(each, np.tile(np.arange(_NODES, dtype=np.int64) * step, count), values, values[following])
-    bend = s.bend()
+    rows, numbers = np.divmod(np.arange(len(decided) * _NODES), _NODES)
+    at = value(_some(s, rows).g, _node(np.arange(_NODES) * step)[numbers])
+    # problem and first node of arcs of one width, values of G at both ends
+    arcs: Any = (rows, numbers * step, at, at[rows * _NODES + (numbers + 1) % _NODES])
+    bend = _bend(s)
     found: list[tuple[Index, NDArray[np.int64], Array]] = []
-    for _ in range(_LEVELS):
-        decided[arcs.problem[(arcs.at_low.least <= 0.0) | (arcs.at_high.least <= 0.0)]] = False
-        alive = decided[arcs.problem]
-        arcs = _Arcs(arcs.problem[alive], arcs.low[alive], arcs.at_low[alive], arcs.at_high[alive])
+    while True:
+        problem, low, first, last = arcs
+        decided[problem[(first.least <= 0.0) | (last.least <= 0.0)]] = False
         h = step * (2.0 * np.pi * 2.0**-25) * (1.0 + 1e-14)
-        least = np.minimum(arcs.at_low.least, arcs.at_high.least)
-        same = (arcs.at_low.mid > 0.0) == (arcs.at_high.mid > 0.0)
-        rest = ~(same & (least > bend[arcs.problem] * (h * h / 8.0) * (1.0 + 1e-14)))
-        arcs = _Arcs(arcs.problem[rest], arcs.low[rest], arcs.at_low[rest], arcs.at_high[rest])
-        same = same[rest]
-        middle = arcs.low + step // 2
-        z, own = _node(middle), s.take(arcs.problem)
-        monotone = own.slope(z).least > bend[arcs.problem] * (h / 2.0) * (1.0 + 1e-14)
+        same = (first.mid > 0.0) == (last.mid > 0.0)
+        free = same & (np.minimum(first.least, last.least) > bend[problem] * (h * h / 8.0) * (1.0 + 1e-14))
+        problem, low, first, last, same = (part[decided[problem] & ~free] for part in (*arcs, same))
+        middle = low + step // 2
+        z, own = _node(middle), _some(s, problem)
+        monotone = slope(own.g, z).least > bend[problem] * (h / 2.0) * (1.0 + 1e-14)
         single = monotone & ~same
-        found.append((arcs.problem[single], arcs.low[single], np.full(int(single.sum()), float(step))))
+        found.append((problem[single], low[single], np.full(int(single.sum()), float(step))))
         left = ~monotone
         if step == 2 or not left.any():
-            decided[arcs.problem[left]] = False
+            decided[problem[left]] = False
             break
-        at = own.value(z)
-        p, low, mid, a, m, c = (
-            arcs.problem[left],
-            arcs.low[left],
-            middle[left],
-            arcs.at_low[left],
-            at[left],
-            arcs.at_high[left],
-        )
-        arcs = _Arcs(np.concatenate([p, p]), np.concatenate([low, mid]), join(a, m), join(m, c))
+        parts = (problem, low, middle, first, value(own.g, z), last)
+        problem, low, middle, first, at, last = (part[left] for part in parts)
+        arcs = (np.concatenate([problem] * 2), np.concatenate([low, middle]), join(first, at), join(at, last))
         step //= 2
-    else:
-        decided[arcs.problem] = False
-    problem, first, width = (np.concatenate(column) for column in zip(*found))
-    return problem, first, width
+    problem, nodes, width = (np.concatenate(column) for column in zip(*found))
+    return problem, nodes, width
 
 
-def _refine(s: _Coefficients, low: NDArray[np.int64], width: Array) -> Balls:
+def _refine(s: Sextic, low: NDArray[np.int64], width: Array) -> Balls:
     """Enclose the root of each arc: safeguarded Newton in floating point, then one interval Newton step around it."""
     grid = 2.0 * np.pi * 2.0**-25
     left = low * grid + 2.0 * np.pi * _SHIFT
     a, c = left.copy(), left + width * grid
-    g1, g2, g3 = s.g[1].mid, s.g[2].mid, s.g[3].mid
-    positive = s.g[0].mid + 2.0 * (lambda z: z * (g1 + z * (g2 + z * g3)))(np.exp(1j * a)).real >= 0.0
+    middles = [g.mid for g in s.g]
+    positive = value(middles, np.exp(1j * a)) >= 0.0
     x = 0.5 * (a + c)
     for _ in range(12):
         z = np.exp(1j * x)
-        value = s.g[0].mid + 2.0 * (z * (g1 + z * (g2 + z * g3))).real
-        slope = -2.0 * (z * (g1 + z * (2.0 * g2 + z * (3.0 * g3)))).imag
-        before = (value >= 0.0) == positive
+        at = value(middles, z)
+        before = (at >= 0.0) == positive
         a, c = np.where(before, x, a), np.where(before, c, x)
-        new = x - value / slope
+        new = x - at / slope(middles, z)
         x = np.where((new >= a) & (new <= c), new, 0.5 * (a + c))
-    value, bend = s.value(unit(exact(x))), s.bend()
-    slope_ball = s.slope(unit(exact(x)))
+    z = unit(exact(x))
+    size, least, bend = value(s.g, z).size, slope(s.g, z).least, _bend(s)
     # |G'| >= |G'(x)| - r bend within r of x; a root is within r if |G(x)| < r times that, and the arc holds only one
-    r = 4.0 * value.size / slope_ball.least + 1e-300
+    r = 4.0 * size / least + 1e-300
     inside = (left + 1e-13 <= x - r) & (x + r <= left + width * grid - 1e-13)  # the ends are rounded
-    good = (slope_ball.least > 0.0) & inside & (r * (slope_ball.least - r * bend) * (1.0 - 1e-14) > value.size)
-    tight = value.size / (slope_ball.least - r * bend) * (1.0 + 1e-13) + 1e-300
+    good = (least > 0.0) & inside & (r * (least - r * bend) * (1.0 - 1e-14) > size)
+    tight = size / (least - r * bend) * (1.0 + 1e-13) + 1e-300
     return Balls(x, np.where(good, tight, np.inf))
 
 
-def _poses(s: _Coefficients, A: Balls, b: Balls, alpha: Balls) -> tuple[Balls, Balls, Balls]:
+def _poses(s: Sextic, A: Balls, b: Balls, alpha: Balls) -> tuple[Balls, Balls, Balls]:
     """Position and ``det JX`` of every root, in scaled lengths; of infinite radius where Delta may vanish."""
     z = unit(alpha)
-    back = z.conj
-    n2, n1, n0, nm = s.n
+    back, (n2, n1, n0, nm) = z.conj, s.n
     Delta = (s.d[0] + s.d[1] * z - s.d[1].conj * back).imag  # purely imaginary
     N = (n2 * z + n1) * z + n0 + nm * back
     Q = Balls(-1j * N.mid, N.rad)  # N / (i Im Delta)
-    x, y = Q.real / Delta, Q.imag / Delta
     origin = A[:, 0] - z * b[:, 0]
-    x, y = x + origin.real, y + origin.imag
+    x, y = Q.real / Delta + origin.real, Q.imag / Delta + origin.imag
     p = Balls(x.mid + 1j * y.mid, x.rad + y.rad)
     rows = []
     for k in range(3):
@@ -383,8 +295,3 @@ def _poses(s: _Coefficients, A: Balls, b: Balls, alpha: Balls) -> tuple[Balls, B
     (a, q, c), (e, f, g), (h, i, j) = rows
     determinant = 8.0 * (a * (f * j - g * i) - q * (e * j - g * h) + c * (e * i - f * h))
     return x, y, determinant
-
-
-def _principal(alpha: Array) -> Array:
-    """Alpha in (-pi, pi]."""
-    return np.asarray(np.pi - np.mod(np.pi - alpha, 2.0 * np.pi)) if alpha.size else alpha

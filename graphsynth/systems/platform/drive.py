@@ -15,10 +15,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import check_fields, check_sizes, finite, positive, sign
+from graphsynth.core.checks import check_fields, check_sizes, finite, plane_point, positive, sign
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.triad.leg import solve_leg
 from graphsynth.mechanism.rotatability import FourBarRotation, four_bar_rotation
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -58,29 +60,19 @@ class GearTrain:
         """The three wheels can carry the same tooth orientation relative to their own leg (exact)."""
         return self.z1 % 3 == 0
 
-    @property
-    def keying_step(self) -> float:
-        """Step of the wheel angles that mounting alone offers, radians."""
-        return math.tau / self.z2
-
     def wheel_angle(self, direction: float, pinion: float = 0.0) -> float:
-        """Return a tooth angle chi_k that meshes, in [0, 2 pi / z2); the others follow in steps of `keying_step`.
+        """Return a tooth angle chi_k that meshes, in [0, 2 pi / z2); the others follow in steps of 2 pi / z2.
 
         ``direction`` is the angle of the wheel axis seen from the pinion, ``pinion`` the angle of a pinion tooth
         centre, both in radians.
         """
         turns = self.z1 * (direction - pinion) / math.tau + self.z2 * (direction + math.pi) / math.tau - 0.5
-        return (turns % 1.0) * self.keying_step
+        return (turns % 1.0) * (math.tau / self.z2)
 
     def wheels_clear(self, module: float = 1.0, addendum: float = 0.0) -> bool:
         """Tell whether neighbouring wheels stay apart, with ``addendum`` added to their pitch radii for ``module``."""
-        module = positive("module", module)
-        addendum = positive("addendum", addendum, zero=True)
-        centre = 0.5 * module * (self.z1 + self.z2)
-        return math.sqrt(3.0) * centre > 2.0 * (0.5 * module * self.z2 + addendum)
-
-
-Array = NDArray[np.float64]
+        module, addendum = positive("module", module), positive("addendum", addendum, zero=True)
+        return 0.5 * math.sqrt(3.0) * module * (self.z1 + self.z2) > module * self.z2 + 2.0 * addendum
 
 
 class Event(NamedTuple):
@@ -99,15 +91,6 @@ class Event(NamedTuple):
     pose: tuple[float, float, float] | None = None
 
 
-_BARRIERS = {
-    "lock": ("drive lock", "drive {0} locks: coupler and rocker in line; the crank cannot pass"),
-    "change point": (
-        "change point",
-        "drive {0} reaches a change point: the branches tau = +1 and tau = -1 meet and both continue; choose one",
-    ),
-}
-
-
 class DriveMotion(NamedTuple):
     """Rocker of the drive: ``phi`` in its leg frame (radians), d/dpsi, d2/dpsi2, ``h_phi = tau S_B``, leg status."""
 
@@ -119,7 +102,7 @@ class DriveMotion(NamedTuple):
 
 
 class DriveTurn(NamedTuple):
-    """Exact statement on a full turn.
+    """Exact statement on a full rotation.
 
     ``kind`` is "full turn", "change point", "limited", "immovable" or "never assembled"; ``admissible`` lists the
     intervals of the wheel angle psi (radians) inside the reach; None means every psi.
@@ -153,10 +136,7 @@ class FourBarDrive:
 
     def __post_init__(self) -> None:
         for name in ("axis", "pivot"):
-            value = complex(getattr(self, name))
-            finite(f"{name}.real", value.real)
-            finite(f"{name}.imag", value.imag)
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, plane_point(name, getattr(self, name)))
         object.__setattr__(self, "crank", positive("crank", self.crank, zero=True))
         for name in ("coupler", "rocker"):
             object.__setattr__(self, name, positive(name, getattr(self, name)))
@@ -167,61 +147,43 @@ class FourBarDrive:
         check_fields(self, ("crank", "coupler", "rocker", "axis", "pivot"))
         check_sizes("FourBarDrive", {"distance of axis and pivot": self.axis - self.pivot})
 
-    def motion(self, psi: ArrayLike, scale: float = 1.0) -> DriveMotion:
+    def motion(self, psi: ArrayLike) -> DriveMotion:
         """Rocker angle and its first two derivatives with respect to psi (radians, any shape).
 
-        ``scale`` multiplies the crank length.  NaN with a status where the drive cannot be assembled; the derivatives
-        are also NaN where it locks (``h_phi = 0``).
+        NaN with a status where the drive cannot be assembled; the derivatives are also NaN where it locks
+        (``h_phi = 0``).
         """
-        turn = np.exp(1j * (np.asarray(psi, dtype=np.float64) + self.phase))
-        arm = np.asarray(scale * self.crank * turn, dtype=np.complex128)
-        return self._rocker(arm, np.asarray(1j * arm), np.asarray(-arm))
-
-    def _rocker(
-        self, arm: NDArray[np.complex128], arm1: NDArray[np.complex128], arm2: NDArray[np.complex128]
-    ) -> DriveMotion:
+        arm = np.asarray(self.crank * np.exp(1j * (np.asarray(psi, dtype=np.float64) + self.phase)))
         w = (self.axis - self.pivot) + arm
         leg = solve_leg(w.real, w.imag, self.rocker, self.coupler)
         phi = leg.angle(self.tau)
         rocker = self.rocker * np.exp(1j * phi)
         link = rocker - w  # C - B
         moment = np.where(leg.S > 0.0, self.tau * leg.S / 2.0, np.nan)  # cross(C - D, C - B)
-        phi1 = _dot(link, arm1) / moment
-        speed = 1j * rocker * phi1 - arm1
-        phi2 = (-(np.abs(speed) ** 2) + _dot(link, arm2 + rocker * phi1 * phi1)) / moment
+        phi1 = (np.conj(link) * (1j * arm)).real / moment
+        speed = 1j * rocker * phi1 - 1j * arm
+        phi2 = ((np.conj(link) * (rocker * phi1 * phi1 - arm)).real - np.abs(speed) ** 2) / moment
         return DriveMotion(phi, phi1, phi2, self.tau * leg.S, leg.status)
-
-    def growth(self, psi: float, scale: float) -> tuple[float, float]:
-        """Phi and ``d phi / d scale`` for the homotopy from zero crank length."""
-        unit = np.asarray(self.crank * np.exp(1j * (psi + self.phase)), dtype=np.complex128)
-        moved = self._rocker(np.asarray(scale * unit), unit, np.zeros_like(unit))
-        return float(moved.phi), float(moved.phi1)
 
     def turn(self) -> DriveTurn:
         """Whether the crank turns fully, decided in exact arithmetic on the given numbers (theory/platform-drive 5)."""
-        state = self._rotation()
+        state, square = self._rotation()
         if state.kind not in ("limited", "immovable"):
             return DriveTurn(state.kind, () if state.kind == "never assembled" else None)
-        return DriveTurn(state.kind, self._limited())
+        return DriveTurn(state.kind, self._limited(square))
 
-    @property
-    def _square(self) -> Fraction:
-        """Square of the distance of the fixed points, exactly."""
-        x = Fraction(self.axis.real) - Fraction(self.pivot.real)
-        y = Fraction(self.axis.imag) - Fraction(self.pivot.imag)
-        return x * x + y * y
-
-    def _rotation(self) -> FourBarRotation:
-        square = self._square
-        crank, rocker, coupler = (Fraction(x) for x in (self.crank, self.rocker, self.coupler))
+    def _rotation(self) -> tuple[FourBarRotation, float]:
+        """Exact statement on the rotation, and the square of the distance of the fixed points."""
+        x, y = (Fraction(getattr(self.axis, s)) - Fraction(getattr(self.pivot, s)) for s in ("real", "imag"))
+        square = x * x + y * y
+        crank, rocker, coupler = (Fraction(length) for length in (self.crank, self.rocker, self.coupler))
         if crank == 0:
             inside = (rocker - coupler) ** 2 <= square <= (rocker + coupler) ** 2
-            return FourBarRotation("full turn" if inside else "never assembled", (False, False), ())
-        return four_bar_rotation(square, crank, coupler, rocker)
+            return FourBarRotation("full turn" if inside else "never assembled", (False, False), ()), float(square)
+        return four_bar_rotation(square, crank, coupler, rocker), float(square)
 
-    def _limited(self) -> tuple[tuple[float, float], ...]:
+    def _limited(self, square: float) -> tuple[tuple[float, float], ...]:
         """Return the admissible angles of a crank that can be somewhere."""
-        square = float(self._square)
         span = 2.0 * math.sqrt(square) * self.crank
         bounds = abs(self.rocker - self.coupler), self.rocker + self.coupler
         low, high = ((bound * bound - square - self.crank**2) / span for bound in bounds)
@@ -236,19 +198,19 @@ class FourBarDrive:
             intervals = [(inner, outer), (-outer, -inner)]
         return tuple((start + shift, stop + shift) for start, stop in intervals)
 
-    def barriers(self) -> tuple[tuple[float, str], ...]:
-        """Wheel angles psi in [0, 2 pi) that the crank cannot pass on a definite branch, with "lock" or "change point".
+    def barriers(self) -> tuple[str, str, list[float]]:
+        """Tell what the crank cannot pass on a definite branch: kind and meaning of the event, wheel angles psi.
 
         The angles are closed forms in double precision; whether there are any is decided exactly (see `turn`).
         """
-        state = self._rotation()
+        state, square = self._rotation()
         if state.kind in ("limited", "immovable"):
-            return tuple(sorted((bound % math.tau, "lock") for interval in self._limited() for bound in interval))
-        if state.kind != "change point":
-            return ()
+            locks = [bound for interval in self._limited(square) for bound in interval]
+            return "drive lock", "locks: coupler and rocker in line; the crank cannot pass", locks
+        text = "reaches a change point: the branches tau = +1 and tau = -1 meet and both continue; choose one"
         shift = cmath.phase(self.axis - self.pivot) - self.phase  # the pin is farthest from the pivot here
-        angles = [angle for angle, met in zip((shift + math.pi, shift), state.touches) if met]
-        return tuple(sorted((angle % math.tau, "change point") for angle in angles))
+        touches = state.touches if state.kind == "change point" else ()
+        return "change point", text, [angle for angle, met in zip((shift + math.pi, shift), touches) if met]
 
     def dead_points(self) -> tuple[float, ...]:
         """Wheel angles psi in [0, 2 pi) at which crank and coupler are in line, so that the rocker reverses."""
@@ -270,17 +232,13 @@ class FourBarDrive:
         return tuple(sorted(found))
 
 
-def _dot(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> Array:
-    return np.asarray((np.conj(a) * b).real)
-
-
-def first_barrier(drives: Sequence[FourBarDrive], start: float, stop: float) -> Event | None:
-    """First drive lock or change point in (start, stop]: no continuation may step over it."""
-    found: list[Event] = []
+def first_barrier(drives: Sequence[FourBarDrive], psi: Array) -> Event | None:
+    """First drive lock or change point after psi[0] up to psi[-1]: no continuation may step over it."""
+    start, found = float(psi[0]), []
     for number, drive in enumerate(drives, start=1):
-        for angle, kind in drive.barriers():
+        kind, text, angles = drive.barriers()
+        for angle in angles:
             at = start + (angle - start) % math.tau
-            if start < at <= stop:
-                name, text = _BARRIERS[kind]
-                found.append(Event(name, at, number, True, text.format(number)))
+            if start < at <= float(psi[-1]):
+                found.append(Event(kind, at, number, True, f"drive {number} {text}"))
     return min(found, key=lambda event: event.psi, default=None)

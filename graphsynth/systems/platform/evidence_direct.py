@@ -17,8 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.errors import GraphsynthError
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
+from graphsynth.systems.platform.certified_assembly_modes import AssemblyCertificate, certify_direct
+from graphsynth.systems.platform.certified_modes_batch import certify_direct_batch
+from graphsynth.systems.platform.motion import distance
 
 if TYPE_CHECKING:
     from graphsynth.systems.platform.parallel_platform import ParallelPlatform
@@ -28,8 +30,10 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 _REFERENCE = f"interpolated closure condition, roots with {DIGITS} digits"
 _KIND = "largest distance of a mode from the reference"
+PROVED = f"none needed; checked to hold the result with {DIGITS} digits"
 #: Modes and their proved radii (scaled), None for a problem that is not decided.
 Proved = list[tuple[Array, float] | None]
+Timed = Sequence[float]
 
 
 def _away(found: Array, truth: Array, size: float) -> float:
@@ -38,33 +42,19 @@ def _away(found: Array, truth: Array, size: float) -> float:
         return math.inf
     if not len(found):
         return 0.0
-    d = found[:, None] - truth[None]
-    turn = np.angle(np.exp(1j * d[..., 2]))
-    distance = np.sqrt((d[..., 0] ** 2 + d[..., 1] ** 2) / size**2 + turn**2)
-    return float(max(distance.min(axis=0).max(), distance.min(axis=1).max()))
+    apart = np.array([distance(truth, pose, size) for pose in found])
+    return float(max(apart.min(axis=0).max(), apart.min(axis=1).max()))
 
 
 def assessed(
-    method: str,
-    setting: str,
-    found: Sequence[Array],
-    truth: Sequence[Array],
-    size: float,
-    seconds: float,
-    rounds: int,
-    **more: Any,
+    method: str, setting: str, found: Sequence[Array], truth: Sequence[Array], size: float, timed: Timed, **more: Any
 ) -> Row:
     """Row of a method that gives all modes: a wrong number of modes anywhere is a failure."""
-    gaps = [_away(np.asarray(one), right, size) for one, right in zip(found, truth)]
-    wrong = sum(not math.isfinite(gap) for gap in gaps)
-    error = max((gap for gap in gaps if math.isfinite(gap)), default=math.nan)
+    gaps = np.array([_away(np.asarray(one), right, size) for one, right in zip(found, truth)])
+    wrong = int(np.isinf(gaps).sum())
     why = f"another number of modes than the reference in {wrong} of {len(gaps)} problems" if wrong else ""
-    status, error = (RowStatus.FAILED, math.nan) if wrong else (RowStatus.OK, error)
-    return Row(method, setting, error, seconds, rounds, _KIND, _REFERENCE, status, why, **more)
-
-
-def _split(problem: NDArray[np.intp], poses: Array, count: int) -> list[Array]:
-    return [poses[problem == k] for k in range(count)]
+    error = math.nan if wrong else float(gaps.max())
+    return Row.of(method, setting, error, timed, why, kind=_KIND, reference=_REFERENCE, **more)
 
 
 def mode_problem(
@@ -86,15 +76,13 @@ def mode_problem(
     rows: list[Row] = []
     for many in (n, 20 * n) if effort.quick else (1, n, 100 * n, 1000 * n):
         tiled = np.resize(theta, (many, 3))
-        batch, seconds, rounds = best_of(partial(platform.direct_batch, tiled), effort)
-        part = min(many, n)
-        found = _split(batch.problem, batch.poses, part)
-        rows.append(assessed("sextic and Newton", f"{many} at once", found, truth[:part], size, seconds / many, rounds))
+        batch, *timed = best_of(partial(platform.direct_batch, tiled), effort)
+        found = [batch.poses[batch.problem == k] for k in range(min(many, n))]
+        rows.append(assessed("sextic and Newton", f"{many} at once", found, truth, size, timed, many=many))
     anchors = platform.elbows(theta)
     for polish in (0, 1, 2):
-        modes, seconds, rounds = best_of(partial(eigenvalue_modes, anchors, b, l2, polish=polish), effort)
-        setting = f"{polish} Newton steps"
-        rows.append(assessed("companion eigenvalues", setting, modes, truth, size, seconds / n, rounds))
+        modes, *timed = best_of(partial(eigenvalue_modes, anchors, b, l2, polish=polish), effort)
+        rows.append(assessed("companion eigenvalues", f"{polish} Newton steps", modes, truth, size, timed, many=n))
     rows += _one_mode(platform, theta, truth, size, effort)
     rows += _proved_rows(platform, theta, truth, size, effort)
     note = "scipy's fsolve finds one mode from a guess near it; all others find all modes."
@@ -110,12 +98,12 @@ def _one_mode(
     rows = []
     for tol in (1e-4, 1e-8, 1e-12) if which else ():
         run = partial(_fsolve, platform, [(theta[k], truth[k][0]) for k in which], size, tol)
-        found, seconds, rounds = best_of(run, effort)
+        found, *timed = best_of(run, effort)
         worst = max(_away(X[None], truth[k][:1], size) for X, k in zip(found, which))
-        lost = (RowStatus.UNRELIABLE, "it ends at another mode or at none")
-        verdict = lost if worst > 1e-3 else (RowStatus.OK, "")
-        cost = (seconds / len(which), rounds)
-        rows.append(Row("scipy fsolve, one mode", f"tol {tol:.0e}", worst, *cost, _KIND, _REFERENCE, *verdict))
+        more: dict[str, Any] = {"kind": _KIND, "reference": _REFERENCE, "many": len(which)}
+        why = "it ends at another mode or at none" if worst > 1e-3 else ""
+        setting, status = f"tol {tol:.0e}", RowStatus.UNRELIABLE
+        rows.append(Row.of("scipy fsolve, one mode", setting, worst, timed, why, status=status, **more))
     return rows
 
 
@@ -136,47 +124,39 @@ def _fsolve(platform: ParallelPlatform, given: Sequence[tuple[Array, Array]], si
 def _proved_rows(
     platform: ParallelPlatform, theta: Array, truth: Sequence[Array], size: float, effort: Effort
 ) -> list[Row]:
-    from graphsynth.systems.platform.certified_assembly_modes import certify_direct
-
-    n = len(theta)
-    rows = []
+    n, rows = len(theta), []
     for many in (n, 4 * n) if effort.quick else (1, n, 10 * n):
-        tiled = np.resize(theta, (many, 3))
-        run, right = partial(_batch, platform, tiled, size), truth[: min(many, n)]
-        rows.append(proof_row("certified, balls of doubles", f"{many} at once", run, right, size, many, effort))
+        run = partial(_batch, platform, np.resize(theta, (many, 3)), size)
+        rows.append(proof_row("certified, balls of doubles", f"{many} at once", run, truth, size, many, effort))
     few, usual = min(n, 2 if effort.quick else 6), signature(certify_direct).parameters["max_bits"].default
     for bits in (64, 128, 512):
         run = partial(_singly, platform, theta[:few], bits, size)
-        row = proof_row("certified, one by one", f"up to {bits} bits", run, truth[:few], size, few, effort)
+        row = proof_row("certified, one by one", f"up to {bits} bits", run, truth, size, few, effort)
         rows.append(replace(row, default=bits == usual))
     return rows
 
 
 def _batch(platform: ParallelPlatform, theta: Array, size: float) -> Proved:
-    from graphsynth.systems.platform import certify_direct_batch
-
     proof = certify_direct_batch(platform, theta)
-    unit = np.array([size, size, 1.0])
+    radii = np.linalg.norm(proof.radii / [size, size, 1.0], axis=-1)
     found: Proved = []
     starts = np.searchsorted(proof.problem, np.arange(len(theta) + 1))
     for k in range(len(theta)):
         own = slice(starts[k], starts[k + 1])
-        radius = float(np.linalg.norm(proof.radii[own] / unit, axis=-1).max(initial=0.0))
-        found.append((proof.poses[own], radius) if proof.counts[k] >= 0 else None)
+        known = proof.counts[k] >= 0
+        found.append((proof.poses[own], float(radii[own].max(initial=0.0))) if known else None)
     return found
 
 
 def _singly(platform: ParallelPlatform, theta: Array, bits: int, size: float) -> Proved:
-    from graphsynth.systems.platform import certify_direct
+    return [of_certificate(certify_direct(platform, angles.tolist(), max_bits=bits), size) for angles in theta]
 
-    unit = np.array([size, size, 1.0])
-    found: Proved = []
-    for angles in theta:
-        proof = certify_direct(platform, angles.tolist(), max_bits=bits)
-        poses = np.array([mode.pose for mode in proof.modes]).reshape(-1, 3)
-        radius = max((float(np.linalg.norm(np.asarray(mode.radius) / unit)) for mode in proof.modes), default=0.0)
-        found.append((poses, radius) if proof.certified else None)
-    return found
+
+def of_certificate(proof: AssemblyCertificate, size: float) -> tuple[Array, float] | None:
+    """Modes of a certificate and the largest of their radii (scaled); None if it is not decided."""
+    poses = np.array([mode.pose for mode in proof.modes]).reshape(-1, 3)
+    radius = max((float(np.linalg.norm(mode.radius / [size, size, 1.0])) for mode in proof.modes), default=0.0)
+    return (poses, radius) if proof.certified else None
 
 
 def proof_row(
@@ -189,21 +169,15 @@ def proof_row(
     effort: Effort,
 ) -> Row:
     """Row of a method that proves: its radius, and whether the reference lies within."""
-    kind = "largest proved radius"
-    try:
-        found, seconds, rounds = best_of(run, effort)
-    except GraphsynthError as error:  # the extra is not installed
-        return Row(method, setting, math.nan, math.nan, 0, kind, "", RowStatus.FAILED, str(error))
-    reference = f"none needed; checked to hold the modes with {DIGITS} digits"
+    found, *timed = best_of(run, effort)
     open_ = sum(one is None for one in found[: len(truth)])
-    why = f"undecided in {open_} of {len(truth)} problems" if open_ else ""
+    why = f"undecided in {open_} of {min(len(truth), len(found))} problems" if open_ else ""
     for one, right in zip(found, truth):
         if one is not None and not _away(one[0], right, size) <= one[1] + 1e-15:
             why = "the reference lies outside of what is proved"
-    radius = max((one[1] for one in found if one is not None), default=math.nan)
-    verdict = (RowStatus.FAILED if why else RowStatus.OK, why)
-    radius = math.nan if why else radius
-    return Row(method, setting, radius, seconds / many, rounds, kind, reference, *verdict, proved=True)
+    radius = math.nan if why else max(one[1] for one in found if one is not None)
+    more: dict[str, Any] = {"kind": "largest proved radius", "reference": PROVED, "proved": True, "many": many}
+    return Row.of(method, setting, radius, timed, why, **more)
 
 
 def precise_modes(anchors: Sequence[Any], vertices: Sequence[complex], lengths: Sequence[float]) -> Array:
@@ -287,21 +261,16 @@ def eigenvalue_modes(
     for k, roots in enumerate(every):
         z = roots[np.abs(np.abs(roots) - 1.0) < band]
         z = z / np.abs(z)
-        p = _place(z, anchors[k], vertices, lengths)
+        w = z[:, None] * vertices - anchors[k]  # position from two differences of the closure equations
+        r = lengths**2 - np.abs(w) ** 2
+        u, v = w[:, 1] - w[:, 0], w[:, 2] - w[:, 0]
+        det = (np.conj(u) * v).imag
+        p = (v * (r[:, 1] - r[:, 0]) - u * (r[:, 2] - r[:, 0])) / (2j * det)
         X = np.stack([p.real, p.imag, np.angle(z)], axis=-1)
         for _ in range(polish):
             X = _newton(X, anchors[k], vertices, lengths)
         found.append(X[np.argsort(X[:, 2])])
     return found
-
-
-def _place(z: Complex, A: Complex, b: Complex, l2: Array) -> Complex:
-    """Position for a rotation from two differences of the closure equations."""
-    w = z[:, None] * b - A
-    r = l2**2 - np.abs(w) ** 2
-    u, v = w[:, 1] - w[:, 0], w[:, 2] - w[:, 0]
-    det = (np.conj(u) * v).imag
-    return np.asarray((v * (r[:, 1] - r[:, 0]) - u * (r[:, 2] - r[:, 0])) / (2j * det))
 
 
 def _newton(X: Array, A: Complex, b: Complex, l2: Array) -> Array:

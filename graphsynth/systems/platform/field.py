@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import checked, finite, three_points, whole
-from graphsynth.core.errors import GeometryError
+from graphsynth.core.checks import checked, finite, sign, three, three_points, whole
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform, cross
 
 Array = NDArray[np.float64]
@@ -23,13 +22,8 @@ Array = NDArray[np.float64]
 
 def working_mode(sigma: Sequence[int]) -> tuple[int, int, int]:
     """Return the working mode as a tuple; `GeometryError` unless it has three entries +1 or -1."""
-    try:
-        values = tuple(sigma)
-    except TypeError:
-        values = ()
-    if len(values) != 3 or any(not isinstance(s, int | float | np.number) or s not in (1, -1) for s in values):
-        raise GeometryError(f"sigma = {sigma!r} must hold three entries +1 or -1, the working mode")
-    return (int(values[0]), int(values[1]), int(values[2]))
+    first, second, third = (sign(f"sigma of leg {k}", s) for k, s in enumerate(three("sigma", sigma), 1))
+    return first, second, third
 
 
 def characteristic_length(platform: ParallelPlatform) -> float:
@@ -56,10 +50,10 @@ def pose_grid(platform: ParallelPlatform, alpha: float | None, nodes: int) -> tu
     return low[0] + (high[0] - low[0]) * steps, low[1] + (high[1] - low[1]) * steps
 
 
-def cofactors(matrix: Array) -> Array:
-    """Cofactor matrices (..., 3, 3): row k is the cross product of the two other rows.  NaN passes silently."""
-    first, second, third = matrix[..., 0, :], matrix[..., 1, :], matrix[..., 2, :]
-    return np.stack([np.cross(second, third), np.cross(third, first), np.cross(first, second)], axis=-2)
+def poses_at(positions: ArrayLike, alpha: float) -> Array:
+    """Poses (..., 3) at complex positions (...) and one orientation."""
+    p = np.asarray(positions, dtype=np.complex128)
+    return np.stack([p.real, p.imag, np.full(p.shape, alpha)], axis=-1)
 
 
 def determinant(matrix: Array) -> Array:
@@ -92,13 +86,6 @@ class BoundaryCircle(NamedTuple):
     angle: float = math.nan
 
 
-class Meeting(NamedTuple):
-    """Common points of two circles; ``kind`` is "apart", "crossing", "tangent" or "coincident"."""
-
-    kind: str
-    points: tuple[complex, ...]
-
-
 @checked
 def leg_circles(
     platform: ParallelPlatform, alpha: float, sigma: tuple[int, ...] | None, limits: tuple[Limits, ...]
@@ -122,25 +109,28 @@ def leg_circles(
     return found
 
 
-def meet(a: BoundaryCircle, b: BoundaryCircle, tolerance: float) -> Meeting:
-    """Return the common points of two circles; closer than ``tolerance`` (a length) counts as tangent or coincident."""
+def meet(a: BoundaryCircle, b: BoundaryCircle, tolerance: float) -> tuple[str, tuple[complex, ...]]:
+    """Tell how two circles lie, "apart", "crossing", "tangent" or "coincident", and their common points.
+
+    Closer than ``tolerance`` (a length) counts as tangent or coincident.
+    """
     gap = b.centre - a.centre
     d, total, difference = abs(gap), a.radius + b.radius, a.radius - b.radius
     if d <= tolerance and abs(difference) <= tolerance:
-        return Meeting("coincident", ())
+        return "coincident", ()
     if d == 0.0:
-        return Meeting("apart", ())
+        return "apart", ()
     unit = gap / d
     if abs(d - total) <= tolerance:
-        return Meeting("tangent", (a.centre + a.radius * unit,))
+        return "tangent", (a.centre + a.radius * unit,)
     if abs(d - abs(difference)) <= tolerance:
         larger = a if difference > 0.0 else b
-        return Meeting("tangent", (larger.centre + larger.radius * (unit if difference > 0.0 else -unit),))
+        return "tangent", (larger.centre + larger.radius * (unit if difference > 0.0 else -unit),)
     if d > total or d < abs(difference):
-        return Meeting("apart", ())
+        return "apart", ()
     along = 0.5 * (d + difference * total / d)
     across = math.sqrt((total - d) * (total + d) * (d - difference) * (d + difference)) / (2.0 * d)
-    return Meeting("crossing", (a.centre + unit * (along + 1j * across), a.centre + unit * (along - 1j * across)))
+    return "crossing", (a.centre + unit * (along + 1j * across), a.centre + unit * (along - 1j * across))
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,9 +172,10 @@ def singular_conic(anchors: ArrayLike, vertices: ArrayLike, alpha: float) -> Sin
     g = A - arm
     u2, u3 = complex(g[0] - g[1]), complex(g[0] - g[2])
     t1 = _moment(arm[0], g[0])
-    t2 = _moment(arm[1], g[1]) - t1
-    t3 = _moment(arm[2], g[2]) - t1
-    quadratic = _product(t3, _turned(u2, g[0])) - _product(t2, _turned(u3, g[0]))
+    t2, t3 = (_moment(arm[k], g[k]) - t1 for k in (1, 2))
+    P = np.outer(t2, _moment(u3, g[0])) - np.outer(t3, _moment(u2, g[0]))
+    P = P + P.T
+    quadratic = np.array([0.5 * P[0, 0], P[0, 1], 0.5 * P[1, 1], P[0, 2], P[1, 2], 0.5 * P[2, 2]])
     quadratic[3:] += cross(u2, u3) * t1
     c = tuple(float(8.0 * value) for value in quadratic)
     discriminant = c[1] ** 2 - 4.0 * c[0] * c[2]
@@ -206,22 +197,3 @@ def _kind(c: tuple[float, ...], discriminant: float, size: float) -> str:
 def _moment(arm: complex, g: complex) -> NDArray[np.float64]:
     """``cross(arm, p - g)`` as coefficients of (x, y, 1)."""
     return np.array([-arm.imag, arm.real, -cross(arm, g)])
-
-
-def _turned(u: complex, g: complex) -> NDArray[np.float64]:
-    """``cross(p - g, u)`` as coefficients of (x, y, 1)."""
-    return np.array([u.imag, -u.real, -cross(g, u)])
-
-
-def _product(s: NDArray[np.float64], t: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Product of two linear functions as coefficients of (xx, xy, yy, x, y, 1)."""
-    return np.array(
-        [
-            s[0] * t[0],
-            s[0] * t[1] + s[1] * t[0],
-            s[1] * t[1],
-            s[0] * t[2] + s[2] * t[0],
-            s[1] * t[2] + s[2] * t[1],
-            s[2] * t[2],
-        ]
-    )

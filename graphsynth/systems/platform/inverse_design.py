@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import checked, finite, plane_point, three
 from graphsynth.systems.platform.small_crank import (
-    Harmonics,
+    RejectedError,
     SmallCrank,
     Sweep,
     cold_sweep,
@@ -87,13 +88,12 @@ def _wanted(value: ArrayLike) -> Complex:
 
 
 def _with(mechanism: SingleMotorPlatform, crank: Complex, coupler: ArrayLike | None = None) -> SingleMotorPlatform:
-    length, phase = np.abs(crank), np.angle(crank)
     changes: dict[str, Any] = {
-        "crank": tuple(float(v) for v in length),
-        "phase": tuple(float(v) for v in np.where(length > 0.0, phase, 0.0)),
+        "crank": tuple(np.abs(crank).tolist()),
+        "phase": tuple(np.where(crank != 0.0, np.angle(crank), 0.0).tolist()),
     }
     if coupler is not None:
-        changes["coupler"] = tuple(float(v) for v in np.asarray(coupler))
+        changes["coupler"] = tuple(np.asarray(coupler).tolist())
     return replace(mechanism, **changes)
 
 
@@ -117,8 +117,7 @@ def linear_design(mechanism: SingleMotorPlatform, wanted: ArrayLike, *, samples:
     >>> [round(length, 6) for length in found.mechanism.crank], found.error < 2e-3
     ([2.106173, 5.296477, 3.190303], True)
     """
-    target = _wanted(wanted)
-    theory = small_crank(mechanism)
+    target, theory = _wanted(wanted), small_crank(mechanism)
     return assess_design(_linear(mechanism, theory, target), target, theory.home, samples=samples)
 
 
@@ -145,18 +144,27 @@ def refine_design(
     >>> found.accepted, found.error < 1e-13, [round(length, 6) for length in found.mechanism.coupler]
     (True, True, [45.099772, 45.157369, 45.113339])
     """
-    target = _wanted(wanted)
-    theory = small_crank(mechanism)
+    target, theory = _wanted(wanted), small_crank(mechanism)
     if not target.any():
         return assess_design(_with(mechanism, np.zeros(3, dtype=np.complex128)), target, theory.home, samples=samples)
-    found, reason, count = _refine(mechanism, theory, target, couplers, samples, tolerance)
-    if found is not None:
+    refine = partial(_refine, mechanism, theory, couplers, samples, tolerance)
+    found, reason, count = refine(target)
+    reached, step = (0.0, 0.5) if found is None else (1.0, 0.0)
+    while step > 0.005 and reached < 1.0:  # follow the design from small amplitudes
+        share, start = min(1.0, reached + step), None
+        if found is not None:
+            own = found.mechanism
+            crank = np.array(own.crank) * np.exp(1j * np.array(own.phase))
+            start = _with(own, np.asarray(crank * (share / reached))), found
+        further, why, _ = refine(share * target, start)
+        if further is None:
+            step, reason = 0.5 * step, why
+        else:
+            found, reached = further, share
+    if found is not None and reached == 1.0:
         return assess_design(found.mechanism, target, theory.home, samples=samples, iterations=count)
-    best, reached, reason_there = _grow(mechanism, theory, target, couplers, samples, tolerance)
-    if best is not None and reached == 1.0:
-        return assess_design(best.mechanism, target, theory.home, samples=samples, iterations=count)
-    rejected = best.mechanism if best is not None else _linear(mechanism, theory, target)
-    return _rejected(rejected, reason_there or reason, target, count, reached)
+    rejected = found.mechanism if found is not None else _linear(mechanism, theory, target)
+    return _rejected(rejected, reason, target, count, reached)
 
 
 def _rejected(mechanism: SingleMotorPlatform, reason: str, target: Complex, count: int, reached: float) -> Design:
@@ -164,61 +172,37 @@ def _rejected(mechanism: SingleMotorPlatform, reason: str, target: Complex, coun
     return Design(mechanism, False, reason, target, nothing + 0j, nothing, nan, nan, nan, nan, count, reached, None)
 
 
-def _grow(
-    mechanism: SingleMotorPlatform, theory: SmallCrank, target: Complex, couplers: bool, samples: int, tolerance: float
-) -> tuple[Sweep | None, float, str]:
-    """Follow the design from small amplitudes; the last one, its fraction of the amplitude, and what stops it."""
-    best: Sweep | None = None
-    reached, step, reason = 0.0, 0.5, ""
-    while step > 0.005 and reached < 1.0:
-        share = min(1.0, reached + step)
-        start = None
-        if best is not None:
-            own = best.mechanism
-            crank = np.array(own.crank) * np.exp(1j * np.array(own.phase))
-            start = warm_sweep(_with(own, np.asarray(crank * (share / reached))), best)
-        found, why, _ = _refine(mechanism, theory, share * target, couplers, samples, tolerance, start)
-        if found is None:
-            step, reason = 0.5 * step, why
-        else:
-            best, reached = found, share
-    return best, reached, reason
-
-
 def _refine(
     mechanism: SingleMotorPlatform,
     theory: SmallCrank,
-    target: Complex,
     couplers: bool,
     samples: int,
     tolerance: float,
-    start: Sweep | None = None,
+    target: Complex,
+    start: tuple[SingleMotorPlatform, Sweep] | None = None,
 ) -> tuple[Sweep | None, str, int]:
-    """Newton iteration from ``start`` or the linear design; the sweep of the solution, or None with the reason."""
+    """Newton iteration from ``start`` (and what is near it) or the linear design; the sweep found, or None and why."""
     weight = np.array([1.0, 1.0, mechanism.Lc])
-    size = float(np.linalg.norm(weight * target))
-    sweep = start if start is not None else cold_sweep(_linear(mechanism, theory, target), samples)
-    if sweep.reason:
-        return None, sweep.reason, 0
-    unknowns, last = (9 if couplers else 6), math.inf
-    for count in range(_ITERATIONS + 1):
-        residual, matrix = _equations(sweep, theory.home, target, weight, unknowns)
-        error = float(np.linalg.norm(residual)) / size
-        if error <= tolerance or (error <= 100.0 * tolerance and error >= 0.5 * last):
-            return sweep, "", count
-        if count and error > 2.0 * last:
-            return None, f"no convergence: relative residual {error:.3g} after {count} iterations", count
-        step = np.linalg.solve(matrix, -residual)
-        own = sweep.mechanism
-        crank = np.array(own.crank) * np.exp(1j * np.array(own.phase)) + step[:3] + 1j * step[3:6]
-        coupler = np.array(own.coupler) + (step[6:] if couplers else 0.0)
-        if coupler.min() <= 0.0:
-            return None, f"a coupler length becomes {coupler.min():.3g}, not positive", count
-        sweep = warm_sweep(_with(own, crank, coupler), sweep)
-        if sweep.reason:
-            return None, sweep.reason, count
-        last = error
-    return None, f"no convergence: relative residual {last:.3g} after {_ITERATIONS} iterations", _ITERATIONS
+    size, last, count = float(np.linalg.norm(weight * target)), math.inf, 0
+    try:
+        sweep = warm_sweep(*start) if start else cold_sweep(_linear(mechanism, theory, target), samples)
+        for count in range(_ITERATIONS + 1):
+            residual, matrix = _equations(sweep, theory.home, target, weight, 9 if couplers else 6)
+            error = float(np.linalg.norm(residual)) / size
+            if error <= tolerance or (error <= 100.0 * tolerance and error >= 0.5 * last):
+                return sweep, "", count
+            if (count and error > 2.0 * last) or count == _ITERATIONS:
+                return None, f"no convergence: relative residual {error:.3g} after {count} iterations", count
+            step = np.linalg.solve(matrix, -residual)
+            own = sweep.mechanism
+            crank = np.array(own.crank) * np.exp(1j * np.array(own.phase)) + step[:3] + 1j * step[3:6]
+            coupler = np.array(own.coupler) + (step[6:] if couplers else 0.0)
+            if coupler.min() <= 0.0:
+                return None, f"a coupler length becomes {coupler.min():.3g}, not positive", count
+            sweep, last = warm_sweep(_with(own, crank, coupler), sweep), error
+    except RejectedError as reason:
+        return None, str(reason), count
+    raise AssertionError  # the loop returns
 
 
 def _equations(sweep: Sweep, home: Array, target: Complex, weight: Array, unknowns: int) -> tuple[Array, Array]:
@@ -241,17 +225,18 @@ def assess_design(
     """Follow a mechanism over a whole turn and compare it with the wanted first harmonic about ``home``."""
     target, start = _wanted(wanted), np.asarray(home, dtype=np.float64)
     weight = np.array([1.0, 1.0, mechanism.Lc])
-    sweep = cold_sweep(mechanism, samples)
-    if sweep.reason:
-        return _rejected(mechanism, sweep.reason, target, iterations, math.nan)
-    measured: Harmonics = harmonics(sweep.pose)
+    try:
+        sweep = cold_sweep(mechanism, samples)
+    except RejectedError as reason:
+        return _rejected(mechanism, str(reason), target, iterations, math.nan)
+    measured = harmonics(sweep.pose)
     size = float(np.linalg.norm(weight * target)) or math.nan
     achieved, mean = measured.order(1), measured.mean - start
     error = float(np.linalg.norm(weight * (achieved - target))) / size
     drift, distortion = float(np.linalg.norm(weight * mean)) / size, measured.total_distortion(mechanism.Lc)
     off = _off_line(weight * (sweep.pose - start), weight * target)
-    motion, moved = mechanism.full_turn(np.linspace(0.0, math.tau, samples + 1)), (target, achieved, mean)
-    return Design(mechanism, True, "", *moved, error, drift, distortion, off, iterations, 1.0, motion)
+    sizes = (error, drift, distortion, off)
+    return Design(mechanism, True, "", target, achieved, mean, *sizes, iterations, 1.0, sweep.motion)
 
 
 def _off_line(path: Array, wanted: Complex) -> float:

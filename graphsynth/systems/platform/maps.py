@@ -12,14 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import checked, finite, finite_array, positive, whole
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.field import (
-    characteristic_length,
-    cofactors,
-    determinant,
-    pose_grid,
-    scaled_rows,
-    working_mode,
-)
+from graphsynth.systems.platform.field import characteristic_length, determinant, pose_grid, scaled_rows, working_mode
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
 Array = NDArray[np.float64]
@@ -101,24 +94,22 @@ def quality(platform: ParallelPlatform, poses: ArrayLike, sigma: Sequence[int], 
     X = finite_array("poses", poses)
     if X.shape[-1:] != (3,):
         raise GeometryError(f"poses have shape {X.shape}; give (..., 3): x, y, alpha")
-    found = platform.inverse(X, mode)
-    reachable = np.isfinite(found.theta).all(axis=-1)
-    JX, JT = platform.jacobians(X[reachable], found.theta[reachable])
+    theta = platform.inverse(X, mode).theta
+    reachable = np.isfinite(theta).all(axis=-1)
+    JX, JT = platform.jacobians(X[reachable], theta[reachable])
     values = _values(platform, scaled_rows(JX, length), JT, length)
-
-    def spread(array: Array) -> Array:
-        full = np.full(reachable.shape, np.nan)
-        full[reachable] = array
-        return full
-
-    a, b, c, d, e, f, g, h, i = (spread(array) for array in values)
-    return Quality(a, b, c, d, e, f, g, h, i, length)
+    spread: list[Any] = [np.full(reachable.shape, np.nan) for _ in values]
+    for array, value in zip(spread, values):
+        array[reachable] = value
+    spread.append(length)
+    return Quality(*spread)
 
 
-def _values(platform: ParallelPlatform, rows: Array, JT: Array, Lc: float) -> list[Array]:
+def _values(platform: ParallelPlatform, rows: Array, JT: Array, Lc: float) -> tuple[Any, ...]:
     """Quantities for the rows of ``JX diag(1, 1, 1/Lc)``, in the order of `Quality`."""
     l1, l2 = np.array(platform.l1), np.array(platform.l2)
-    adjugate = np.swapaxes(cofactors(rows), -1, -2)
+    a, b, c = rows[..., 0, :], rows[..., 1, :], rows[..., 2, :]
+    adjugate = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-1)
     determinant = np.einsum("...i,...i->...", rows[..., 0, :], adjugate[..., :, 0])
     smallest = np.linalg.svd(rows, compute_uv=False)[..., 2]
     # det * J_s stays finite at type II: its singular values over |det| are those of J_s
@@ -133,8 +124,7 @@ def _values(platform: ParallelPlatform, rows: Array, JT: Array, Lc: float) -> li
         force = 1.0 / np.linalg.svd(unit, compute_uv=False)[..., 2]
         arms = 2.0 * l1 * l2
         reach = np.where(arms > 0.0, np.abs(JT) / np.where(arms > 0.0, arms, 1.0), 0.0).min(axis=-1)
-    found = (determinant * Lc, smallest, dexterity, slowest, fastest, held_least, held_most, force, reach)
-    return [np.asarray(array, dtype=np.float64) for array in found]
+    return determinant * Lc, smallest, dexterity, slowest, fastest, held_least, held_most, force, reach
 
 
 @checked
@@ -214,12 +204,14 @@ def aspects(
     [-1]
     """
     from scipy.ndimage import label
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
 
     sigma = working_mode(sigma)
     count = nodes or (200 if alpha is not None else 64)
     if count < 4 or angles < 4:
         raise GeometryError(f"nodes = {count}, angles = {angles}: the grid needs 4 nodes or more along each axis")
-    every = np.arange(angles) * (math.tau / angles) - math.pi
+    every = np.linspace(-math.pi, math.pi, angles, endpoint=False)
     turn = every if alpha is None else np.array([finite("alpha", alpha)])
     x, y = pose_grid(platform, None if alpha is None else float(turn[0]), count)
     X = np.stack(np.broadcast_arrays(x[:, None, None], y[None, :, None], turn), axis=-1)
@@ -230,50 +222,23 @@ def aspects(
     for sign in (1, -1):
         with np.errstate(invalid="ignore"):
             part, found = label(sign * values > 0.0)
-        if alpha is None:
-            part, found = _wrapped(part, found)
+        if alpha is None:  # parts may meet across alpha = pi
+            pairs = np.stack([part[:, :, 0].ravel(), part[:, :, -1].ravel()])
+            pairs = pairs[:, pairs.all(axis=0)]
+            joined = coo_array((np.ones(pairs.shape[1]), pairs), shape=(found + 1, found + 1))
+            found, names = connected_components(joined, directed=False)
+            part, found = names[part], found - 1
         labels = np.where(part > 0, part + len(signs), labels)
         signs += [sign] * found
-    cell = (x[1] - x[0]) * (y[1] - y[0]) * (1.0 if alpha is not None else math.tau / angles)
-    return _sorted(sigma, math.nan if alpha is None else float(turn[0]), labels, signs, X, values, float(cell))
-
-
-def _wrapped(part: NDArray[np.int64], count: int) -> tuple[NDArray[np.int64], int]:
-    """Join parts that meet across alpha = pi."""
-    parent = list(range(count + 1))
-
-    def root(k: int) -> int:
-        while parent[k] != k:
-            parent[k] = parent[parent[k]]
-            k = parent[k]
-        return k
-
-    for a, b in np.unique(np.stack([part[:, :, 0].ravel(), part[:, :, -1].ravel()], axis=1), axis=0):
-        if a and b:
-            parent[root(int(a))] = root(int(b))
-    roots = sorted({root(k) for k in range(1, count + 1)})
-    table = np.array([0] + [1 + roots.index(root(k)) for k in range(1, count + 1)])
-    return table[part], len(roots)
-
-
-def _sorted(
-    sigma: tuple[int, ...],
-    alpha: float,
-    labels: NDArray[np.int64],
-    signs: list[int],
-    X: NDArray[np.float64],
-    values: NDArray[np.float64],
-    cell: float,
-) -> Aspects:
+    cell = float((x[1] - x[0]) * (y[1] - y[0]) * (1.0 if alpha is not None else math.tau / angles))
     cells = np.bincount(labels.ravel(), minlength=len(signs) + 1)[1:]
     order = np.argsort(-cells, kind="stable")
+    order = order[cells[order] >= LEAST]
     rank = np.zeros(len(signs) + 1, dtype=np.int64)
-    rank[order + 1] = np.arange(1, len(signs) + 1)
+    rank[order + 1] = np.arange(1, len(order) + 1)
     parts = []
-    unresolved = int(cells[cells < LEAST].sum())
-    for k in order[cells[order] >= LEAST]:
-        own = np.where(labels == k + 1, np.abs(values), -1.0)
-        x, y, a = (float(v) for v in X.reshape(-1, 3)[int(np.argmax(own))])
-        parts.append(Aspect(signs[k], float(cells[k]) * cell, (x, y, a), int(cells[k])))
-    rank[rank > len(parts)] = 0
-    return Aspects(sigma, alpha, tuple(parts), unresolved, rank[labels], X[:, 0, 0, 0], X[0, :, 0, 1], X[0, 0, :, 2])
+    for k in order:
+        inside = int(np.argmax(np.where(labels == k + 1, np.abs(values), -1.0)))
+        parts.append(Aspect(signs[k], float(cells[k]) * cell, tuple(X.reshape(-1, 3)[inside].tolist()), int(cells[k])))
+    at, unresolved = math.nan if alpha is None else float(turn[0]), int(cells[cells < LEAST].sum())
+    return Aspects(sigma, at, tuple(parts), unresolved, rank[labels], x, y, turn)

@@ -1,4 +1,4 @@
-"""Motion of the platform over the wheel angle: branches followed without jumps, events, closure of the turn, labels.
+"""Motion of the platform over the wheel angle: branches followed without jumps, events, closure, labels.
 
 A step is accepted only if the corrector moves little, converges at a quadratic rate and keeps the sign of ``det JX``;
 otherwise it is halved.  A step that becomes too small ends the branch with its place and reason, never with a jump.
@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,32 +59,24 @@ class Monodromy:
     @property
     def periods(self) -> tuple[int, ...]:
         """Number of turns after which each mode returns to itself; 0 if it never does because a branch ends."""
-        return tuple(self._period(mode) for mode in range(len(self.permutation)))
-
-    def _period(self, mode: int) -> int:
-        at = mode
-        for turns in range(1, len(self.permutation) + 1):
-            at = self.permutation[at]
-            if at < 0:
-                return 0
-            if at == mode:
-                return turns
-        return 0
+        found = []
+        for mode, at in enumerate(self.permutation):
+            turns = 1
+            while 0 <= at != mode and turns < len(self.permutation):
+                at, turns = self.permutation[at], turns + 1
+            found.append(turns if at == mode else 0)
+        return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
-    """One branch over many wheel angles, positions and derivatives only.
+class _Followed:
+    """What was followed over the wheel angle: n angles, and N dimension sets where there are many.
 
-    * `psi` (shape (n,)): wheel angles asked for, radians.
-    * `pose`, `velocity` (shape (n, 3)): ``(x, y, alpha)`` and d/dpsi; NaN from ``reached`` on.
-    * `theta`, `theta_velocity` (shape (n, 3)): rocker angles, continuous along the motion, and d/dpsi.
-    * `determinant` (shape (n,)): ``det JX``.
-    * `acceleration`, `theta_acceleration` (shape (n, 3)): second derivatives by psi, if asked for.
-    * `reached`: number of wheel angles reached on the branch.
-    * `complete`: all of them were.
-    * `end`: wheel angle and pose at which the branch ended.
-    * `reason`: why it ended early; empty if it is complete.
+    * `psi` (shape (n,)): wheel angles, radians.
+    * `pose`, `velocity` (shape (n, 3) or (N, n, 3)): ``(x, y, alpha)`` and d/dpsi; NaN from ``reached`` on.
+    * `theta`, `theta_velocity` (shapes as above): rocker angles, continuous along the motion, and d/dpsi.
+    * `determinant` (shape (n,) or (N, n)): ``det JX``.
+    * `acceleration`, `theta_acceleration` (shapes as above): second derivatives by psi, if asked for.
     """
 
     psi: Array
@@ -95,6 +87,18 @@ class Sweep:
     determinant: Array
     acceleration: Array | None
     theta_acceleration: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep(_Followed):
+    """One branch over many wheel angles, positions and derivatives only.
+
+    * `reached`: number of wheel angles reached on the branch.
+    * `complete`: all of them were.
+    * `end`: wheel angle and pose at which the branch ended.
+    * `reason`: why it ended early; empty if it is complete.
+    """
+
     reached: int
     complete: bool
     end: tuple[float, ...]
@@ -102,27 +106,15 @@ class Sweep:
 
 
 @dataclass(frozen=True, eq=False)
-class TurnBatch:
+class TurnBatch(_Followed):
     """Home branches of N dimension sets over the same n wheel angles.
 
-    * `psi` (shape (n,)): wheel angles, radians.
-    * `pose`, `velocity`, `theta`, `theta_velocity` (shape (N, n, 3)): as in `Sweep`; NaN from ``reached`` on.
-    * `determinant` (shape (N, n)): ``det JX``.
-    * `acceleration`, `theta_acceleration` (shape (N, n, 3)): second derivatives by psi, if asked for.
     * `status` (shape (N,)): ``graphsynth.systems.platform.motion.BranchEnd``: how each branch ended.
     * `reached` (shape (N,)): number of wheel angles reached.
     * `end` (shape (N, 4)): wheel angle (for HOME_ENDS the scale of the cranks) and pose where the branch ended.
     * `closure_error` (shape (N,)): scaled distance of the last pose from the first; NaN if not complete.
     """
 
-    psi: Array
-    pose: Array
-    velocity: Array
-    theta: Array
-    theta_velocity: Array
-    determinant: Array
-    acceleration: Array | None
-    theta_acceleration: Array | None
     status: NDArray[np.int8]
     reached: NDArray[np.int64]
     end: Array
@@ -135,22 +127,16 @@ class TurnBatch:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
-    """One tracked branch over the wheel angle.
+class Motion(_Followed):
+    """One tracked branch over the wheel angle, up to where it stops.
 
-    * `psi` (shape (n,)): wheel angles that were reached, radians; fewer than asked for if the motion stops.
-    * `pose`, `velocity`, `acceleration` (shape (n, 3)): ``(x, y, alpha)`` and its first and second derivatives with
-      respect to psi.
-    * `theta` (shape (n, 3)): rocker angles, continuous along the motion.
-    * `determinant` (shape (n,)): ``det JX``.
     * `leg` (shape (n, 3)): ``JT_kk = sigma_k S_k`` of the legs.
     * `drive` (shape (n, 3)): ``h_phi = tau_k S_B,k`` of the drives.
     * `gap` (shape (n,)): scaled distance to the nearest other assembly mode; infinite if there is none.
     * `residual`: largest closure error over the turn relative to the square of the largest length.
     * `complete`: the whole asked range was reached on one branch.
     * `closed`: after ``period`` turns the pose returns to the start.
-    * `closure_error`: scaled distance of the end pose from the start pose after one turn; NaN if the turn is not
-      complete.
+    * `closure_error`: scaled distance of the end pose from the start pose after one turn; NaN if not complete.
     * `period`: number of turns until closure; 0 if not closed.
     * `events`: in order of psi.
     * `label`: of the start pose.
@@ -160,12 +146,7 @@ class Motion:
     * `monodromy`: what all assembly modes become after the turn; None if the range is not one turn or the branch ends.
     """
 
-    psi: Array
-    pose: Array
-    velocity: Array
     acceleration: Array
-    theta: Array
-    determinant: Array
     leg: Array
     drive: Array
     gap: Array
@@ -237,6 +218,16 @@ class Tracked(NamedTuple):
     end: Array
 
 
+def followed(psi: Array, found: Tracked, key: Any) -> dict[str, Any]:
+    """Arrays of `Sweep`, `TurnBatch` and `Motion`: ``key`` takes the machine and the angles."""
+    names = {"theta_velocity": "theta1", "theta_acceleration": "theta2"}
+    arrays = {name: getattr(found, names.get(name, name)) for name in _Followed.__annotations__ if name != "psi"}
+    second = found.theta2.shape[1] > 0
+    return {"psi": psi} | {
+        name: array[key] if second or not name.endswith("acceleration") else None for name, array in arrays.items()
+    }
+
+
 def track(
     machines: Array, psi: Array, stops: Array, guess: Array, Lc: float, *, grown: bool, accelerations: bool
 ) -> Tracked:
@@ -250,10 +241,9 @@ def track(
 
     count, n = len(machines), len(psi)
     vectors, second = (count, n, 3), (count, n if accelerations else 0, 3)
-    pose, velocity, theta, theta1 = np.empty(vectors), np.empty(vectors), np.empty(vectors), np.empty(vectors)
-    theta2, acceleration, determinant = np.empty(second), np.empty(second), np.empty(vectors[:2])
-    status, reached, end = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.empty((count, 4))
-    found = Tracked(pose, velocity, theta, theta1, determinant, theta2, acceleration, status, reached, end)
+    shapes = (vectors, vectors, vectors, vectors, vectors[:2], second, second)
+    arrays: list[Any] = [*map(np.empty, shapes), *np.empty((2, count), dtype=np.int64), np.empty((count, 4))]
+    found = Tracked(*arrays)
     given = (np.require(a, dtype=np.float64, requirements=["C", "W"]) for a in (machines, psi, stops, guess))
     turns(*given, grown, Lc, found)
     for i in np.flatnonzero(found.reached < n):

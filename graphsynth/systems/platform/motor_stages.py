@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from graphsynth.core.errors import GeometryError, SceneError, SpecError
 from graphsynth.pipeline.display import balance_rows, limit_table, quantity_table, table
 from graphsynth.pipeline.products import Attempt, Finding, Quantity, Record, Table
@@ -112,8 +114,6 @@ def drive(context: Context) -> tuple[LabelledRun, ...]:
 def _runs(
     table: PlatformDriveTable | MachineDriveTable, drives: Iterable[MotorDrivenPlatform]
 ) -> tuple[LabelledRun, ...]:
-    import numpy as np
-
     times = np.linspace(0.0, table.end, table.samples)
     pairs = zip(table.resistances, drives)
     return tuple(LabelledRun(r, model, model.simulate(times, rtol=table.tolerance)) for r, model in pairs)
@@ -121,8 +121,6 @@ def _runs(
 
 def without_inertia(context: Context) -> WithoutInertia:
     """Run the regularised model of the source, then the model with ever smaller inertia."""
-    import numpy as np
-
     w = table_of(context).without_inertia
     times = np.linspace(0.0, w.end, 501)
     with _refused(context, "without_inertia"):
@@ -136,8 +134,6 @@ def without_inertia(context: Context) -> WithoutInertia:
 
 def claim(context: Context) -> Claim:
     """Linear criterion and simulated ripples for the cases; the simulated map."""
-    import numpy as np
-
     from graphsynth.systems.platform.resistance import resistance_effect, ripple_map
 
     c = table_of(context).claim
@@ -156,8 +152,6 @@ def claim(context: Context) -> Claim:
 
 def limit(context: Context) -> ReductionStudy | None:
     """Compare inductances with the limit L -> 0; None if the scene names none."""
-    import numpy as np
-
     t = table_of(context).limit
     if not t.inductances:
         return None
@@ -170,8 +164,6 @@ def limit(context: Context) -> ReductionStudy | None:
 
 def solvers(context: Context) -> tuple[Table, ...]:
     """Error against run time beside scipy; not part of the shipped outputs."""
-    import numpy as np
-
     from graphsynth.evidence.drives import drive_work_precision
     from graphsynth.pipeline.display import work_table
 
@@ -194,25 +186,18 @@ def assess(
 
 def _record(number: int, item: LabelledRun) -> Record:
     if not item.run.complete:
-        return Record(
-            number, status="failed", recognised_as="platform_drive", reason=f"{item.label}: {item.run.reason}"
-        )
+        reason = f"{item.label}: {item.run.reason}"
+        return Record(number, status="failed", recognised_as="platform_drive", reason=reason)
     margins = _margins(item)
     return Record(number, recognised_as="platform_drive", verdict=_words(item, margins), margins=margins)
 
 
 def _words(item: LabelledRun, margins: tuple[Quantity, ...]) -> str:
-    speed, torque = margins[2].value, margins[3].value
-    return (
-        f"{item.label}: in steady motion the speed varies by {speed:.4g} rad/s, the torque by {torque:.4g} N m "
-        "(estimated)"
-    )
+    varies = f"the speed varies by {margins[2].value:.4g} rad/s, the torque by {margins[3].value:.4g} N m"
+    return f"{item.label}: in steady motion {varies} (estimated)"
 
 
 def _margins(item: LabelledRun) -> tuple[Quantity, ...]:
-    import numpy as np
-
-    from graphsynth.core.errors import SpecError
     from graphsynth.systems.platform.resistance import steady_ripple
 
     run, motor = item.run, item.drive.motor
@@ -224,18 +209,18 @@ def _margins(item: LabelledRun) -> tuple[Quantity, ...]:
     except SpecError:
         speed = current = other = second = math.nan
     constant = float(getattr(motor, "torque_constant", 1.0))
-    torque_error = constant * abs(current - second)
-    w_error, i_error = float(run.error[1]), float(run.error[-1]) * constant
-    return (
-        Quantity("mean speed, second half", mean, "rad/s", "estimated", 2.0 * float(run.error[0]) / span),
-        Quantity("largest torque at the samples", float(run.motor_torque.max()), "N m", "estimated", i_error),
-        Quantity("steady speed ripple, peak to peak", speed, "rad/s", "estimated", abs(speed - other)),
-        Quantity("steady torque ripple, peak to peak", constant * current, "N m", "estimated", torque_error),
-        Quantity("crank angle at the end", float(run.angle[-1]), "rad", "estimated", float(run.error[0])),
-        Quantity("speed at the end", float(run.speed[-1]), "rad/s", "estimated", w_error),
-        Quantity("torque at the end", float(run.motor_torque[-1]), "N m", "estimated", i_error),
-        Quantity("turns made", float(np.floor(run.angle[-1] / math.tau)), "", "exact", 0.0),
+    angle_error, w_error, i_error = float(run.error[0]), float(run.error[1]), float(run.error[-1]) * constant
+    rows = (
+        ("mean speed, second half", mean, "rad/s", 2.0 * angle_error / span),
+        ("largest torque at the samples", run.motor_torque.max(), "N m", i_error),
+        ("steady speed ripple, peak to peak", speed, "rad/s", abs(speed - other)),
+        ("steady torque ripple, peak to peak", constant * current, "N m", constant * abs(current - second)),
+        ("crank angle at the end", run.angle[-1], "rad", angle_error),
+        ("speed at the end", run.speed[-1], "rad/s", w_error),
+        ("torque at the end", run.motor_torque[-1], "N m", i_error),
     )
+    turns = Quantity("turns made", float(np.floor(run.angle[-1] / math.tau)), "", "exact", 0.0)
+    return *(Quantity(name, float(value), unit, "estimated", error) for name, value, unit, error in rows), turns
 
 
 def run_tables(runs: tuple[LabelledRun, ...], *, headline: bool = False) -> tuple[Table, ...]:
@@ -269,7 +254,13 @@ def _claim_tables(context: Context, found: Claim) -> tuple[Table, ...]:
         "r, the speed ripple if and only if Om/w_n > 0.7071. Simulated: estimated, the full model over the second half "
         f"of {table_of(context).claim.revolutions} mean revolutions."
     )
-    finding = _claim_finding(found)
+    count = len(found.effects)
+    falls = [sum(row[column] == "falls" for row in trends) for column in (3, 5)]
+    calms = "calms" if falls == [count, count] else "does not always calm"
+    finding = Finding(
+        f"A larger armature resistance {calms} the machine: of {count} cases the ripple of the speed falls throughout "
+        f"in {falls[0]}, that of the torque in {falls[1]} (estimated)."
+    )
     return (
         table("Does a larger resistance calm the machine?", _TREND_COLUMNS, trends, truth, finding),
         table("Ripples over the resistance", _RIPPLE_COLUMNS, rows, note),
@@ -297,35 +288,8 @@ _RIPPLE_COLUMNS = (
 )
 
 
-def _claim_finding(found: Claim) -> Finding:
-    """Answer the claim: in how many cases each ripple falls all the way."""
-    count = len(found.effects)
-    speed = sum(_trend(effect.simulated_speed) == "falls" for effect in found.effects.values())
-    torque = sum(_trend(effect.simulated_current) == "falls" for effect in found.effects.values())
-    calms = "calms" if speed == torque == count else "does not always calm"
-    return Finding(
-        f"A larger armature resistance {calms} the machine: of {count} cases the ripple of the speed falls throughout "
-        f"in {speed}, that of the torque in {torque} (estimated)."
-    )
-
-
-def _bare_findings(bare: WithoutInertia, root: float) -> tuple[Finding, ...]:
-    """Say what the model without rotor inertia does at its first dead centre."""
-    first = next((event for event in bare.source.events if event.kind == "dead centre"), None)
-    if first is None:
-        return ()
-    return (
-        Finding(
-            f"Without rotor inertia the crank speed is unbounded at each dead centre, first after {first.time:.4g} s; "
-            f"the platform passes it at {abs(first.motion) / root:.4g} m/s (estimated)."
-        ),
-    )
-
-
 def _trend(values: object) -> str:
     """Words for the way a ripple goes over increasing resistance."""
-    import numpy as np
-
     steps = np.diff(np.asarray(values, dtype=np.float64))
     if not np.isfinite(steps).all():
         return "not known: a run failed"
@@ -339,35 +303,21 @@ def _trend(values: object) -> str:
 def _bare_tables(context: Context, bare: WithoutInertia) -> tuple[Table, ...]:
     moved, source = table_of(context).platform, bare.source
     root = math.sqrt(moved.mass)
+    scale = moved.amplitude * root
     events = [
-        (
-            e.kind,
-            e.angle / math.pi,
-            e.time,
-            e.fictitious_time * moved.amplitude * root,
-            e.motion / root,
-            ", ".join(f"{i:.13g}" for i in e.currents),
-        )
+        (e.kind, e.angle / math.pi, e.time, e.fictitious_time * scale, e.motion / root, listed)
         for e in source.events[:20]
+        for listed in [", ".join(f"{i:.13g}" for i in e.currents)]
     ]
     more = len(source.events) - len(events)
     note = "Regularised by dt = |cos q| ds: the crank speed is unbounded there, the speed of the platform is not."
     note += f" {more} more events are left out." if more > 0 else ""
-
-    def end(run: DriveRun) -> float | str:
-        return float(run.angle[-1]) if run.complete else run.reason
-
-    rows: list[tuple[object, ...]] = [
-        (
-            f"{inertia:.0e}",
-            end(run),
-            abs(run.angle[-1] - source.angle[-1]),
-            float(abs(run.speed).max()),
-            run.energy_error,
-        )
-        for inertia, run in zip(bare.inertias, bare.runs)
-    ]
-    rows.append(("none", end(source), None, "unbounded", source.energy_error))
+    rows: list[tuple[object, ...]] = []
+    for inertia, run in zip((*bare.inertias, None), (*bare.runs, source)):
+        end = float(run.angle[-1]) if run.complete else run.reason
+        apart, fastest = abs(run.angle[-1] - source.angle[-1]), float(abs(run.speed).max())
+        of_run = ("none", end, None, "unbounded") if inertia is None else (f"{inertia:.0e}", end, apart, fastest)
+        rows.append((*of_run, run.energy_error))
     columns = (
         "J_0 [kg m²]",
         f"angle at {source.time[-1]:g} s [rad] | .12g",
@@ -375,7 +325,17 @@ def _bare_tables(context: Context, bare: WithoutInertia) -> tuple[Table, ...]:
         "largest speed [rad/s] | .5g",
         "energy | .1e",
     )
-    found = _bare_findings(bare, root)
+    first = next((event for event in source.events if event.kind == "dead centre"), None)
+    found = (
+        []
+        if first is None
+        else [
+            Finding(
+                f"Without rotor inertia the crank speed is unbounded at each dead centre, first after {first.time:.4g} s; "
+                f"the platform passes it at {abs(first.motion) / root:.4g} m/s (estimated)."
+            )
+        ]
+    )
     return (
         table("Without inertia: dead centres and reversals", _EVENT_COLUMNS, events, note, *found),
         table("The model without inertia is a limit", columns, rows, "Estimated; the largest speed at the samples."),
@@ -408,16 +368,9 @@ def machine_drive(machine: SingleMotorPlatform, table: MachineDriveTable, resist
     """Build the drive of the real machine for an armature resistance (ohm)."""
     from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 
-    model = MotorDrivenPlatform.of_machine(
-        machine,
-        dc_motor(table.motor, resistance),
-        mass=table.mass,
-        gyration=table.gyration,
-        mass_centre=complex(*table.mass_centre),
-        wheel_inertia=table.wheel_inertia,
-        pinion_inertia=table.pinion_inertia,
-        length=1.0,
-    )
+    shared = {name: getattr(table, name) for name in ("mass", "gyration", "wheel_inertia", "pinion_inertia")}
+    motor, centre = dc_motor(table.motor, resistance), complex(*table.mass_centre)
+    model = MotorDrivenPlatform.of_machine(machine, motor, mass_centre=centre, length=1.0, **shared)
     train = replace(model.train, efficiency=table.efficiency)
     return replace(model, train=train, friction=table.friction, load=table.load)
 

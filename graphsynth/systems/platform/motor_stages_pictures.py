@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from graphsynth.drawing.plots import Chart, Line, Mark, themed_svg
 from graphsynth.pipeline.display import TURN, chart, shown_motion
 from graphsynth.pipeline.products import Picture
 from graphsynth.pipeline.stages import Context
@@ -12,7 +15,6 @@ from graphsynth.systems.platform.motor_stages import Claim, LabelledRun, Without
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.driven.reduction import ReductionStudy
-    from graphsynth.dynamics.driven.run import DriveRun
 
 _COLOURS = ("a", "b", "c", "d")
 _STYLES = ("-", "--", "-.", ":")
@@ -20,10 +22,7 @@ _STYLES = ("-", "--", "-.", ":")
 
 def sketches(context: Context) -> tuple[Picture, ...]:
     """Draw crank, slot and platform at one angle, and the inertia that the motor feels over a turn."""
-    import numpy as np
-
     from graphsynth.drawing.diagram import mechanism_sketch
-    from graphsynth.drawing.plots import Line
     from graphsynth.dynamics.driven.inertia import EffectiveInertia
 
     moved = table_of(context).platform
@@ -47,8 +46,6 @@ def sketches(context: Context) -> tuple[Picture, ...]:
 
 def _yoke(amplitude: float, q: Any) -> tuple[Any, Any]:
     """Crank with a pin in the slot of a platform that slides along y, and its poses (n, 3, 3) at crank angles."""
-    import numpy as np
-
     from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
     from graphsynth.mechanism.laws import Driver
     from graphsynth.mechanism.model import Mechanism, TracePoint
@@ -72,8 +69,6 @@ def _yoke(amplitude: float, q: Any) -> tuple[Any, Any]:
 
 def animations(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Picture, ...]:
     """Let the crank make its last turn with the speed that the motor gives it, slowed down."""
-    import numpy as np
-
     from graphsynth.drawing.animation import animated_svg
 
     amplitude = table_of(context).platform.amplitude
@@ -104,7 +99,6 @@ def plots(
 ) -> tuple[Picture, ...]:
     """Torque, speed and phase portraits; the model without inertia; the claim; the limit L -> 0."""
     from graphsynth.drawing.drive_pictures import reduction_picture
-    from graphsynth.drawing.plots import themed_svg
     from graphsynth.systems.platform.resistance import ripple_map_picture, ripple_picture
 
     pictures = [*run_pictures(runs), *_bare_pictures(context, bare)]
@@ -126,20 +120,18 @@ def plots(
 
 def run_pictures(runs: tuple[LabelledRun, ...]) -> list[Picture]:
     """Torque and speed over time (Figures 6 and 7 of the source), and two phase portraits of the steady motion."""
-    from graphsynth.drawing.plots import Line
-
     torque, speed, turn, spiral = [], [], [], []
     for k, item in enumerate(runs):
         run, look = item.run, (item.label, _COLOURS[k % 4], _STYLES[k % 4])
         late = run.time >= 0.5 * run.time[-1]
+        angle = run.angle[late] % math.tau
+        ends = np.flatnonzero(np.abs(np.diff(angle)) > math.pi) + 1  # a gap where a rotation ends
         torque.append(Line(run.time, run.motor_torque, *look))
         speed.append(Line(run.time, run.speed, *look))
-        turn.append(Line(*_wrapped(run, late), *look))
+        turn.append(Line(np.insert(angle, ends, np.nan), np.insert(run.speed[late], ends, np.nan), *look))
         spiral.append(Line(run.motor_torque, run.speed, *look))
-    rest, steady = (
-        "From rest, for each armature resistance.",
-        "Second half of the run: a closed curve is a steady motion.",
-    )
+    rest = "From rest, for each armature resistance."
+    steady = "Second half of the run: a closed curve is a steady motion."
     loop = "From rest (0, 0) into the steady loop."
     y = "speed [rad/s]"
     return [
@@ -150,41 +142,23 @@ def run_pictures(runs: tuple[LabelledRun, ...]) -> list[Picture]:
     ]
 
 
-def _wrapped(run: DriveRun, rows: Any) -> tuple[Any, Any]:
-    """Crank angle within a rotation and speed, with a gap where a rotation ends."""
-    import numpy as np
-
-    angle, value = run.angle[rows] % math.tau, run.speed[rows].copy()
-    ends = np.flatnonzero(np.abs(np.diff(angle)) > math.pi) + 1
-    return np.insert(angle, ends, np.nan), np.insert(value, ends, np.nan)
-
-
 def _bare_pictures(context: Context, bare: WithoutInertia) -> list[Picture]:
-    import numpy as np
-
-    from graphsynth.drawing.plots import Chart, Line, Mark
-
     run = bare.source
     root = math.sqrt(table_of(context).platform.mass) or 1.0
     marks = [Mark(event.time, event.kind, "soft" if event.kind == "dead centre" else "b") for event in run.events]
     moving = Chart([Line(run.time, run.momentum / root)], "time [s]", "speed of the platform [m/s]", marks=marks)
     spike = float(np.nanpercentile(np.abs(run.speed), 97.0))
-    lines = [Line(run.time, np.where(np.abs(run.speed) <= spike, run.speed, np.nan), "none", "a")]
-    for k, (inertia, other) in enumerate(zip(bare.inertias[:3], bare.runs), 1):
+    labels = ("none", *(f"{inertia:.0e}" for inertia in bare.inertias[:3]))
+    lines = []
+    for k, (label, other) in enumerate(zip(labels, (run, *bare.runs))):
         shown = np.where(np.abs(other.speed) <= spike, other.speed, np.nan)
-        lines.append(Line(other.time, shown, f"{inertia:.0e}", _COLOURS[k], _STYLES[k]))
-    speeds = Chart(lines, "time [s]", "crank speed [rad/s]", marks=marks[:0])
+        lines.append(Line(other.time, shown, label, _COLOURS[k], _STYLES[k]))
+    speeds = Chart(lines, "time [s]", "crank speed [rad/s]")
+    upright = "The regularised model of the source passes its dead centres (upright lines); this speed stays finite."
+    cut = f"J_0 in kg m². The spikes of the crank speed at the dead centres are cut off at {spike:.3g} rad/s."
     return [
-        Picture(
-            "Without inertia: speed of the platform",
-            moving.svg(),
-            "The regularised model of the source passes its dead centres (upright lines); this speed stays finite.",
-        ),
-        Picture(
-            "Without and with ever smaller inertia",
-            speeds.svg(),
-            f"J_0 in kg m². The spikes of the crank speed at the dead centres are cut off at {spike:.3g} rad/s.",
-        ),
+        Picture("Without inertia: speed of the platform", moving.svg(), upright),
+        Picture("Without and with ever smaller inertia", speeds.svg(), cut),
     ]
 
 
@@ -192,10 +166,6 @@ def curves(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Picture, ..
     """Torque, speed and phase portraits, the inertia over a turn, the torque at constant speed."""
     if not runs:
         return ()
-    import numpy as np
-
-    from graphsynth.drawing.plots import Line
-
     model, table = runs[0].drive, machine_table(context)
     q = np.linspace(0.0, math.tau, 361)
     own = Line((), model.constant_inertia, "rotor, pinion, wheels", "soft", "--")

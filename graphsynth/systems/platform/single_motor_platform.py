@@ -32,6 +32,7 @@ from graphsynth.systems.platform.motion import (
     dimension_sets,
     distance,
     events,
+    followed,
     track,
     wheel_angles,
 )
@@ -143,7 +144,7 @@ class SingleMotorPlatform:
         """The three-leg platform in the fixed frame."""
         turn = directions(self.frame_angle)
         D, b = np.array(self.pivot) * turn, np.array(self.vertex) * turn
-        return ParallelPlatform((D[0], D[1], D[2]), (b[0], b[1], b[2]), self.l1, self.l2)
+        return ParallelPlatform(tuple(D), tuple(b), self.l1, self.l2)
 
     @cached_property
     def drives(self) -> tuple[FourBarDrive, FourBarDrive, FourBarDrive]:
@@ -167,7 +168,7 @@ class SingleMotorPlatform:
         return DriveState(phi + offset, phi1, phi2, h_phi, np.stack([m.status for m in moved], axis=-1))
 
     def drive_turns(self) -> tuple[DriveTurn, DriveTurn, DriveTurn]:
-        """Exact full-turn statement of each drive (theory/platform-drive 5)."""
+        """Exact statement on the full rotation of each drive (theory/platform-drive 5)."""
         first, second, third = (drive.turn() for drive in self.drives)
         return (first, second, third)
 
@@ -179,7 +180,7 @@ class SingleMotorPlatform:
         GeometryError
             If the drives cannot be assembled there, the home pose does not close, or the branch ends on the way.
         """
-        tracked = self.follow(np.array([finite("psi", psi)]), None, np.inf, accelerations=False)
+        tracked = self.follow(np.array([finite("psi", psi)]), None, None, accelerations=False)
         return np.asarray(tracked.pose[0, 0])
 
     @cached_property
@@ -195,21 +196,15 @@ class SingleMotorPlatform:
             rows.append([*crank, *constants[k, :6], bell[k].real, bell[k].imag, angles[k], *platform])
         return np.array(rows)
 
-    def follow(self, psi: Array, start: ArrayLike | None, stop: float, *, accelerations: bool) -> Tracked:
-        """Track the home branch, or the one of ``start``, through wheel angles psi (n,) up to ``stop`` (radians).
+    def follow(self, psi: Array, start: ArrayLike | None, stop: Event | None, *, accelerations: bool) -> Tracked:
+        """Track the home branch, or the one of ``start``, through wheel angles psi (n,) up to an event.
 
-        Raises
-        ------
-        GeometryError
-            If there is no such branch at the first angle.
+        Raises `GeometryError` if there is no such branch at the first angle.
         """
         guess = np.array(self.home) if start is None else triple("start", start)
-        stops, grown = np.array([stop]), start is None
+        stops, grown = np.array([np.inf if stop is None else stop.psi]), start is None
         tracked = track(self._machine[None], psi, stops, guess[None], self.Lc, grown=grown, accelerations=accelerations)
-        self._require_start(BranchEnd(int(tracked.status[0])), float(psi[0]), float(tracked.end[0, 0]))
-        return tracked
-
-    def _require_start(self, status: BranchEnd, psi: float, scale: float) -> None:
+        status = BranchEnd(int(tracked.status[0]))
         if status is BranchEnd.NO_HOME:
             reach = np.abs(np.array(self.axis) - np.array(self.pivot))
             sides = np.array(self.rocker), np.array(self.coupler)
@@ -218,11 +213,14 @@ class SingleMotorPlatform:
             raise GeometryError(f"home = {self.home} is not close to an assembled pose; give a pose near the home pose")
         if status is BranchEnd.HOME_ENDS:
             raise GeometryError(
-                f"the home branch ends at {scale:.6g} of the crank lengths {self.crank} at psi = {psi}; "
+                f"the home branch ends at {tracked.end[0, 0]:.6g} of the crank lengths {self.crank} at psi = {psi[0]}; "
                 "use shorter cranks"
             )
         if status is BranchEnd.NO_START:
-            raise GeometryError(f"start is not close to an assembled pose at psi = {psi}; take one of all_poses(psi)")
+            raise GeometryError(
+                f"start is not close to an assembled pose at psi = {psi[0]}; take one of all_poses(psi)"
+            )
+        return tracked
 
     def sweep(self, psi: ArrayLike, start: ArrayLike | None = None, *, accelerations: bool = False) -> Sweep:
         """Follow one branch through increasing wheel angles, fast: without events or comparison with other modes.
@@ -253,22 +251,15 @@ class SingleMotorPlatform:
         (True, [0.672631, -5.007799, 0.053385])
         """
         angles = wheel_angles(finite_array("psi", psi))
-        barrier = first_barrier(self.drives, float(angles[0]), float(angles[-1]))
-        tracked = self.follow(angles, start, np.inf if barrier is None else barrier.psi, accelerations=accelerations)
+        barrier = first_barrier(self.drives, angles)
+        tracked = self.follow(angles, start, barrier, accelerations=accelerations)
         status = BranchEnd(int(tracked.status[0]))
         reason = {BranchEnd.SINGULAR: SINGULAR, BranchEnd.DRIVE_ENDS: barrier.statement if barrier else ""}
         return Sweep(
-            psi=angles,
-            pose=tracked.pose[0],
-            velocity=tracked.velocity[0],
-            theta=tracked.theta[0],
-            theta_velocity=tracked.theta1[0],
-            determinant=tracked.determinant[0],
-            acceleration=tracked.acceleration[0] if accelerations else None,
-            theta_acceleration=tracked.theta2[0] if accelerations else None,
+            **followed(angles, tracked, 0),
             reached=int(tracked.reached[0]),
             complete=status is BranchEnd.COMPLETE,
-            end=(float(tracked.end[0, 0]), *map(float, tracked.end[0, 1:])),
+            end=tuple(tracked.end[0].tolist()),
             reason=reason.get(status, ""),
         )
 
@@ -320,14 +311,7 @@ class SingleMotorPlatform:
         guess = np.repeat(np.array(self.home)[None], len(l_B), axis=0)
         tracked = track(machines, psi, stops, guess, self.Lc, grown=True, accelerations=accelerations)
         return TurnBatch(
-            psi=psi,
-            pose=tracked.pose,
-            velocity=tracked.velocity,
-            theta=tracked.theta,
-            theta_velocity=tracked.theta1,
-            determinant=tracked.determinant,
-            acceleration=tracked.acceleration if accelerations else None,
-            theta_acceleration=tracked.theta2 if accelerations else None,
+            **followed(psi, tracked, slice(None)),
             status=tracked.status.astype(np.int8),
             reached=tracked.reached,
             end=tracked.end,
@@ -349,29 +333,27 @@ class SingleMotorPlatform:
         """
         psi = wheel_angles(samples)
         modes = self.all_poses(float(psi[0]))
-        barrier = first_barrier(self.drives, float(psi[0]), float(psi[-1]))
-        stop = np.inf if barrier is None else barrier.psi
-        machines, stops = np.repeat(self._machine[None], len(modes), axis=0), np.full(len(modes), stop)
+        barrier = first_barrier(self.drives, psi)
+        machines = np.repeat(self._machine[None], len(modes), axis=0)
+        stops = np.full(len(modes), np.inf if barrier is None else barrier.psi)
         tracked = track(machines, psi, stops, modes, self.Lc, grown=False, accelerations=False)
         permutation, reasons = [], []
         for i in range(len(modes)):
-            status, reason, target = BranchEnd(int(tracked.status[i])), "", -1
-            if status is BranchEnd.COMPLETE:
+            status, reason, target = tracked.status[i], SINGULAR, -1
+            if status == BranchEnd.COMPLETE:
                 apart = distance(modes, tracked.pose[i, -1], self.Lc)
                 nearest = int(np.argmin(apart))
                 target = nearest if apart[nearest] <= SAME else -1
                 reason = "" if target >= 0 else "the pose at the end is none of the modes at the start"
-            elif status is BranchEnd.DRIVE_ENDS and barrier is not None:
+            elif status == BranchEnd.DRIVE_ENDS and barrier is not None:
                 reason = barrier.statement
-            else:
-                reason = SINGULAR
             permutation.append(target)
             reasons.append(reason)
         ends = tuple(math.nan if target >= 0 else float(at) for target, at in zip(permutation, tracked.end[:, 0]))
         return Monodromy(modes, tuple(permutation), ends, tuple(reasons))
 
     def full_turn(self, samples: int | ArrayLike = 361, start: ArrayLike | None = None) -> Motion:
-        """Follow one branch over a turn of the wheels, with events and a closure test.
+        """Follow one branch over a rotation of the wheels, with events and a closure test.
 
         Parameters
         ----------
@@ -388,10 +370,11 @@ class SingleMotorPlatform:
         """
         begin = perf_counter()
         psi = wheel_angles(samples)
-        barrier = first_barrier(self.drives, float(psi[0]), float(psi[-1]))
-        tracked = self.follow(psi, start, np.inf if barrier is None else barrier.psi, accelerations=True)
+        barrier = first_barrier(self.drives, psi)
+        tracked = self.follow(psi, start, barrier, accelerations=True)
         reached = int(tracked.reached[0])
-        pose, theta, determinant = (a[0, :reached] for a in (tracked.pose, tracked.theta, tracked.determinant))
+        found = followed(psi[:reached], tracked, (0, slice(reached)))
+        pose, theta, determinant = found["pose"], found["theta"], found["determinant"]
         _, leg = self.platform.jacobians(pose, theta)
         gap, rank, mismatch = compare(self.platform, pose, theta, self.Lc)
         complete = int(tracked.status[0]) == BranchEnd.COMPLETE
@@ -403,12 +386,7 @@ class SingleMotorPlatform:
         sigma = (int(np.sign(leg[0, 0])), int(np.sign(leg[0, 1])), int(np.sign(leg[0, 2])))
         scale = max(*self.platform.l1, *self.platform.l2) ** 2
         return Motion(
-            psi=psi[:reached],
-            pose=pose,
-            velocity=tracked.velocity[0, :reached],
-            acceleration=tracked.acceleration[0, :reached],
-            theta=theta,
-            determinant=determinant,
+            **found,
             leg=leg,
             drive=self.drive(psi[:reached]).h_phi,
             gap=gap,
@@ -445,7 +423,7 @@ class SingleMotorPlatform:
         """Wheel angle at which ``JT`` of a leg vanishes between two samples, by refinement of the sampling."""
         low, high = float(psi[0]), float(psi[1])
         for _ in range(4):
-            fine = self.follow(np.linspace(low, high, 33), pose, np.inf, accelerations=False)
+            fine = self.follow(np.linspace(low, high, 33), pose, None, accelerations=False)
             values = self.platform.jacobians(fine.pose[0], fine.theta[0])[1][:, leg]
             change = int(np.argmax(np.sign(values[1:]) != np.sign(values[:-1])))
             low, high = low + (high - low) * change / 32.0, low + (high - low) * (change + 1) / 32.0
@@ -460,12 +438,8 @@ class SingleMotorPlatform:
         """Structural graph of the source's Figure 3: 15 links, 19 turning pairs, 3 gear pairs, link 0 the frame."""
         from graphsynth.structure.graph import MechanismGraph
 
-        joints = [
-            (*map(int, pair.split("-")), mobility)
-            for text, mobility in ((_TURNING, 1), (_GEARED, 2))
-            for pair in text.split()
-        ]
-        return MechanismGraph(15, [(a, b, f) for a, b, f in joints], frame=0)
+        pairs = [(pair.split("-"), f) for text, f in ((_TURNING, 1), (_GEARED, 2)) for pair in text.split()]
+        return MechanismGraph(15, [(int(a), int(b), f) for (a, b), f in pairs], frame=0)
 
 
 def _stops(mechanism: SingleMotorPlatform, l_B: Array, psi0: Array, l_BC: Array, psi: Array) -> Array:
@@ -476,6 +450,6 @@ def _stops(mechanism: SingleMotorPlatform, l_B: Array, psi0: Array, l_BC: Array,
     stops = np.full(len(l_B), np.inf)
     for i in np.flatnonzero(~free.all(axis=1)):  # decided exactly, one by one
         one = replace(mechanism, crank=tuple(l_B[i]), phase=tuple(psi0[i]), coupler=tuple(l_BC[i]))
-        barrier = first_barrier(one.drives, float(psi[0]), float(psi[-1]))
+        barrier = first_barrier(one.drives, psi)
         stops[i] = np.inf if barrier is None else barrier.psi
     return stops

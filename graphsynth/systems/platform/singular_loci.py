@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from graphsynth.systems.platform.field import (
     determinant,
     leg_circles,
     pose_grid,
+    poses_at,
     working_mode,
 )
 from graphsynth.systems.platform.parallel_platform import WORKING_MODES, ParallelPlatform, cross
@@ -129,8 +129,7 @@ def type_two_curves(
         if not _known(curves, state, unit, ends_only=True):
             gradient = mode[leg - 1] * equations.reach_gradient(state, leg - 1)
             curves.append(_curve(mode, leg, [trace(equations, state, mode, gradient)], equations, unit))
-    seeds = _grid_seeds(platform, alpha, mode, nodes, unit)
-    for state in seeds:
+    for state in _grid_seeds(platform, alpha, mode, nodes, unit):
         if _known(curves, state, unit):
             continue
         found = equations.correct(state, np.linalg.svd(equations.evaluate(state)[1])[2][-1])
@@ -138,7 +137,7 @@ def type_two_curves(
             continue
         along = np.linalg.svd(found[1])[2][-1]
         parts = [trace(equations, found[0], mode, along)]
-        if parts[0].end != 0:
+        if parts[0][1] != 0:
             parts.append(trace(equations, found[0], mode, -along))
         curve = _curve(mode, 0, parts, equations, unit)
         if not _repeated(curves, curve, unit):
@@ -175,17 +174,16 @@ def isolated_singular_points(
     step = max(float(x[1] - x[0]), float(y[1] - y[0]))
 
     def value(p: Complex) -> Array:
-        X = np.stack([p.real, p.imag, np.full(p.shape, alpha)], axis=-1)
+        X = poses_at(p, alpha)
         JX, _ = platform.jacobians(X, platform.inverse(X, mode).theta)
         return np.asarray(determinant(JX) / np.linalg.norm(JX, axis=-1).prod(axis=-1))
 
     g = value(x[:, None] + 1j * y[None, :])
     inner, size = g[1:-1, 1:-1], np.abs(g)
     least = np.isfinite(inner) & (np.abs(inner) < 0.05)
-    for i in range(3):
-        for j in range(3):
-            other = (slice(i, i + nodes - 2), slice(j, j + nodes - 2))
-            least &= (size[other] >= np.abs(inner)) & (g[other] * inner > 0.0)
+    for i, j in np.ndindex(3, 3):
+        other = (slice(i, i + nodes - 2), slice(j, j + nodes - 2))
+        least &= (size[other] >= np.abs(inner)) & (g[other] * inner > 0.0)
     rows, columns = np.nonzero(least)
     if not rows.size:
         return ()
@@ -203,14 +201,14 @@ def isolated_singular_points(
 
 
 def _curve(
-    mode: tuple[int, int, int], leg: int, parts: list[Traced], equations: CurveEquations, unit: float
+    mode: tuple[int, int, int], leg: int, parts: list[tuple[Array, int]], equations: CurveEquations, unit: float
 ) -> SingularCurve:
-    states, last = parts[0].states, max(parts[0].end, 0)
+    states, end = parts[0]
     if len(parts) == 2:
-        states = np.concatenate([parts[1].states[::-1], states[1:]])
-        ends: tuple[int, ...] = (max(parts[1].end, 0), last)
+        states = np.concatenate([parts[1][0][::-1], states[1:]])
+        ends: tuple[int, ...] = (max(parts[1][1], 0), max(end, 0))
     else:
-        ends = () if parts[0].end == 0 else (leg, last)
+        ends = () if end == 0 else (leg, max(end, 0))
     residual = max(float(np.abs(equations.evaluate(state)[0]).max()) for state in states)
     return SingularCurve(mode, np.asarray(unit * (states[:, 0] + 1j * states[:, 1])), states[:, 2:], ends, residual)
 
@@ -266,7 +264,7 @@ def _on_arc(
     """``det JX``, positions and rocker angles on an arc of the boundary, where the arc's own leg has one angle."""
     k = arc.circle.leg - 1
     p = arc.point(t)
-    X = np.stack([p.real, p.imag, np.full(t.shape, alpha)], axis=-1)
+    X = poses_at(p, alpha)
     theta = platform.inverse(X, mode).theta.copy()
     back = arc.circle.side == "inner" and platform.l1[k] < platform.l2[k]
     theta[:, k] = t + (math.pi if back else 0.0)
@@ -279,7 +277,7 @@ def _grid_seeds(
     """Zeros of ``det JX`` on the edges of the grid."""
 
     def value(p: Complex) -> tuple[Array, Array]:
-        X = np.stack([p.real, p.imag, np.full(p.shape, alpha)], axis=-1)
+        X = poses_at(p, alpha)
         theta = platform.inverse(X, mode).theta
         return determinant(platform.jacobians(X, theta)[0]), theta
 
@@ -301,13 +299,6 @@ def _grid_seeds(
 _LARGEST = 0.05
 _SMALLEST = 1e-8
 _STEPS = 20000
-
-
-class Traced(NamedTuple):
-    """States (n, 5) in order; ``end`` is the leg (1 to 3) whose reach ends the curve, 0 if closed, -1 if lost."""
-
-    states: Array
-    end: int
 
 
 class CurveEquations:
@@ -388,8 +379,11 @@ class CurveEquations:
         return v if size <= 1e-10 else None
 
 
-def trace(equations: CurveEquations, start: Array, sigma: tuple[int, ...], direction: Array) -> Traced:
-    """Follow the curve from ``start`` until a leg reaches its boundary or the curve closes."""
+def trace(equations: CurveEquations, start: Array, sigma: tuple[int, ...], direction: Array) -> tuple[Array, int]:
+    """Follow the curve from ``start`` until a leg reaches its boundary or the curve closes.
+
+    The states (n, 5) in order, and the leg (1 to 3) whose reach ends the curve, 0 if closed, -1 if lost.
+    """
     tangent = _tangent(equations.evaluate(start)[1], direction)
     first, v, states, step = tangent, start, [start], 0.01
     mode = np.array(sigma)
@@ -399,7 +393,7 @@ def trace(equations: CurveEquations, start: Array, sigma: tuple[int, ...], direc
         if found is None or turned is None or float(turned @ tangent) < 0.985:
             step *= 0.5
             if step < _SMALLEST:
-                return Traced(np.array(states), -1)
+                break
             continue
         new = found[0]
         reach = mode * equations.reach(new)
@@ -410,30 +404,20 @@ def trace(equations: CurveEquations, start: Array, sigma: tuple[int, ...], direc
             k = int(crossed[np.argmin(share[crossed])])
             ended = equations.end(v + float(share[k]) * (new - v), k)
             if ended is not None and np.abs(ended - v).max() <= 2.0 * step:
-                return Traced(np.array([*states, ended]), k + 1)
+                return np.array([*states, ended]), k + 1
             step *= 0.5
             if step < _SMALLEST:
-                return Traced(np.array(states), -1)
+                break
             continue
-        if len(states) > 2 and _closes(start, first, v, new):
-            return Traced(np.array([*states, start]), 0)
+        gaps = np.array([v, new]) - start
+        gaps[:, 2:] = np.mod(gaps[:, 2:] + math.pi, math.tau) - math.pi
+        passed = gaps[0] @ first < 0.0 <= gaps[1] @ first
+        if len(states) > 2 and passed and np.linalg.norm(gaps[0]) <= 1.2 * np.linalg.norm(new - v):
+            return np.array([*states, start]), 0
         v, tangent = new, turned
         states.append(v)
         step = min(_LARGEST, 1.6 * step)
-    return Traced(np.array(states), -1)
-
-
-def _closes(start: Array, first: Array, v: Array, new: Array) -> bool:
-    """Whether the step from v to new passes the start."""
-    before, after = _difference(v, start), _difference(new, start)
-    reach = float(np.linalg.norm(new - v))
-    return bool(before @ first < 0.0 <= after @ first and np.linalg.norm(before) <= 1.2 * reach)
-
-
-def _difference(a: Array, b: Array) -> Array:
-    d = a - b
-    d[2:] = np.mod(d[2:] + math.pi, math.tau) - math.pi
-    return d
+    return np.array(states), -1
 
 
 def _tangent(J: Array, along: Array) -> Array:

@@ -45,7 +45,7 @@ class Singularity:
     * `smallest`: smallest singular value of ``JX diag(1, 1, 1/Lc)``, length.
     * `ratio`: the smallest over the largest singular value.
     * `sines`: ``sigma_k S_k / (2 l1 l2)``: sine of the angle between rocker and link, signed by the working mode.
-    * `Lc`, `tolerance`: characteristic length; bound of ``ratio`` and of ``|sines|``.
+    * `tolerance`: bound of ``ratio`` and of ``|sines|``.
     """
 
     kind: str
@@ -109,32 +109,27 @@ def singularity(
     left, values, right = np.linalg.svd(scaled_rows(JX, length))
     largest = float(values[0]) if values[0] > 0.0 else 1.0
     free = values <= tolerance * largest
-    weight = np.array([length, length, 1.0])
-    uncontrolled = np.array([_oriented(row) * weight for row in right[free]]).reshape(-1, 3)
-    links = 2.0 * np.array(platform.l2)
-    stress = (left[:, free] * links[:, None]).T
-    stress = np.array([_oriented(row / np.linalg.norm(row)) for row in stress]).reshape(-1, 3)
+
+    def oriented(rows: Array) -> Array:
+        """Signs chosen so that the largest entry of each row is positive."""
+        largest = np.take_along_axis(rows, np.abs(rows).argmax(axis=1)[:, None], axis=1)
+        return np.asarray(rows * np.sign(largest) + 0.0)
+
+    uncontrolled = oriented(right[free]) * np.array([length, length, 1.0])
+    stress = (left[:, free] * (2.0 * np.array(platform.l2))[:, None]).T
+    stress = oriented(stress / np.linalg.norm(stress, axis=1, keepdims=True))
     arms = 2.0 * np.array(platform.l1) * np.array(platform.l2)
     sines = np.where(arms > 0.0, JT / np.where(arms > 0.0, arms, 1.0), 0.0)
     legs = tuple(k + 1 for k in range(3) if abs(sines[k]) <= tolerance)
     lost = np.array([0.5 * JX[k - 1] for k in legs]).reshape(-1, 3)
     kind = ("regular", "I", "II", "III")[bool(legs) + 2 * bool(free.any())]
-    smallest, (first, second, third) = float(values[-1]), sines.tolist()
-    determinant, ratio, centre = float(np.linalg.det(JX)), smallest / largest, _centre(X, uncontrolled)
-    moved, signed = (kind, legs, uncontrolled, centre, stress, lost), (first, second, third)
-    return Singularity(*moved, determinant, smallest, ratio, signed, length, tolerance)
-
-
-def _oriented(row: Array) -> Array:
-    """Sign chosen so that the largest entry is positive."""
-    return np.asarray(row * np.sign(row[int(np.argmax(np.abs(row)))]) + 0.0)
-
-
-def _centre(X: Array, motions: Array) -> complex:
-    if len(motions) != 1 or abs(motions[0, 2]) < 1e-12:
-        return complex(math.nan, math.nan)
-    dx, dy, turn = (float(value) for value in motions[0])
-    return complex(float(X[0]), float(X[1])) + 1j * complex(dx, dy) / turn
+    centre = complex(math.nan, math.nan)
+    if len(uncontrolled) == 1 and abs(uncontrolled[0, 2]) >= 1e-12:
+        dx, dy, turn = uncontrolled[0].tolist()
+        centre = complex(*X[:2]) + 1j * complex(dx, dy) / turn
+    sizes = (float(np.linalg.det(JX)), float(values[-1]), float(values[-1]) / largest)
+    moved = (kind, legs, uncontrolled, centre, stress, lost)
+    return Singularity(*moved, *sizes, tuple(sines.tolist()), length, tolerance)
 
 
 class NearestSingularity(NamedTuple):
@@ -205,35 +200,22 @@ def singularity_distance(
             raise GeometryError(f"leg {leg + 1} does not reach the pose {X.tolist()}; choose a pose in the workspace")
     JX, JT = platform.jacobians(X, theta)
     sines = np.abs(JT) / (2.0 * np.array(platform.l1) * np.array(platform.l2))
-    gap, other = _other_mode(platform, X, theta, length)
+    modes = platform.direct(theta).poses
+    gaps = modes - X
+    gaps[:, 2] = length * (np.mod(gaps[:, 2] + math.pi, math.tau) - math.pi)
+    distances = np.linalg.norm(gaps, axis=1)
+    order = np.argsort(distances)[1:2]  # the nearest is the pose itself
     first = _type_one(platform, X, length)
     return SingularityDistance(
         float(determinant(JX)),
         float(np.linalg.svd(scaled_rows(JX, length), compute_uv=False)[-1]),
-        (float(sines[0]), float(sines[1]), float(sines[2])),
-        gap,
-        other,
+        tuple(sines.tolist()),
+        float(distances[order[0]]) if len(order) else math.inf,
+        tuple(modes[order[0]].tolist()) if len(order) else None,
         first,
         _type_two(platform, X, mode, length, first.distance, rays),
         length,
     )
-
-
-def _other_mode(
-    platform: ParallelPlatform, X: Array, theta: Array, Lc: float
-) -> tuple[float, tuple[float, float, float] | None]:
-    modes = platform.direct(theta).poses
-    distance = _norm(modes - X, Lc)
-    order = np.argsort(distance)
-    if len(order) < 2:
-        return math.inf, None
-    x, y, alpha = (float(value) for value in modes[order[1]])
-    return float(distance[order[1]]), (x, y, alpha)
-
-
-def _norm(d: Array, Lc: float) -> Array:
-    turn = np.mod(d[..., 2] + math.pi, math.tau) - math.pi
-    return np.asarray(np.sqrt(d[..., 0] ** 2 + d[..., 1] ** 2 + (Lc * turn) ** 2))
 
 
 def _type_one(platform: ParallelPlatform, X: Array, Lc: float) -> NearestSingularity:
@@ -271,7 +253,10 @@ def _type_two(
     if radius <= 0.0:
         return None
     shares = (np.arange(1, 33) - 0.5) / 32.0
-    unit = _directions(rays) * np.array([1.0, 1.0, 1.0 / Lc])
+    k = np.arange(rays) + 0.5  # directions spread over the sphere by a golden spiral
+    height, turn = 1.0 - 2.0 * k / rays, math.pi * (1.0 + math.sqrt(5.0)) * k
+    ring = np.sqrt(1.0 - height**2)
+    unit = np.column_stack([ring * np.cos(turn), ring * np.sin(turn), height / Lc])
     poses = X + radius * shares[None, :, None] * unit[:, None, :]
     here = float(determinant(platform.jacobians(X, platform.inverse(X, mode).theta)[0]))
     values = determinant(platform.jacobians(poses, platform.inverse(poses, mode).theta)[0])
@@ -279,21 +264,9 @@ def _type_two(
     rows = np.flatnonzero(changed.any(axis=1))
     first = np.argmax(changed[rows], axis=1)
     starts = poses[rows, first][np.argsort(first, kind="stable")][:24:3]
-    best: NearestSingularity | None = None
-    for start in starts:
-        found = _minimise(platform, X, mode, Lc, start)
-        if found is not None and found.distance <= radius and (best is None or found.distance < best.distance):
-            best = found
-    return best
-
-
-def _directions(count: int) -> Array:
-    """Return unit vectors spread over the sphere (golden spiral)."""
-    k = np.arange(count) + 0.5
-    height = 1.0 - 2.0 * k / count
-    turn = math.pi * (1.0 + math.sqrt(5.0)) * k
-    ring = np.sqrt(1.0 - height**2)
-    return np.column_stack([ring * np.cos(turn), ring * np.sin(turn), height])
+    found = (_minimise(platform, X, mode, Lc, start) for start in starts)
+    near = [place for place in found if place is not None and place.distance <= radius]
+    return min(near, key=lambda place: place.distance, default=None)
 
 
 def _minimise(
@@ -302,35 +275,30 @@ def _minimise(
     """Smallest distance from X subject to closure and ``det JX = 0``, in (x, y, alpha, theta): smooth at type I too."""
     from scipy.optimize import minimize
 
-    theta = platform.inverse(start, mode).theta
     scale = np.array([Lc, Lc, 1.0])
-    size = np.array(mode, dtype=np.float64)
 
-    def split(v: Array) -> tuple[CurveEquations, Array]:
-        return CurveEquations(platform, float(v[2] + X[2]), Lc), np.concatenate([v[:2] + X[:2] / Lc, v[3:]])
+    def constrained(v: Array) -> tuple[Array, Array]:
+        """Residuals of closure and determinant; signed reach of the legs."""
+        curve = CurveEquations(platform, float(v[2] + X[2]), Lc)
+        state = np.concatenate([v[:2] + X[:2] / Lc, v[3:]])
+        return curve.evaluate(state)[0], np.array(mode) * curve.reach(state)
 
-    def equations(v: Array) -> Array:
-        curve, state = split(v)
-        return curve.evaluate(state)[0]
-
-    def margins(v: Array) -> Array:
-        curve, state = split(v)
-        return np.asarray(size * curve.reach(state))
-
-    first = np.concatenate([(start - X) / scale, theta])
     found = minimize(
         lambda v: 0.5 * float(v[:3] @ v[:3]),
-        first,
+        np.concatenate([(start - X) / scale, platform.inverse(start, mode).theta]),
         jac=lambda v: np.concatenate([v[:3], np.zeros(3)]),
         method="SLSQP",
-        constraints=[{"type": "eq", "fun": equations}, {"type": "ineq", "fun": margins}],
+        constraints=[
+            {"type": "eq", "fun": lambda v: constrained(v)[0]},
+            {"type": "ineq", "fun": lambda v: constrained(v)[1]},
+        ],
         options={"ftol": 1e-14, "maxiter": 200},
     )
     v = np.asarray(found.x, dtype=np.float64)
-    if np.abs(equations(v)).max() > 1e-7 or margins(v).min() < -1e-7:
+    residuals, margins = constrained(v)
+    if np.abs(residuals).max() > 1e-7 or margins.min() < -1e-7:
         return None
-    x, y, alpha = (float(value) for value in X + v[:3] * scale)
-    return NearestSingularity("II", 0, (x, y, alpha), Lc * float(np.linalg.norm(v[:3])))
+    return NearestSingularity("II", 0, tuple((X + v[:3] * scale).tolist()), Lc * float(np.linalg.norm(v[:3])))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """Small-crank theory of the single-motor mechanism: predicted motion of rockers and platform; harmonics of a motion.
 
-Sweeps of a full turn on a known branch, warm-started from a neighbouring design, serve the design iterations: every
-sweep either keeps the branch label or says why not.
+Sweeps of a full rotation on a known branch, warm-started from a neighbouring design, serve the design iterations: every
+sweep keeps the branch label, or is `RejectedError`.
 """
 
 from __future__ import annotations
@@ -19,9 +19,15 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.systems.platform.field import determinant
 
 if TYPE_CHECKING:
+    from graphsynth.systems.platform.motion import Motion
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class RejectedError(GeometryError):
+    """A design whose rotation does not stay on one branch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +41,10 @@ class Harmonics:
     """
 
     mean: Array
-    amplitudes: NDArray[np.complex128]
+    amplitudes: Complex
     tail: Array
 
-    def order(self, m: int) -> NDArray[np.complex128]:
+    def order(self, m: int) -> Complex:
         """Amplitudes of harmonic m (from 1), shape (d,).
 
         Raises `GeometryError`: a harmonic that the samples do not resolve.
@@ -89,13 +95,9 @@ def harmonics(samples: ArrayLike) -> Harmonics:
         raise GeometryError(f"samples have shape {values.shape}; give (N,) or (N, d) with N of 4 or more")
     count = len(values)
     spectrum = np.fft.rfft(values, axis=0) / count
-    top = (count - 1) // 2
-    amplitudes = 2.0 * spectrum[1 : top + 1]
-    tail = np.abs(amplitudes[-max(1, top // 4) :]).max(axis=0)
+    amplitudes = 2.0 * spectrum[1 : (count - 1) // 2 + 1]
+    tail = np.abs(amplitudes[-max(1, len(amplitudes) // 4) :]).max(axis=0)
     return Harmonics(spectrum[0].real.copy(), amplitudes, tail)
-
-
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,9 +138,8 @@ class SmallCrank:
     @property
     def mean_shift(self) -> Array:
         """Predicted mean of ``phi - phi_home`` of each rocker; relative error of second order."""
-        c, s, g = self.cosine, self.sine, 0.5
-        bracket = g * c / self.rocker**2 - g / (self.coupler * self.rocker)
-        return np.asarray(self.crank**2 / (2.0 * s**3) * bracket)
+        bracket = 0.5 * self.cosine / self.rocker**2 - 0.5 / (self.coupler * self.rocker)
+        return np.asarray(self.crank**2 / (2.0 * self.sine**3) * bracket)
 
     @property
     def second_over_first(self) -> Array:
@@ -193,32 +194,19 @@ def small_crank(mechanism: SingleMotorPlatform) -> SmallCrank:
     still = replace(mechanism, crank=(0.0, 0.0, 0.0))
     state = still.drive(0.0)
     home = still.home_pose(0.0)
-    frame, delta = np.array(mechanism.frame_angle), np.array(mechanism.delta)
-    phi = state.theta - delta
-    turn = np.exp(1j * frame)
+    phi = state.theta - np.array(mechanism.delta)
+    turn = np.exp(1j * np.array(mechanism.frame_angle))
     rocker = np.array(mechanism.rocker) * np.exp(1j * phi)
-    link = (np.array(mechanism.pivot) - np.array(mechanism.axis)) * turn + rocker
-    direction = np.angle(link)
-    gamma = direction - phi
-    sine = np.sin(gamma)
+    direction = np.angle((np.array(mechanism.pivot) - np.array(mechanism.axis)) * turn + rocker)
+    sine, cosine = np.sin(direction - phi), np.cos(direction - phi)
     for k in range(3):
         if abs(sine[k]) < 1e-9:
             raise GeometryError(
                 f"drive {k + 1} locks at home: coupler and rocker in line; change the coupler or the distance of axes"
             )
-    return SmallCrank(
-        home,
-        state.theta,
-        phi,
-        mechanism.platform.velocity_matrix(home, state.theta),
-        direction,
-        sine,
-        np.cos(gamma),
-        np.array(mechanism.crank),
-        np.array(mechanism.phase),
-        np.array(mechanism.coupler),
-        np.array(mechanism.rocker),
-    )
+    J = mechanism.platform.velocity_matrix(home, state.theta)
+    dimensions = (np.array(getattr(mechanism, name)) for name in ("crank", "phase", "coupler", "rocker"))
+    return SmallCrank(home, state.theta, phi, J, direction, sine, cosine, *dimensions)
 
 
 @checked
@@ -240,8 +228,8 @@ def crank_scaling(
     psi = np.linspace(0.0, math.tau, samples + 1)
     found = []
     for scale in finite_array("scales", scales).ravel():
-        lengths = [float(scale) * length for length in mechanism.crank]
-        scaled = replace(mechanism, crank=(lengths[0], lengths[1], lengths[2]))
+        lengths = (float(scale) * np.array(mechanism.crank)).tolist()
+        scaled = replace(mechanism, crank=tuple(lengths))
         theory, motion = small_crank(scaled), scaled.full_turn(psi)
         if not motion.complete:
             raise GeometryError(f"cranks {lengths} make no full turn: {motion.stop_reason()}; use smaller scales")
@@ -257,7 +245,7 @@ def crank_scaling(
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """Poses at ``psi = 2 pi j / N``; ``reason`` is empty if the whole turn stays on one branch."""
+    """Poses at ``psi = 2 pi j / N`` on one branch, and the motion that they were taken from, if any."""
 
     mechanism: SingleMotorPlatform
     psi: Array
@@ -266,80 +254,66 @@ class Sweep:
     h_phi: Array
     sigma: tuple[int, ...]
     sign: int
-    reason: str
-
-
-def _failed(mechanism: SingleMotorPlatform, reason: str) -> Sweep:
-    empty = np.zeros((0, 3))
-    return Sweep(mechanism, np.zeros(0), empty, empty, empty, (), 0, reason)
+    motion: Motion | None = None
 
 
 @checked
 def cold_sweep(mechanism: SingleMotorPlatform, samples: int) -> Sweep:
-    """Follow the home branch over a turn with step control."""
+    """Follow the home branch over a rotation with step control; `RejectedError` unless it closes."""
     samples = whole("samples", samples, 4, 100_000)
-    reason = _drives(mechanism)
-    if reason:
-        return _failed(mechanism, reason)
+    _check_drives(mechanism)
     try:
         motion = mechanism.full_turn(np.linspace(0.0, math.tau, samples + 1))
     except GeometryError as error:
-        return _failed(mechanism, str(error))
+        raise RejectedError(str(error)) from error
     if not motion.complete:
         stopped = next((event for event in motion.events if event.ends_motion), None)
         where = "" if stopped is None else f" at psi = {stopped.psi:.6g}"
-        return _failed(mechanism, (motion.stop_reason() or "the tracked pose is not an assembly mode") + where)
+        raise RejectedError((motion.stop_reason() or "the tracked pose is not an assembly mode") + where)
     if motion.period != 1:
-        return _failed(mechanism, f"the path does not close after one turn (period {motion.period})")
+        raise RejectedError(f"the path does not close after one turn (period {motion.period})")
     if not motion.working_mode_constant:
-        return _failed(mechanism, "a leg passes its boundary: the working mode changes during the turn")
+        raise RejectedError("a leg passes its boundary: the working mode changes during the turn")
     psi, pose, theta, drive = (a[:-1] for a in (motion.psi, motion.pose, motion.theta, motion.drive))
-    return Sweep(mechanism, psi, pose, theta, drive, motion.label.sigma, motion.label.sign, "")
+    return Sweep(mechanism, psi, pose, theta, drive, motion.label.sigma, motion.label.sign, motion)
 
 
-def _drives(mechanism: SingleMotorPlatform) -> str:
+def _check_drives(mechanism: SingleMotorPlatform) -> None:
     for number, turn in enumerate(mechanism.drive_turns(), start=1):
         if turn.kind != "full turn":
-            return f"drive {number} makes no full turn ({turn.kind})"
-    return ""
+            raise RejectedError(f"drive {number} makes no full rotation ({turn.kind})")
 
 
 @checked
 def warm_sweep(mechanism: SingleMotorPlatform, near: Sweep) -> Sweep:
-    """Solve all samples by Newton from the poses of a neighbouring design; checked against its branch label."""
-    reason = _drives(mechanism)
-    if reason:
-        return _failed(mechanism, reason)
+    """Solve all samples by Newton from the poses of a neighbouring design; `RejectedError` unless its label is kept.
+
+    Where Newton's method fails the rotation is followed from home.
+    """
+    _check_drives(mechanism)
     platform, weight = mechanism.platform, np.array([1.0, 1.0, mechanism.Lc])
     state = mechanism.drive(near.psi)
     theta = state.theta + math.tau * np.round((near.theta - state.theta) / math.tau)
-    pose, size = near.pose, math.inf
-    for _ in range(12):
+    pose, size, settled = near.pose, math.inf, False
+    for count in range(13):
         JX, JT = platform.jacobians(pose, theta)
-        value = determinant(JX)
-        if bool((value * near.sign <= 0.0).any()):
-            return _failed(mechanism, "det JX changes its sign: the platform is singular during the turn")
+        last_one = settled or count == 12
+        if last_one and bool((np.sign(JT) != np.array(near.sigma)).any()):
+            raise RejectedError("a leg passes its boundary: the working mode changes during the turn")
+        if bool((determinant(JX) * near.sign <= 0.0).any()):
+            raise RejectedError("det JX changes its sign: the platform is singular during the turn")
+        if last_one:
+            break
         step = np.linalg.solve(JX, -platform.closure(pose, theta)[..., None])[..., 0]
         pose = pose + step
         last, size = size, float(np.abs(step * weight).max()) / mechanism.Lc
-        if size <= 1e-14 or (size <= 1e-11 and size >= 0.25 * last):
-            break
-        if size > 0.5 or (size >= last and size > 1e-11):
-            return _followed(mechanism, near)
-    JX, JT = platform.jacobians(pose, theta)
-    if bool((np.sign(JT) != np.array(near.sigma)).any()):
-        return _failed(mechanism, "a leg passes its boundary: the working mode changes during the turn")
-    if bool((determinant(JX) * near.sign <= 0.0).any()):
-        return _failed(mechanism, "det JX changes its sign: the platform is singular during the turn")
-    return Sweep(mechanism, near.psi, pose, theta, state.h_phi, near.sigma, near.sign, "")
-
-
-def _followed(mechanism: SingleMotorPlatform, near: Sweep) -> Sweep:
-    """Follow the turn from home where Newton from the neighbouring poses fails; the label must be the neighbour's."""
-    found = cold_sweep(mechanism, len(near.psi))
-    if not found.reason and (found.sigma, found.sign) != (near.sigma, near.sign):
-        return _failed(mechanism, "the home branch has another label than that of the neighbouring design")
-    return found
+        settled = size <= 1e-14 or (size <= 1e-11 and size >= 0.25 * last)
+        if not settled and (size > 0.5 or (size >= last and size > 1e-11)):
+            found = cold_sweep(mechanism, len(near.psi))
+            if (found.sigma, found.sign) != (near.sigma, near.sign):
+                raise RejectedError("the home branch has another label than that of the neighbouring design")
+            return found
+    return Sweep(mechanism, near.psi, pose, theta, state.h_phi, near.sigma, near.sign)
 
 
 @checked

@@ -1,4 +1,4 @@
-"""The single-motor platform of a scene: recognise its graph, move it through a full turn, assess, draw."""
+"""The single-motor platform of a scene: recognise its graph, move it through a full rotation, assess, draw."""
 
 from __future__ import annotations
 
@@ -6,15 +6,18 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
+import numpy as np
+
+from graphsynth.core.errors import GeometryError
+from graphsynth.drawing.plots import Line
 from graphsynth.drawing.sketch import Sketch, degrees
-from graphsynth.pipeline.display import table
+from graphsynth.pipeline.display import TURN, chart, table
 from graphsynth.pipeline.products import Attempt, Candidate, Picture, Quantity, Recognised, Record, Table, each, exact
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.steps import recognise_by_key, records_of
 from graphsynth.systems.platform.system import PlatformTable
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from graphsynth.systems.platform.motion import Motion
@@ -61,22 +64,18 @@ def recognise(context: Context, candidates: tuple[Candidate, ...]) -> tuple[Reco
 
 def kinematics(context: Context, recognised: tuple[Recognised, ...]) -> tuple[Attempt, ...]:
     """Move every recognised candidate through one turn with the dimensions of the scene."""
-    table = _table(context)
-    return each((Attempt(r.candidate, r) for r in recognised if r.module), lambda _: _move(table))
+    return each((Attempt(r.candidate, r) for r in recognised if r.module), lambda _: _move(context))
 
 
 def platform_of(context: Context) -> SingleMotorPlatform:
-    """Return the platform with the dimensions of the scene, not moved yet.
+    """Return the platform with the dimensions of the scene, metres, not moved yet; one leg is repeated three times.
 
     Raises `GeometryError` for dimensions that no platform can have.
     """
-    return _mechanism(_table(context))
-
-
-def _mechanism(table: PlatformTable) -> SingleMotorPlatform:
-    """Embody the scene's dimensions, metres; one leg is repeated three times."""
     from graphsynth.systems.platform.drive import GearTrain
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
+
+    table = _table(context)
 
     def thrice(value: T) -> tuple[T, T, T]:
         return (value, value, value)
@@ -98,12 +97,8 @@ def _mechanism(table: PlatformTable) -> SingleMotorPlatform:
     )
 
 
-def _move(table: PlatformTable) -> PlatformMotion:
-    import numpy as np
-
-    from graphsynth.core.errors import GeometryError
-
-    mechanism = _mechanism(table)
+def _move(context: Context) -> PlatformMotion:
+    table, mechanism = _table(context), platform_of(context)
     motion = mechanism.full_turn(table.positions + 1)
     if motion.label.sigma != table.working_mode:
         raise GeometryError(
@@ -133,19 +128,16 @@ def _verdict(moved: PlatformMotion) -> tuple[str, bool, tuple[Quantity, ...]]:
     motion = moved.motion
     good = motion.complete and motion.closed
     if good:
-        words = (
-            f"full turn on one branch, closed after {motion.period} turn{'s' if motion.period != 1 else ''} (estimated)"
-        )
+        turns = "turn" if motion.period == 1 else "turns"
+        words = f"full rotation on one branch, closed after {motion.period} {turns} (estimated)"
     elif motion.complete:
-        words = "full turn on one branch, but it does not close (estimated)"
+        words = "full rotation on one branch, but it does not close (estimated)"
     else:
-        words = f"no full turn: {motion.stop_reason() or 'the branch is lost'} (estimated)"
+        words = f"no full rotation: {motion.stop_reason() or 'the branch is lost'} (estimated)"
     return words, good, _margins(motion)
 
 
 def _margins(motion: Motion) -> tuple[Quantity, ...]:
-    import numpy as np
-
     travel = np.ptp(motion.pose, axis=0)
     closure = motion.closure_error * motion.Lc
     error, turned = (closure, motion.closure_error) if math.isfinite(closure) else (None, None)
@@ -166,10 +158,10 @@ def _margins(motion: Motion) -> tuple[Quantity, ...]:
 
 def _turn_table(moved: PlatformMotion) -> Table:
     """State what the turn is, its method and what the drives allow."""
-    motion, mechanism = moved.motion, moved.mechanism
-    drives = ", ".join(turn.kind for turn in mechanism.drive_turns())
-    label = motion.label
-    branch = f"tau = {_signs(label.tau)}, sigma = {_signs(label.sigma)}, det JX {_sign(label.sign)}"
+    motion, label = moved.motion, moved.motion.label
+    drives = ", ".join(turn.kind for turn in moved.mechanism.drive_turns())
+    side = {1: "> 0", -1: "< 0"}.get(label.sign, "= 0")
+    branch = f"tau = {_signs(label.tau)}, sigma = {_signs(label.sigma)}, det JX {side}"
     rows = [
         ("drives 1, 2, 3", drives, "exact"),
         ("branch at the start", branch, "estimated"),
@@ -177,11 +169,7 @@ def _turn_table(moved: PlatformMotion) -> Table:
         *((q.name, q, q.guarantee) for q in _margins(motion)),
         ("time of the turn", f"{motion.seconds:.3f} s", "measured once"),
     ]
-    return table("The full turn", ("quantity", "value", "method"), rows, f"Method: {motion.method}.")
-
-
-def _sign(value: int) -> str:
-    return {1: "> 0", -1: "< 0"}.get(value, "= 0")
+    return table("The full rotation", ("quantity", "value", "method"), rows, f"Method: {motion.method}.")
 
 
 def _signs(values: tuple[int, ...]) -> str:
@@ -230,7 +218,8 @@ def sketches(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture, .
     psi = motion.motion.psi
     count = len(psi) - 1
     leg = max(range(3), key=lambda k: motion.mechanism.crank[k])
-    clear = max(range(count), key=lambda i: _spread(motion, i, leg))
+    O, B, F = motion.O[leg], motion.B[:count, leg], motion.F[:count, leg]
+    clear = int(np.argmax(np.minimum(np.minimum(abs(O - B), abs(B - F)), abs(F - O))))  # joints well apart
     caption = (
         f"Wheel at {degrees(float(psi[clear]))}. The pinion in the middle turns three wheels; a crank pin B on each "
         "moves a coupler BC and the bell crank CDA, whose other arm moves the platform through AF. The closed curves "
@@ -242,12 +231,6 @@ def sketches(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture, .
         for i in (round(i * count / _SHOWN) for i in range(_SHOWN))
     ]
     return tuple(pictures)
-
-
-def _spread(motion: PlatformMotion, i: int, k: int) -> float:
-    """Return the smallest distance between wheel axis, crank pin and platform corner of leg k, in position i."""
-    O, B, F = motion.O[k], motion.B[i, k], motion.F[i, k]
-    return float(min(abs(O - B), abs(B - F), abs(F - O)))
 
 
 def _sketch(motion: PlatformMotion, i: int, width: float, labelled: int | None) -> str:
@@ -267,8 +250,13 @@ def _sketch(motion: PlatformMotion, i: int, width: float, labelled: int | None) 
         sketch.bar(A[k], F[k], colour=colour, width=3)
         for point in (O[k], B[k], C[k], D[k], A[k], F[k]):
             sketch.joint(point)
-    if labelled is not None:
-        _label_leg(sketch, *(points[labelled] for points in (O, B, C, D, A, F)))
+    if labelled is not None:  # each label is pushed away from its neighbours, D's also from its ground
+        o, b, c, d, a, f = (complex(points[labelled]) for points in (O, B, C, D, A, F))
+        crank, bell = (o + b + f) / 3, (a + c + d) / 3
+        away = {"O": (o, o - crank), "B": (b, b - crank), "F": (f, f - crank), "C": (c, c - bell), "A": (a, a - bell)}
+        for name, (point, vector) in (away | {"D": (d, (a + c) / 2 - d)}).items():
+            apart = vector / abs(vector) if vector else 1j
+            sketch.label(point, name, (20 if name == "D" else 17) * apart)
     return sketch.svg()
 
 
@@ -307,27 +295,11 @@ def animations(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture,
     return (Picture("One turn of the wheels", svg, "The motor turns them; the curves are the corners' paths.", "wide"),)
 
 
-def _label_leg(sketch: Sketch, O: complex, B: complex, C: complex, D: complex, A: complex, F: complex) -> None:
-    """Name the joints of one leg, each label pushed away from its neighbours; D's also from its ground."""
-    near = (O + B + F) / 3
-    for name, point in {"O": O, "B": B, "F": F}.items():
-        sketch.label(point, name, 17 * _direction(point - near))
-    for name, point in {"C": C, "A": A}.items():
-        sketch.label(point, name, 17 * _direction(point - (A + C + D) / 3))
-    sketch.label(D, "D", 20 * _direction((A + C) / 2 - D))
-
-
-def _direction(vector: complex) -> complex:
-    return vector / abs(vector) if vector else 1j
-
-
 def _box(motion: PlatformMotion) -> tuple[complex, complex]:
-    points = [p for group in (motion.D, motion.A, motion.C, motion.F) for p in group.ravel()]
-    points += [o + motion.wheel_radius * d for o in motion.O for d in (1, -1, 1j, -1j)]
-    return (
-        complex(min(p.real for p in points), min(p.imag for p in points)),
-        complex(max(p.real for p in points), max(p.imag for p in points)),
-    )
+    rims = np.add.outer(motion.O, motion.wheel_radius * np.array([1, -1, 1j, -1j]))
+    points = np.concatenate([group.ravel() for group in (motion.D, motion.A, motion.C, motion.F, rims)])
+    x, y = points.real, points.imag
+    return complex(x.min(), y.min()), complex(x.max(), y.max())
 
 
 def plots(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture, ...]:
@@ -335,9 +307,6 @@ def plots(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture, ...]
     motion = _first(motions)
     if motion is None:
         return ()
-    from graphsynth.drawing.plots import Line
-    from graphsynth.pipeline.display import TURN, chart
-
     turn, wheel = motion.motion, "wheel angle [°]"
     x, y, alpha = turn.pose.T
     shift = [Line(turn.psi, x, "x", "a"), Line(turn.psi, y, "y", "b", "--")]

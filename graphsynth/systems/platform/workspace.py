@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import checked, finite, finite_array, positive, three
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.field import BoundaryCircle, Limits, leg_circles, meet, working_mode
+from graphsynth.systems.platform.field import BoundaryCircle, Limits, leg_circles, meet, poses_at, working_mode
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
 #: Circles closer to tangency than this fraction of the largest length are treated and reported as tangent.
@@ -104,9 +104,7 @@ class Workspace:
 
         Decided by the signs of compensated sums for the vertices as computed, not by a tolerance.
         """
-        p = np.asarray(points, dtype=np.complex128)
-        pose = np.stack([p.real, p.imag, np.full(p.shape, self.alpha)], axis=-1)
-        found = self.platform.inverse(pose, self.sigma or (1, 1, 1))
+        found = self.platform.inverse(poses_at(points, self.alpha), self.sigma or (1, 1, 1))
         inside = (found.deficit <= 0.0).all(axis=-1)
         for k, bounds in enumerate(self.limits):
             if bounds is not None:
@@ -119,10 +117,8 @@ class Workspace:
         for arc in self.arcs:
             quarters = np.arange(math.ceil(arc.start / (math.pi / 2)), arc.stop / (math.pi / 2)) * (math.pi / 2)
             points += list(arc.point(np.concatenate([[arc.start, arc.stop], quarters])))
-        if not points:
-            return (math.nan,) * 4
-        x, y = [p.real for p in points], [p.imag for p in points]
-        return min(x), max(x), min(y), max(y)
+        x, y = np.real(points or [math.nan]), np.imag(points or [math.nan * 1j])
+        return float(x.min()), float(x.max()), float(y.min()), float(y.max())
 
 
 @checked
@@ -167,11 +163,9 @@ def _checked(
     platform: ParallelPlatform, sigma: Sequence[int] | None, limits: Sequence[Limits] | None
 ) -> tuple[tuple[int, ...] | None, tuple[Limits, ...]]:
     mode = None if sigma is None else working_mode(sigma)
-    if limits is None:
-        return None, (None, None, None)
-    limits = three("limits", limits)
+    limits = (None, None, None) if limits is None else three("limits", limits)
     if all(bound is None for bound in limits):
-        return None, (None, None, None)
+        return None, limits
     if mode is None:
         raise GeometryError("limits of the rocker angles need a working mode; give sigma")
     for leg, bound in enumerate(limits, start=1):
@@ -206,22 +200,18 @@ class _Problem:
         self.copies: dict[int, int] = {}  # circle -> an earlier one that coincides with it
         self.opposed: int | None = None  # a circle that coincides with one of the opposite sense
         self.contacts: list[Contact] = []
-        for i, j in combinations(range(len(circles)), 2):
-            self._meet(i, j)
-
-    def _meet(self, i: int, j: int) -> None:
-        a, b = self.circles[i], self.circles[j]
-        found = meet(a, b, self.tolerance)
-        self.cuts[i] += found.points
-        self.cuts[j] += found.points
-        if found.kind in ("tangent", "coincident") and a.leg != b.leg:
-            on = any(self._near(point) for point in found.points) or found.kind == "coincident"
-            self.contacts.append(Contact(found.kind, a, b, found.points, on))
-        if found.kind == "coincident":
-            if a.sense == b.sense:
-                self.copies[j] = i
-            elif {a.side, b.side} <= {"outer", "inner"}:
-                self.opposed = i
+        for (i, a), (j, b) in combinations(enumerate(circles), 2):
+            kind, points = meet(a, b, tolerance)
+            self.cuts[i] += points
+            self.cuts[j] += points
+            if kind in ("tangent", "coincident") and a.leg != b.leg:
+                on = any(self._near(point) for point in points) or kind == "coincident"
+                self.contacts.append(Contact(kind, a, b, points, on))
+            if kind == "coincident":
+                if a.sense == b.sense:
+                    self.copies[j] = i
+                elif {a.side, b.side} <= {"outer", "inner"}:
+                    self.opposed = i
 
     def thin(self) -> int | None:
         """Index of a circle that holds the whole workspace, if there is one."""
@@ -295,20 +285,18 @@ class _Problem:
         points += [c.centre for c in self.circles if c.radius == 0.0]
         ends = [complex(arc.point(t)) for arc in arcs for t in (arc.start, arc.stop)]
         near = max(1e-6 * max(c.radius for c in self.circles), 4.0 * self.tolerance)
+
+        def on(arc: Arc, p: complex) -> bool:
+            away = p - arc.circle.centre
+            turn = (cmath.phase(away) - arc.start) % math.tau
+            return abs(abs(away) - arc.circle.radius) <= 8.0 * self.tolerance and turn <= arc.stop - arc.start
+
         found: list[complex] = []
         for p in points:
-            if self._near(p) and not any(abs(p - q) <= near for q in [*ends, *found]) and not self._on(arcs, p):
+            known = any(abs(p - q) <= near for q in [*ends, *found])
+            if self._near(p) and not known and not any(on(arc, p) for arc in arcs):
                 found.append(p)
         return found
-
-    def _on(self, arcs: list[Arc], p: complex) -> bool:
-        for arc in arcs:
-            turn = (cmath.phase(p - arc.circle.centre) - arc.start) % math.tau
-            if abs(abs(p - arc.circle.centre) - arc.circle.radius) <= 8.0 * self.tolerance and (
-                turn <= arc.stop - arc.start
-            ):
-                return True
-        return False
 
 
 def _between(angle: float, bounds: tuple[float, float], slack: float) -> bool:

@@ -122,10 +122,10 @@ def test_platform_equations_agree_with_the_platform() -> None:
     np.testing.assert_allclose(
         J.mid[:, 3:, 3:], mechanism.platform.jacobians(motion.pose, motion.theta)[0], rtol=1e-10, atol=1e-9
     )
-    bounds = system.bounds(exact(x), exact(motion.psi))
-    np.testing.assert_allclose(bounds.JT.mid, motion.leg, rtol=1e-10)
-    np.testing.assert_allclose(bounds.h_phi.mid, motion.drive, rtol=1e-10)
-    np.testing.assert_allclose(bounds.P1.mid * bounds.P2.mid, motion.leg**2, rtol=1e-9)
+    P1, P2, JT, h_phi = system.bounds(exact(x), exact(motion.psi))
+    np.testing.assert_allclose(JT.mid, motion.leg, rtol=1e-10)
+    np.testing.assert_allclose(h_phi.mid, motion.drive, rtol=1e-10)
+    np.testing.assert_allclose(P1.mid * P2.mid, motion.leg**2, rtol=1e-9)
     velocity = -np.linalg.solve(J.mid, rate.mid[..., None])[..., 0]
     np.testing.assert_allclose(velocity[:, 3:], motion.velocity, rtol=1e-9, atol=1e-10)
 

@@ -122,7 +122,7 @@ def test_one_more_freedom_where_dead_points_meet_the_singular_platform() -> None
 
 def test_motor_component_vanishes_at_a_drive_lock() -> None:
     source = SingleMotorPlatform(crank=(35.0, 0.0, 0.0))
-    lock = min(source.drives[0].barriers())[0]
+    lock = min(angle % math.tau for angle in source.drives[0].barriers()[2])
     errors = []
     for before in (1e-4, 1e-6, 1e-8):  # phi has a square root at the lock
         psi = lock - before
@@ -137,7 +137,7 @@ def test_motor_component_vanishes_at_a_drive_lock() -> None:
 def test_rank_drops_at_a_change_point() -> None:
     """Crank 30 mm: at the far end crank, coupler, rocker and frame are collinear, and one more freedom appears."""
     source = SingleMotorPlatform(crank=(30.0, 0.0, 0.0))
-    (at, kind), *_ = source.drives[0].barriers()
+    kind, _, (at, *_) = source.drives[0].barriers()
     assert kind == "change point"
     near = at - 1e-9 if np.isfinite(source.drive(at - 1e-9).theta).all() else at
     poses = source.all_poses(near)

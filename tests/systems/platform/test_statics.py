@@ -168,7 +168,7 @@ def test_dead_point_carries_any_load_without_torque() -> None:
 
 def test_locked_drive_is_named() -> None:
     mechanism = SingleMotorPlatform(crank=(35, 0, 0))
-    lock = min(mechanism.drives[0].barriers())[0]
+    lock = min(angle % math.tau for angle in mechanism.drives[0].barriers()[2])
     poses = mechanism.all_poses(lock - 1e-12)
     held = crank_statics(mechanism, lock - 1e-12, poses[0], [1.0, 0.0, 0.0], tolerance=1e-5)
     assert held.status == "drive 1 locked" and math.isnan(held.crank_torque)
