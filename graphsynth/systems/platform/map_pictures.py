@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from graphsynth.systems.platform.parallel_platform import ParallelPlatform
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
     from graphsynth.systems.platform.singular_loci import SingularLoci
-    from graphsynth.systems.platform.workspace import Workspace
+    from graphsynth.systems.platform.workspace import Arc, Workspace
 
 #: One colour for each leg, readable in grey and by colour-blind readers [Okabe & Ito 2008].
 _LEGS = ("#0072B2", "#D55E00", "#009E73")
@@ -50,30 +50,22 @@ def _signs(sigma: Sequence[int]) -> str:
     return "(" + " ".join("+" if s > 0 else "−" for s in sigma) + ")"
 
 
-def _path(work: Workspace) -> Any:
-    """Return the closed outline of the workspace as a matplotlib path (holes wind the other way)."""
+def _along(arc: Arc) -> Any:
+    """Points of an arc, with the workspace on the left."""
+    t = np.linspace(arc.start, arc.stop, max(8, math.ceil(60 * (arc.stop - arc.start))))
+    return arc.point(t if arc.circle.sense > 0 else t[::-1])
+
+
+def _fill(axes: Any, work: Workspace) -> None:
+    """Fill the workspace (holes wind the other way)."""
+    from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
-    corners: list[Any] = []
-    codes: list[Any] = []
-    for loop in work.loops:
-        first = len(corners)
-        for i in loop:
-            arc = work.arcs[i]
-            t = np.linspace(arc.start, arc.stop, max(8, math.ceil(60 * (arc.stop - arc.start))))
-            p = arc.point(t if arc.circle.sense > 0 else t[::-1])
-            corners += list(zip(p.real, p.imag))
-        corners.append(corners[first])
-        codes += [Path.MOVETO] + [Path.LINETO] * (len(corners) - first - 2) + [Path.CLOSEPOLY]
-    return Path(corners, codes) if corners else None
-
-
-def _fill(axes: Any, work: Workspace, colour: str = LIGHT["pale"]) -> None:
-    from matplotlib.patches import PathPatch
-
-    path = _path(work)
-    if path is not None:
-        axes.add_patch(PathPatch(path, facecolor=colour, edgecolor="none", zorder=0))
+    loops = [np.concatenate([_along(work.arcs[i]) for i in loop]) for loop in work.loops]
+    if loops:
+        paths = [Path(np.column_stack([p.real, p.imag])[[*range(len(p)), 0]], closed=True) for p in loops]
+        outline = Path.make_compound_path(*paths)
+        axes.add_patch(PathPatch(outline, facecolor=LIGHT["pale"], edgecolor="none", zorder=0))
 
 
 def _arcs(axes: Any, work: Workspace, width: float) -> None:
@@ -81,14 +73,14 @@ def _arcs(axes: Any, work: Workspace, width: float) -> None:
     seen: set[tuple[int, str]] = set()
     for arc in work.arcs:
         key = (arc.circle.leg, arc.circle.side)
-        p = arc.point(np.linspace(arc.start, arc.stop, max(8, math.ceil(60 * (arc.stop - arc.start)))))
+        p = _along(arc)
         label = None if key in seen else f"leg {key[0]}, {key[1]}"
         seen.add(key)
         axes.plot(p.real, p.imag, ls=_STYLES[key[1]], color=_LEGS[key[0] - 1], lw=width, label=label)
 
 
-def _frame(axes: Any, work: Workspace) -> None:
-    """Equal scales, limits a little outside the workspace."""
+def _frame(axes: Any, work: Workspace, unit: str | None = None) -> None:
+    """Equal scales, limits a little outside the workspace; names of the axes if there is a unit."""
     x0, x1, y0, y1 = work.box()
     if math.isfinite(x0):
         margin = 0.05 * max(x1 - x0, y1 - y0)
@@ -96,6 +88,9 @@ def _frame(axes: Any, work: Workspace) -> None:
         axes.set_ylim(y0 - margin, y1 + margin)
     axes.set_aspect("equal")
     axes.tick_params(labelsize=8)
+    if unit is not None:
+        axes.set_xlabel(_axis("x", unit))
+        axes.set_ylabel(_axis("y", unit))
 
 
 def workspace_picture(work: Workspace, *, unit: str = "mm", size: tuple[float, float] = (6.4, 4.8)) -> Figure:
@@ -115,9 +110,7 @@ def workspace_picture(work: Workspace, *, unit: str = "mm", size: tuple[float, f
     _arcs(axes, work, 2.0)
     for p in work.isolated:
         axes.plot([p.real], [p.imag], "o", color="black", ms=5)
-    _frame(axes, work)
-    axes.set_xlabel(_axis("x", unit))
-    axes.set_ylabel(_axis("y", unit))
+    _frame(axes, work, unit)
     plain, square = (f" {unit}", f" {unit}²") if unit else ("", "")
     mode = "" if work.sigma is None else f", working mode {_signs(work.sigma)}"
     size_text = f"area {work.area:.6g}{square}, perimeter {work.perimeter:.6g}{plain}"
@@ -157,14 +150,9 @@ def loci_picture(
     handles, labels = grid[0, 0].get_legend_handles_labels()
     handles += [Line2D([], [], color=_SINGULAR, lw=1.4), Patch(color=_TINTS[1]), Patch(color=_TINTS[0])]
     labels += ["type II, det JX = 0", "det JX > 0", "det JX < 0"]
-    figure.legend(
-        handles,
-        labels,
-        loc="outside lower center",
-        ncols=len(labels) if len(labels) <= 6 else (len(labels) + 1) // 2,
-        fontsize=8,
-        frameon=False,
-    )
+    columns = len(labels) if len(labels) <= 6 else (len(labels) + 1) // 2
+    look = {"loc": "outside lower center", "fontsize": 8, "frameon": False}
+    figure.legend(handles, labels, ncols=columns, **look)
     figure.suptitle(f"Singular loci at α = {math.degrees(loci.alpha):.4g}°; arcs: type I", fontsize=11)
     return figure
 
@@ -205,7 +193,8 @@ def map_picture(
     if quantity not in _MAPS:
         raise GeometryError(f"quantity = {quantity!r} is unknown; use one of {', '.join(_MAPS)}")
     title, colours, measured = _MAPS[quantity]
-    values = np.where(np.isfinite(getattr(found.quality, quantity)), getattr(found.quality, quantity), np.nan)
+    values = getattr(found.quality, quantity)
+    values = np.where(np.isfinite(values), values, np.nan)
     figure = new_figure(size)
     axes = figure.add_subplot()
     work = constant_orientation_workspace(found.platform, found.alpha)
@@ -214,17 +203,15 @@ def map_picture(
         top = float(np.percentile(shown, 97)) if colours == "magma_r" and shown.size else None
         bottom = 0.0 if top is None else float(shown.min())
         image = axes.pcolormesh(found.x, found.y, values.T, cmap=colours, vmin=bottom, vmax=top, rasterized=True)
-        bar = figure.colorbar(image, ax=axes, extend="neither" if top is None else "max")
-        bar.set_label(_axis(title, unit if measured == "length" else "–"))
+        label = _axis(title, unit if measured == "length" else "–")
+        figure.colorbar(image, ax=axes, extend="neither" if top is None else "max").set_label(label)
         determinant = found.quality.determinant.T
         if bool((determinant > 0.0).any()) and bool((determinant < 0.0).any()):
             axes.contour(found.x, found.y, determinant, levels=[0.0], colors=WHITE, linewidths=1.2)
     for arc in work.arcs:
-        p = arc.point(np.linspace(arc.start, arc.stop, max(8, math.ceil(60 * (arc.stop - arc.start)))))
+        p = _along(arc)
         axes.plot(p.real, p.imag, color="#333333", lw=1.2)
-    _frame(axes, work)
-    axes.set_xlabel(_axis("x", unit))
-    axes.set_ylabel(_axis("y", unit))
+    _frame(axes, work, unit)
     length = f"Lc = {found.quality.Lc:.4g} {unit}".rstrip()
     text = f"α = {math.degrees(found.alpha):.4g}°, working mode {_signs(found.sigma)}, {length}"
     axes.set_title(text, fontsize=10)
@@ -246,8 +233,7 @@ def harmonics_picture(
     from graphsynth.systems.platform.small_crank import crank_scaling
 
     found = crank_scaling(mechanism, scales)
-    longest = max(mechanism.crank)
-    share = longest * np.array([row.scale for row in found])
+    share = max(mechanism.crank) * np.array([row.scale for row in found])
     curves = (
         ("higher harmonics / first", [row.second for row in found], "o", _LEGS[0], 1),
         ("mean shift / first harmonic", [row.mean for row in found], "s", _LEGS[2], 1),

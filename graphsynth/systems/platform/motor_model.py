@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import check_fields, finite_array
-from graphsynth.core.errors import SpecError
+from graphsynth.core.errors import GeometryError, SpecError
 from graphsynth.dynamics.driven.inertia import EffectiveInertia
 from graphsynth.dynamics.driven.reduction import ReductionStudy, inductance_study, reduction_error, simulate_drive
 from graphsynth.dynamics.driven.run import DriveRun
@@ -19,10 +19,11 @@ from graphsynth.dynamics.driven.setup import Plant, load_coefficients
 from graphsynth.dynamics.motors import IdealSpeed, Motor, Train, check_motor, number
 
 if TYPE_CHECKING:
+    from graphsynth.systems.platform.motion import Sweep
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 Array = NDArray[np.float64]
-_SAMPLES = (128, 256, 512, 1024, 2048, 4096)  # of a turn
+_SAMPLES = (128, 256, 512, 1024, 2048, 4096)  # of a rotation
 _SPIKES = "no rotor inertia: model S; the crank speed is unbounded at dead centres, an artefact of the missing inertia"
 
 
@@ -122,14 +123,8 @@ class MotorDrivenPlatform:
     def plant(self) -> Plant:
         """Mechanism as the integrator sees it (load torques with the sign of driving)."""
         series = None if self.load_series is None else -np.asarray(self.load_series, dtype=np.float64)
-        return Plant(
-            self.inertia.rows,
-            self.base_inertia,
-            self.friction,
-            -self.load,
-            series,
-            dead_centres=self.inertia.dead_centres,
-        )
+        dead = self.inertia.dead_centres
+        return Plant(self.inertia.rows, self.base_inertia, self.friction, -self.load, series, dead_centres=dead)
 
     def simulate(
         self,
@@ -238,7 +233,7 @@ def platform_inertia(
     length: float = 1e-3,
     tolerance: float = 1e-12,
 ) -> EffectiveInertia:
-    """Effective inertia of the platform, and of the rockers, of a single-motor mechanism over a closed turn.
+    """Effective inertia of the platform, and of the rockers, of a single-motor mechanism over a closed rotation.
 
     `mass`: of the platform, kg. `gyration`: radius of gyration about the mass centre, m. `mass_centre`: in the frame of
     the platform, m. `rocker_inertia`: about the pivots D_k, kg m^2. `length`: metres per length unit of the machine
@@ -246,40 +241,30 @@ def platform_inertia(
     `SpecError`: negative masses, or a motion that 4096 samples do not resolve. Raises `GeometryError` if the home
     branch does not make a whole turn.
     """
-    m = number("mass", mass, least=0.0)
-    radius = number("gyration", gyration, least=0.0)
+    m, radius = number("mass", mass, least=0.0), number("gyration", gyration, least=0.0)
     wheels = [number(f"rocker_inertia {k}", v, least=0.0) for k, v in enumerate(rocker_inertia, 1)]
     for count in _SAMPLES:
-        velocities = _velocities(machine, m, radius, complex(mass_centre), wheels, length, count)
+        sweep = _closed_sweep(machine, count)
+        dx, dy, turning = sweep.velocity[:-1].T
+        arm = np.exp(1j * sweep.pose[:-1, 2]) * complex(mass_centre)
+        point = length * (dx + 1j * dy) + 1j * arm * turning
+        rows = [math.sqrt(m) * v for v in (point.real, point.imag, radius * turning)]
+        rows += [math.sqrt(value) * sweep.theta_velocity[:-1, k] for k, value in enumerate(wheels) if value > 0.0]
         try:
-            return EffectiveInertia.of_samples(velocities, tolerance=tolerance)
+            return EffectiveInertia.of_samples(np.asarray(rows), tolerance=tolerance)
         except SpecError:
             if count == _SAMPLES[-1]:
                 raise
     raise AssertionError
 
 
-def _velocities(
-    machine: SingleMotorPlatform,
-    m: float,
-    radius: float,
-    centre: complex,
-    rockers: list[float],
-    length: float,
-    count: int,
-) -> Array:
-    from graphsynth.core.errors import GeometryError
-
+def _closed_sweep(machine: SingleMotorPlatform, count: int) -> Sweep:
     psi = np.linspace(0.0, math.tau, count + 1)
     sweep = machine.sweep(psi)
     if not sweep.complete:
         raise GeometryError(f"the branch ends at psi = {sweep.end[0]:.6g} rad: {sweep.reason}; use shorter cranks")
-    pose, velocity = sweep.pose[:-1], sweep.velocity[:-1]
     if np.abs(sweep.pose[-1] - sweep.pose[0]).max() > 1e-9 * machine.Lc:
         raise GeometryError(
             "the branch does not close after one turn, so J has no period of 2 pi; choose another start"
         )
-    point = length * (velocity[:, 0] + 1j * velocity[:, 1]) + 1j * np.exp(1j * pose[:, 2]) * centre * velocity[:, 2]
-    rows = [math.sqrt(m) * point.real, math.sqrt(m) * point.imag, math.sqrt(m) * radius * velocity[:, 2]]
-    rows += [math.sqrt(value) * sweep.theta_velocity[:-1, k] for k, value in enumerate(rockers) if value > 0.0]
-    return np.asarray(rows)
+    return sweep

@@ -326,16 +326,11 @@ def _bare_tables(context: Context, bare: WithoutInertia) -> tuple[Table, ...]:
         "energy | .1e",
     )
     first = next((event for event in source.events if event.kind == "dead centre"), None)
-    found = (
-        []
-        if first is None
-        else [
-            Finding(
-                f"Without rotor inertia the crank speed is unbounded at each dead centre, first after {first.time:.4g} s; "
-                f"the platform passes it at {abs(first.motion) / root:.4g} m/s (estimated)."
-            )
-        ]
-    )
+    found = []
+    if first is not None:
+        unbounded = f"the crank speed is unbounded at each dead centre, first after {first.time:.4g} s"
+        passes = f"the platform passes it at {abs(first.motion) / root:.4g} m/s (estimated)"
+        found.append(Finding(f"Without rotor inertia {unbounded}; {passes}."))
     return (
         table("Without inertia: dead centres and reversals", _EVENT_COLUMNS, events, note, *found),
         table("The model without inertia is a limit", columns, rows, "Estimated; the largest speed at the samples."),

@@ -59,15 +59,12 @@ def orientations(platform: ParallelPlatform, point: complex) -> tuple[tuple[floa
     if not ends.size:
         return ((0.0, math.tau),) if bool(_allowed(platform, p, np.zeros((1, 1)), 0.0).all()) else ()
     following = np.append(ends[1:], ends[0] + math.tau)
-    middle = 0.5 * (ends + following)
-    good = _allowed(platform, p, middle[None], 0.0)[0].all(axis=-1)
-    pieces = [(float(a), float(b)) for a, b, ok in zip(ends, following, np.atleast_1d(good)) if ok]
+    good = _allowed(platform, p, 0.5 * (ends + following)[None], 0.0)[0].all(axis=-1)
     joined: list[tuple[float, float]] = []
-    for start, stop in pieces:
+    for start, stop in zip(ends[good].tolist(), following[good].tolist()):
         if joined and joined[-1][1] == start:
-            joined[-1] = (joined[-1][0], stop)
-        else:
-            joined.append((start, stop))
+            start = joined.pop()[0]
+        joined.append((start, stop))
     if len(joined) > 1 and joined[-1][1] == joined[0][0] + math.tau:
         joined = [(joined[-1][0], joined[0][1] + math.tau), *joined[1:-1]]
     return tuple(joined)
@@ -110,10 +107,10 @@ def total_orientation_workspace(
     def test(p: Complex, extra: float) -> NDArray[np.bool_]:
         low, high, centre = _cosines(platform, p, extra)
         a, b = start - centre, stop - centre
-        ends = np.cos(np.stack([a, b]))
+        ends = np.sort(np.cos([a, b]), axis=0)
         whole = stop - start >= math.tau
-        top = np.where((np.ceil(a / math.tau) * math.tau <= b) | whole, 1.0, ends.max(axis=0))
-        bottom = np.where((np.ceil((a - math.pi) / math.tau) * math.tau + math.pi <= b) | whole, -1.0, ends.min(axis=0))
+        top = np.where((np.ceil(a / math.tau) * math.tau <= b) | whole, 1.0, ends[1])
+        bottom = np.where((np.ceil((a - math.pi) / math.tau) * math.tau + math.pi <= b) | whole, -1.0, ends[0])
         return np.asarray(((top <= high) & (bottom >= low)).all(axis=-1))
 
     return _cover(platform, test, resolution, f"positions where every orientation from {start} to {stop} is reached")

@@ -73,14 +73,13 @@ class InverseSolution:
         return np.asarray((self.status <= LegStatus.BOUNDARY).all(axis=-1))
 
 
-def _lengths(name: str, values: Any) -> tuple[float, float, float]:
+def _lengths(name: str, values: Any) -> tuple[float, ...]:
     try:
         alone = np.ndim(values) == 0
     except ValueError:  # parts of different lengths: the rule of a number finds the one that is none
         alone = False
     given = (values,) * 3 if alone else three(name, values)
-    first, second, third = (positive(f"{name} of leg {leg}", value, zero=True) for leg, value in enumerate(given, 1))
-    return (first, second, third)
+    return tuple(positive(f"{name} of leg {leg}", value, zero=True) for leg, value in enumerate(given, 1))
 
 
 @dataclass(frozen=True)
@@ -149,7 +148,7 @@ class ParallelPlatform:
     def vertices(self, pose: ArrayLike) -> Complex:
         """Platform vertices F_k in the fixed frame, shape (..., 3), for poses (..., 3)."""
         X = triples("pose", pose)
-        return np.asarray(_complex(X)[..., None] + np.exp(1j * X[..., 2:3]) * np.array(self.b))
+        return np.asarray(X[..., 0:1] + 1j * X[..., 1:2] + np.exp(1j * X[..., 2:3]) * np.array(self.b))
 
     def elbows(self, theta: ArrayLike) -> Complex:
         """Joints A_k between rocker and intermediate link, (..., 3), for rocker angles (..., 3); NaN stays NaN."""
@@ -248,11 +247,9 @@ class ParallelPlatform:
         X, angle, t1, t2 = together(pose=pose, theta=theta, rate=rate, rate2=rate2)
         JX, JT = self.jacobians(X, angle)
         first = _solve(JX, -(JT * t1)[..., None], "velocities")[..., 0]
-        rocker = np.array(self.l1) * np.exp(1j * angle)
-        arm = np.exp(1j * X[..., 2:3]) * np.array(self.b)
-        d = self.vertices(X) - self.elbows(theta)
-        turn = first[..., 2:3]
-        speed = _complex(first)[..., None] + 1j * arm * turn - 1j * rocker * t1  # F' - A'
+        rocker, arm = np.array(self.l1) * np.exp(1j * angle), np.exp(1j * X[..., 2:3]) * np.array(self.b)
+        d, turn = self.vertices(X) - self.elbows(theta), first[..., 2:3]
+        speed = (first[..., 0] + 1j * first[..., 1])[..., None] + 1j * arm * turn - 1j * rocker * t1  # F' - A'
         push = rocker * (1j * t2 - t1 * t1) + arm * turn * turn
         right = 2.0 * ((np.conj(d) * push).real - np.abs(speed) ** 2)
         return first, _solve(JX, right[..., None], "accelerations")[..., 0]
@@ -320,10 +317,6 @@ def _solve(JX: Array, right: Array, what: str) -> Array:
         raise GeometryError(f"det JX = 0: the platform is singular (type II) and has no {what}") from error
 
 
-def _complex(X: Array) -> Complex:
-    return np.asarray(X[..., 0] + 1j * X[..., 1])
-
-
 def cross(a: Any, b: Any) -> Any:
     """Cross product ``x_a y_b - y_a x_b`` of complex numbers or arrays of them.
 
@@ -343,8 +336,7 @@ def directions(angles: Sequence[float]) -> NDArray[np.complex128]:
     table = [0.0, 0.5, 0.5 * math.sqrt(3.0), 1.0, 0.5 * math.sqrt(3.0), 0.5]
 
     def sine(k: int) -> float:
-        k %= 12
-        return table[k] if k < 6 else 0.0 - table[k - 6]  # 0.0, not -0.0
+        return table[k % 6] if k % 12 < 6 else 0.0 - table[k % 6]  # 0.0, not -0.0
 
     return np.array(
         [

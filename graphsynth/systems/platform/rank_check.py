@@ -112,40 +112,30 @@ def as_mechanism(platform: SingleMotorPlatform, psi: float = 0.0, pose: ArrayLik
     for k in range(3):
         joints += _leg(platform, k)
     driver = Driver(0, 1, Linear(1.0 / platform.gears.ratio))
-    return Mechanism(
-        platform.graph(),
-        tuple(joints),
-        (driver,),
-        {"P": TracePoint(14, (0.0, 0.0))},
-        tuple((float(x), float(y), float(a)) for x, y, a in poses),
-    )
+    at: tuple[tuple[float, float, float], ...] = tuple(map(tuple, poses.tolist()))
+    return Mechanism(platform.graph(), tuple(joints), (driver,), {"P": TracePoint(14, (0.0, 0.0))}, at)
 
 
 def _leg(platform: SingleMotorPlatform, k: int) -> list[JointGeometry]:
     """Joints of wheel, coupler, rocker and intermediate link k (from 0)."""
-    turn = complex(np.exp(1j * platform.frame_angle[k]))
-    z1, z2 = platform.gears.z1, platform.gears.z2
+    turn, gears = complex(np.exp(1j * platform.frame_angle[k])), platform.gears
     wheel, coupler, rocker, link = 2 + k, 5 + k, 8 + k, 11 + k
-    O = complex(platform.axis[k] * turn)
+    O, D, b = complex(platform.axis[k] * turn), platform.platform.D[k], platform.platform.b[k]
     if O == 0:
         raise GeometryError(f"wheel {k + 1} lies on the axis of the pinion; give an axis that is not 0")
-    small, large = abs(O) * z1 / (z1 + z2), abs(O) * z2 / (z1 + z2)
+    small, large = (abs(O) * teeth / (gears.z1 + gears.z2) for teeth in (gears.z1, gears.z2))
     toothed = -(1.0 + small / large) * math.atan2(O.imag, O.real)
     crank = platform.crank[k] * complex(np.exp(1j * platform.phase[k]))
     arm = platform.l1[k] * complex(np.exp(1j * platform.delta[k]))
     return [
-        Revolute(0, wheel, _pair(O)),
-        Revolute(wheel, coupler, _pair(crank)),
+        Revolute(0, wheel, (O.real, O.imag)),
+        Revolute(wheel, coupler, (crank.real, crank.imag)),
         Revolute(coupler, rocker, (platform.coupler[k], 0.0), (platform.rocker[k], 0.0)),
-        Revolute(0, rocker, _pair(platform.platform.D[k])),
-        Revolute(rocker, link, _pair(arm)),
-        Revolute(link, 14, (platform.l2[k], 0.0), _pair(platform.platform.b[k])),
+        Revolute(0, rocker, (D.real, D.imag)),
+        Revolute(rocker, link, (arm.real, arm.imag)),
+        Revolute(link, 14, (platform.l2[k], 0.0), (b.real, b.imag)),
         Gear(1, wheel, radius_a=small, radius_b=large, offset=toothed),
     ]
-
-
-def _pair(z: complex) -> tuple[float, float]:
-    return (float(z.real), float(z.imag))
 
 
 @checked
@@ -167,15 +157,13 @@ def loop_closure(mechanism: Mechanism, pose: ArrayLike | None = None, *, toleran
     Lc = characteristic_length(mechanism)
     names: list[str] = []
     twists: list[Array] = []
-    owner: list[int] = []
+    own: list[int] = []
     for number, joint in enumerate(mechanism.joints):
         for name, twist in _twists(joint, X, Lc):
             names.append(f"{name} {joint.a}-{joint.b}")
             twists.append(twist)
-            owner.append(number)
-    signs = _cycles(mechanism)
-    columns, own = np.array(twists), np.array(owner)
-    matrix = (signs[:, own][:, None, :] * columns.T[None]).reshape(-1, len(names))
+            own.append(number)
+    matrix = (_cycles(mechanism)[:, own][:, None, :] * np.array(twists).T[None]).reshape(-1, len(names))
     _, values, rows = np.linalg.svd(matrix, full_matrices=True)
     rank = int((values > tolerance * values[0]).sum()) if values.size else 0
     return LoopClosure(matrix, tuple(names), values, rank, rows[rank:], tolerance, Lc)

@@ -110,10 +110,9 @@ def resistance_effect(
     >>> effect.speed_falls, effect.speed.round(2).tolist()
     (False, [0.65, 9.73])
     """
-    motor = drive.motor
-    if not isinstance(motor, DCMotor) or motor.inductance == 0.0:
+    if not isinstance(drive.motor, DCMotor) or drive.motor.inductance == 0.0:
         raise SpecError("the effect of the resistance needs a DCMotor with positive inductance; give one")
-    _must_be_bounded(drive)
+    motor = _armature(drive)
     if 0.0 in (motor.gain, motor.speed, motor.torque_constant):
         raise SpecError(
             f"gain = {motor.gain:g}, speed = {motor.speed:g} and torque_constant = {motor.torque_constant:g} must not "
@@ -184,21 +183,10 @@ def ripple_map(
     r, L = numbers("resistances", resistances, "ohm"), numbers("inductances", inductances, "H")
     if r.ndim != 1 or r.size < 2 or not (np.diff(r) > 0.0).all() or r[0] <= 0.0:
         raise SpecError(f"resistances of shape {r.shape} must be two or more increasing positive numbers; give ohm")
-    motor = drive.motor
-    if not isinstance(motor, DCMotor):
-        raise SpecError(f"{type(motor).__name__} has no armature; give a DCMotor")
-    effects = [
-        resistance_effect(
-            replace(drive, motor=replace(motor, inductance=float(x))),
-            r.tolist(),
-            simulate=True,
-            revolutions=revolutions,
-        )
-        for x in L
-    ]
-    speed, current = (
-        np.array([getattr(e, name) for e in effects]) for name in ("simulated_speed", "simulated_current")
-    )
+    motor = _armature(drive)
+    drives = (replace(drive, motor=replace(motor, inductance=float(x))) for x in L)
+    effects = [resistance_effect(own, r.tolist(), simulate=True, revolutions=revolutions) for own in drives]
+    speed, current = (np.array([getattr(e, f"simulated_{name}") for e in effects]) for name in ("speed", "current"))
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = [np.diff(np.log(values), axis=1) / np.diff(np.log(r)) for values in (speed, current)]
     ratio = np.array([effect.frequency_ratio for effect in effects])
@@ -223,10 +211,7 @@ def steady_ripple(drive: MotorDrivenPlatform, revolutions: int = 40, rtol: float
 
     Raises `SpecError` for a motor that is no DCMotor.
     """
-    motor = drive.motor
-    if not isinstance(motor, DCMotor):
-        raise SpecError(f"{type(motor).__name__} has no armature current; give a DCMotor")
-    _must_be_bounded(drive)
+    motor = _armature(drive)
     whole("revolutions", revolutions, "two halves of the run are compared")
     free = motor.gain * motor.speed
     if free == 0.0:
@@ -242,9 +227,13 @@ def steady_ripple(drive: MotorDrivenPlatform, revolutions: int = 40, rtol: float
     return _peak_to_peak(motion.speed[1:]), _peak_to_peak(motion.currents[1:, 0])
 
 
-def _must_be_bounded(drive: MotorDrivenPlatform) -> None:
+def _armature(drive: MotorDrivenPlatform) -> DCMotor:
+    """Motor of a drive whose crank speed is bounded; `SpecError` for another motor or drive."""
+    if not isinstance(drive.motor, DCMotor):
+        raise SpecError(f"{type(drive.motor).__name__} has no armature; give a DCMotor")
     if drive.constant_inertia == 0.0 and drive.inertia.dead_centres:
         raise SpecError("without inertia the crank speed is unbounded at dead centres: no ripple; give J_0 > 0")
+    return drive.motor
 
 
 def _peak_to_peak(values: Array) -> float:
@@ -254,8 +243,8 @@ def _peak_to_peak(values: Array) -> float:
         vertex = middle - 0.125 * (right - left) ** 2 / bend
     peak = (middle >= left) & (middle >= right) & (bend < 0.0)
     low = (middle <= left) & (middle <= right) & (bend > 0.0)
-    highest = max(values.max(), *vertex[peak]) if peak.any() else values.max()
-    lowest = min(values.min(), *vertex[low]) if low.any() else values.min()
+    highest = max(values.max(), *vertex[peak])
+    lowest = min(values.min(), *vertex[low])
     return float(highest - lowest)
 
 
@@ -275,14 +264,8 @@ def resistance_picture(effects: Mapping[str, ResistanceEffect], *, size: tuple[f
     _gain_map(figure, chart)
     for label, effect in effects.items():
         chart.plot(np.full(effect.damping.size, effect.frequency_ratio), effect.damping, "o-", ms=3, lw=0.8, color="k")
-        chart.annotate(
-            label,
-            (effect.frequency_ratio, effect.damping.max()),
-            xytext=(3, 3),
-            fontsize=7,
-            color=WHITE,
-            textcoords="offset points",
-        )
+        top, look = (effect.frequency_ratio, effect.damping.max()), {"fontsize": 7, "color": WHITE}
+        chart.annotate(label, top, xytext=(3, 3), textcoords="offset points", **look)
     _ripples(ripples, effects, "speed")
     return figure
 
@@ -299,6 +282,19 @@ def ripple_picture(
     figure = new_figure(size)
     _ripples(figure.add_subplot(), effects, of)
     return figure
+
+
+def _log_axes(axes: Any, x: str, y: str, xticks: tuple[float, ...], yticks: tuple[float, ...]) -> None:
+    """Logarithmic axes with a few ticks inside the view, written plainly."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    for axis, ticks in ((axes.xaxis, xticks), (axes.yaxis, yticks)):
+        low, high = sorted(axis.get_view_interval())
+        shown = [tick for tick in ticks if low <= tick <= high]
+        axis.set_ticks(shown, [f"{tick:g}" for tick in shown])
+        axis.set_ticks([], minor=True)
 
 
 def _ripples(axes: Any, effects: Mapping[str, ResistanceEffect], of: str) -> None:
@@ -322,28 +318,14 @@ def ripple_map_picture(found: RippleMap, *, size: tuple[float, float] = (5.4, 4.
     middle = np.sqrt(found.resistance[1:] * found.resistance[:-1])
     order = np.argsort(found.frequency_ratio)
     axes.set_facecolor("#999999")
-    drawn = axes.pcolormesh(
-        _edges(middle),
-        _edges(found.frequency_ratio[order]),
-        found.speed_slope[order],
-        cmap="RdBu_r",
-        vmin=-1.0,
-        vmax=1.0,
-        rasterized=True,
-    )
-    bar = figure.colorbar(drawn, ax=axes, extend="both")
-    bar.set_label("d ln(speed ripple) / d ln r")
+    shown: dict[str, Any] = {"cmap": "RdBu_r", "vmin": -1.0, "vmax": 1.0, "rasterized": True}
+    cells = (_edges(middle), _edges(found.frequency_ratio[order]), found.speed_slope[order])
+    drawn = axes.pcolormesh(*cells, **shown)
+    figure.colorbar(drawn, ax=axes, extend="both").set_label("d ln(speed ripple) / d ln r")
     axes.axhline(1.0 / math.sqrt(2.0), color="#111111", lw=2.0)
     axes.text(axes.get_xlim()[0] * 1.1, 0.73, "linear: falls above", fontsize=8, color="#111111")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_xlabel("armature resistance [ohm]")
-    axes.set_ylabel("Om / w_n")
-    for axis, ticks in ((axes.xaxis, (0.5, 1, 2, 5, 10, 20)), (axes.yaxis, (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2))):
-        low, high = sorted(axis.get_view_interval())
-        shown = [tick for tick in ticks if low <= tick <= high]
-        axis.set_ticks(shown, [f"{tick:g}" for tick in shown])
-        axis.set_ticks([], minor=True)
+    ticks = ((0.5, 1, 2, 5, 10, 20), (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2))
+    _log_axes(axes, "armature resistance [ohm]", "Om / w_n", *ticks)
     return figure
 
 
@@ -357,22 +339,14 @@ def _edges(centres: Any) -> Any:
 
 
 def _gain_map(figure: Figure, axes: Any) -> None:
-
     nu, zeta = np.geomspace(0.1, 3.0, 181), np.geomspace(0.02, 8.0, 161)
     gain = np.log10(ripple_gain(nu[None, :], zeta[:, None])[0])
     drawn = axes.contourf(nu, zeta, gain, levels=np.linspace(-1.0, 1.6, 14), cmap="viridis", extend="both")
-    bar = figure.colorbar(drawn, ax=axes)
-    bar.set_label("log10 of the speed gain")
+    figure.colorbar(drawn, ax=axes).set_label("log10 of the speed gain")
     axes.axvline(1.0 / math.sqrt(2.0), color=WHITE, lw=2.0)
     for x, text in ((0.26, "ripple rises with r"), (1.4, "ripple falls with r")):
         axes.text(x, 0.024, text, color=WHITE, fontsize=8, ha="center")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
     axes.set_xlim(nu[0], nu[-1])
     axes.set_ylim(zeta[0], zeta[-1])
-    for axis, ticks in ((axes.xaxis, (0.1, 0.2, 0.5, 1, 2, 3)), (axes.yaxis, (0.02, 0.1, 0.5, 1, 5))):
-        axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
-        axis.set_ticks([], minor=True)
+    _log_axes(axes, "Om / w_n", "damping ratio zeta", (0.1, 0.2, 0.5, 1, 2, 3), (0.02, 0.1, 0.5, 1, 5))
     axes.set_title("speed gain; bar: Om = w_n / √2", fontsize=10)
-    axes.set_xlabel("Om / w_n")
-    axes.set_ylabel("damping ratio zeta")
