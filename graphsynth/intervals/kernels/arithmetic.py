@@ -3,25 +3,23 @@
 from graphsynth.core.compilation import kernel
 from graphsynth.core.intrinsics import fma
 from graphsynth.intervals.kernels.rounding import (
-    DIVISOR_MIN,
-    FACTOR_MAX,
     INF,
     MAX,
-    NAN,
     PHI,
     PRODUCT_MIN,
-    QUOTIENT_MAX,
-    QUOTIENT_MIN,
     add_down,
     add_up,
     divide_both,
     down,
     excess,
     multiply_both,
-    root_down,
-    root_up,
+    root_both,
     up,
 )
+
+NAN = float("nan")
+FACTOR_MAX, DIVISOR_MIN = 2.0**500, 2.0**-500
+QUOTIENT_MIN, QUOTIENT_MAX = 2.0**-400, 2.0**490
 
 
 @kernel(forceinline=True)
@@ -38,24 +36,6 @@ def subtract(al, ah, bl, bh):
     void = (al > ah) | (bl > bh)
     lo, hi = add_down(al, -bh), add_up(ah, -bl)
     return INF if void else lo, -INF if void else hi
-
-
-@kernel(forceinline=True)
-def ends_of_four(p1, p2, p3, p4, e1, e2, e3, e4):
-    """Least and largest of four rounded values, and whether they bound the exact ones, which are p + e."""
-    l1 = p1 if p1 < p2 else p2
-    l2 = p3 if p3 < p4 else p4
-    u1 = p1 if p1 > p2 else p2
-    u2 = p3 if p3 > p4 else p4
-    lo = l1 if l1 < l2 else l2
-    hi = u1 if u1 > u2 else u2
-    below = (
-        ((p1 > lo) | (e1 >= 0.0)) & ((p2 > lo) | (e2 >= 0.0)) & ((p3 > lo) | (e3 >= 0.0)) & ((p4 > lo) | (e4 >= 0.0))
-    )
-    above = (
-        ((p1 < hi) | (e1 <= 0.0)) & ((p2 < hi) | (e2 <= 0.0)) & ((p3 < hi) | (e3 <= 0.0)) & ((p4 < hi) | (e4 <= 0.0))
-    )
-    return lo, hi, below, above
 
 
 @kernel(forceinline=True)
@@ -130,7 +110,17 @@ def divide_plain(al, ah, bl, bh):
     r1, r2, r3, r4 = fma(-q1, bl, al), fma(-q2, bh, al), fma(-q3, bl, ah), fma(-q4, bh, ah)
     sign = 1.0 if bl > 0.0 else -1.0
     r1, r2, r3, r4 = r1 * sign, r2 * sign, r3 * sign, r4 * sign
-    lo, hi, below, above = ends_of_four(q1, q2, q3, q4, r1, r2, r3, r4)
+    l1 = q1 if q1 < q2 else q2
+    l2 = q3 if q3 < q4 else q4
+    u1 = q1 if q1 > q2 else q2
+    u2 = q3 if q3 > q4 else q4
+    lo = l1 if l1 < l2 else l2
+    hi = u1 if u1 > u2 else u2
+    # whether the least and the largest bound the exact quotients, which lie beyond the rounded ones by the signs of r
+    below = ((q1 > lo) | (r1 >= 0.0)) & ((q2 > lo) | (r2 >= 0.0))
+    below &= ((q3 > lo) | (r3 >= 0.0)) & ((q4 > lo) | (r4 >= 0.0))
+    above = ((q1 < hi) | (r1 <= 0.0)) & ((q2 < hi) | (r2 <= 0.0))
+    above &= ((q3 < hi) | (r3 <= 0.0)) & ((q4 < hi) | (r4 <= 0.0))
     inner = bl if bl > 0.0 else -bh
     outer = bh if bl > 0.0 else -bl
     small, large = abs(lo), abs(hi)
@@ -200,7 +190,7 @@ def root(al, ah):
     """Square roots of the part at or above 0."""
     if al > ah or ah < 0.0:
         return INF, -INF
-    return root_down(al) if al > 0.0 else 0.0, root_up(ah)
+    return root_both(al)[0] if al > 0.0 else 0.0, root_both(ah)[1]
 
 
 @kernel(forceinline=True)
@@ -212,29 +202,16 @@ def absolute(al, ah):
 
 
 @kernel
-def power_down(x, n):
-    """Lower bound of ``x**n`` for ``x >= 0``, ``n >= 1``."""
-    result, factor = 1.0, x
+def _powers(low, high, n):
+    """Lower bound of ``low**n`` and upper bound of ``high**n`` for numbers of zero or more, ``n >= 1``."""
+    lo, hi = 1.0, 1.0
     while True:
         if n & 1:
-            result = multiply_both(result, factor)[0]
+            lo, hi = multiply_both(lo, low)[0], multiply_both(hi, high)[1]
         n >>= 1
         if n == 0:
-            return result
-        factor = multiply_both(factor, factor)[0]
-
-
-@kernel
-def power_up(x, n):
-    """Upper bound of ``x**n`` for ``x >= 0``, ``n >= 1``."""
-    result, factor = 1.0, x
-    while True:
-        if n & 1:
-            result = multiply_both(result, factor)[1]
-        n >>= 1
-        if n == 0:
-            return result
-        factor = multiply_both(factor, factor)[1]
+            return lo, hi
+        low, high = multiply_both(low, low)[0], multiply_both(high, high)[1]
 
 
 @kernel
@@ -245,10 +222,14 @@ def power(al, ah, n):
     if n == 0:
         return 1.0, 1.0
     m = abs(n)
-    if m & 1:
-        lo = power_down(al, m) if al >= 0.0 else -power_up(-al, m)
-        hi = power_up(ah, m) if ah >= 0.0 else -power_down(-ah, m)
-    else:
+    if m & 1 == 0:
         l, h = absolute(al, ah)
-        lo, hi = power_down(l, m), power_up(h, m)
+        lo, hi = _powers(l, h, m)
+    elif al >= 0.0:
+        lo, hi = _powers(al, ah, m)
+    elif ah < 0.0:
+        h, l = _powers(-ah, -al, m)
+        lo, hi = -l, -h
+    else:
+        lo, hi = -_powers(0.0, -al, m)[1], _powers(0.0, ah, m)[1]
     return (lo, hi) if n > 0 else divide(1.0, 1.0, lo, hi)

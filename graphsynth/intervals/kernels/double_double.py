@@ -78,6 +78,19 @@ def root(ah, al):
 
 
 @kernel(forceinline=True)
+def polynomial(coefficients, exact, least, xh, xl):
+    """Horner's scheme from the last coefficient to that of index ``least``; those from ``exact`` on as doubles."""
+    tail = 0.0
+    for k in range(coefficients.shape[0] - 1, exact - 1, -1):
+        tail = tail * xh + coefficients[k, 0]
+    h, l = tail, 0.0
+    for k in range(exact - 1, least - 1, -1):
+        h, l = multiply(h, l, xh, xl)
+        h, l = add(h, l, coefficients[k, 0], coefficients[k, 1])
+    return h, l
+
+
+@kernel(forceinline=True)
 def bounds(h, l, error):
     """Doubles on both sides of every number within ``error`` of ``h + l``."""
     d = l - error
@@ -117,8 +130,6 @@ def atan_fixed(p: int, q: int, bits: int) -> int:
 def pi_fixed(bits: int) -> int:
     """Return ``pi * 2**bits`` within one unit (Machin 1706).
 
-    Examples
-    --------
     >>> pi_fixed(16)
     205887
     """

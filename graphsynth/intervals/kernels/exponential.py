@@ -8,7 +8,7 @@ import numpy as np
 from graphsynth.core.compilation import kernel
 from graphsynth.core.intrinsics import fma
 from graphsynth.intervals.kernels import double_double as dd
-from graphsynth.intervals.kernels.rounding import ETA, INF, MAX, add_down, add_up, multiply_both, root_down, root_up, up
+from graphsynth.intervals.kernels.rounding import ETA, INF, MAX, add_down, add_up, multiply_both, root_both, up
 
 _LOG2 = Fraction(dd.log2_fixed(300), 2**300)
 _TOP = float(Fraction(int(_LOG2 * 2**40), 2**40))  # 40 bits: its products with exponents are exact
@@ -33,13 +33,7 @@ def exp_at(x):
     h, l = dd.two_sum(x, -k * _TOP)
     mh, ml = dd.multiply_double(_MID, _LOW, k)
     h, l = dd.add(h, l, -mh, -ml)
-    tail = 0.0
-    for j in range(20, _EXP_EXACT - 1, -1):
-        tail = tail * h + _EXP[j, 0]
-    ph, pl = tail, 0.0
-    for j in range(_EXP_EXACT - 1, -1, -1):
-        ph, pl = dd.multiply(ph, pl, h, l)
-        ph, pl = dd.add(ph, pl, _EXP[j, 0], _EXP[j, 1])
+    ph, pl = dd.polynomial(_EXP, _EXP_EXACT, 0, h, l)
     lo, hi = dd.bounds(ph, pl, ph * RELATIVE)
     if k == 0.0:
         lo, hi = (max(lo, 1.0), hi) if x > 0.0 else (lo, min(hi, 1.0))
@@ -68,13 +62,7 @@ def log_at(x):
     ah, al = dd.two_sum(m, 1.0)
     h, l = dd.divide(m - 1.0, 0.0, ah, al)
     sh, sl = dd.multiply(h, l, h, l)
-    tail = 0.0
-    for j in range(19, _LOG_EXACT - 1, -1):
-        tail = tail * sh + _ODD[j, 0]
-    ph, pl = tail, 0.0
-    for j in range(_LOG_EXACT - 1, -1, -1):
-        ph, pl = dd.multiply(ph, pl, sh, sl)
-        ph, pl = dd.add(ph, pl, _ODD[j, 0], _ODD[j, 1])
+    ph, pl = dd.polynomial(_ODD, _LOG_EXACT, 0, sh, sl)
     h, l = dd.multiply(ph, pl, h, l)
     if e != 0:
         lh, ll = dd.multiply_double(_LOG2_H, _LOG2_L, float(e))
@@ -130,6 +118,6 @@ def _hypot_at(x, y):
     h, l = dd.root(h, l)
     lo, hi = dd.bounds(h, l, h * RELATIVE)
     # roots of bounds are wider, but exact where the squares and their sum are
-    lo = max(lo, root_down(add_down(multiply_both(a, a)[0], multiply_both(b, b)[0])))
-    hi = min(hi, root_up(add_up(multiply_both(a, a)[1], multiply_both(b, b)[1])))
+    lo = max(lo, root_both(add_down(multiply_both(a, a)[0], multiply_both(b, b)[0]))[0])
+    hi = min(hi, root_both(add_up(multiply_both(a, a)[1], multiply_both(b, b)[1]))[1])
     return multiply_both(lo, 1.0 / scale)[0], multiply_both(hi, 1.0 / scale)[1]

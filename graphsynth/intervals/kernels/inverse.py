@@ -32,13 +32,7 @@ def atan_unit(h, l):
         th, tl = dd.add_double(th, tl, 1.0)
         h, l = dd.divide(nh, nl, th, tl)
     sh, sl = dd.multiply(h, l, h, l)
-    tail = 0.0
-    for j in range(11, 3, -1):
-        tail = tail * sh + _ODD[j, 0]
-    ph, pl = tail, 0.0
-    for j in range(3, 0, -1):
-        ph, pl = dd.multiply(ph, pl, sh, sl)
-        ph, pl = dd.add(ph, pl, _ODD[j, 0], _ODD[j, 1])
+    ph, pl = dd.polynomial(_ODD, 4, 1, sh, sl)
     ph, pl = dd.multiply(ph, pl, sh, sl)
     ph, pl = dd.multiply(ph, pl, h, l)
     h, l = dd.add(h, l, ph, pl)

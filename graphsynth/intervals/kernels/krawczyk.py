@@ -208,15 +208,6 @@ def _inside(a, b):
 
 
 @kernel
-def _apart(a, b):
-    """Whether two boxes have no point in common."""
-    apart = False
-    for i in range(a.shape[1]):
-        apart = apart or a[1, i] < b[0, i] or b[1, i] < a[0, i]
-    return apart
-
-
-@kernel
 def _known(x, domains, count):
     """Whether a box lies in the domain of a solution that has been found."""
     known = False
@@ -264,7 +255,10 @@ def _beyond(equations, p, start, x, domain, k, room):
         if result == UNIQUE:
             if _inside(k, start):
                 return UNIQUE, count + 1
-            return EMPTY if _apart(k, start) else UNDECIDED, count + 1
+            apart = False
+            for i in range(x.shape[1]):
+                apart = apart or k[1, i] < start[0, i] or start[1, i] < k[0, i]
+            return EMPTY if apart else UNDECIDED, count + 1
         if result == EMPTY:
             return EMPTY, count + 1
         if not norm < 1.0:

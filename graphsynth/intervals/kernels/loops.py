@@ -4,18 +4,42 @@ from graphsynth.core.compilation import kernel
 from graphsynth.intervals.kernels import arithmetic, exponential, inverse, trigonometry
 
 
-@kernel
-def add(al, ah, bl, bh, lo, hi):
-    """Add flat arrays."""
-    for i in range(lo.size):
-        lo[i], hi[i] = arithmetic.add(al[i], ah[i], bl[i], bh[i])
+def _loop_of_one(name, operation):
+    """Return the kernel that applies an operation of one interval to flat arrays, known by its name."""
+
+    def loop(al, ah, lo, hi):
+        for i in range(lo.size):
+            lo[i], hi[i] = operation(al[i], ah[i])
+
+    loop.__name__ = loop.__qualname__ = name
+    return kernel(loop)
 
 
-@kernel
-def subtract(al, ah, bl, bh, lo, hi):
-    """Differences of flat arrays."""
-    for i in range(lo.size):
-        lo[i], hi[i] = arithmetic.subtract(al[i], ah[i], bl[i], bh[i])
+def _loop_of_two(name, operation):
+    """Return the kernel that applies an operation of two intervals to flat arrays, known by its name."""
+
+    def loop(al, ah, bl, bh, lo, hi):
+        for i in range(lo.size):
+            lo[i], hi[i] = operation(al[i], ah[i], bl[i], bh[i])
+
+    loop.__name__ = loop.__qualname__ = name
+    return kernel(loop)
+
+
+add = _loop_of_two("add", arithmetic.add)
+subtract = _loop_of_two("subtract", arithmetic.subtract)
+square = _loop_of_one("square", arithmetic.square)
+root = _loop_of_one("root", arithmetic.root)
+sin = _loop_of_one("sin", trigonometry.sin)
+cos = _loop_of_one("cos", trigonometry.cos)
+tan = _loop_of_one("tan", trigonometry.tan)
+atan = _loop_of_one("atan", inverse.atan)
+asin = _loop_of_one("asin", inverse.asin)
+acos = _loop_of_one("acos", inverse.acos)
+exp = _loop_of_one("exp", exponential.exp)
+log = _loop_of_one("log", exponential.log)
+atan2 = _loop_of_two("atan2", inverse.atan2)
+hypot = _loop_of_two("hypot", exponential.hypot)
 
 
 @kernel
@@ -47,91 +71,7 @@ def divide(al, ah, bl, bh, lo, hi):
 
 
 @kernel
-def square(al, ah, lo, hi):
-    """Squares of a flat array."""
-    for i in range(lo.size):
-        lo[i], hi[i] = arithmetic.square(al[i], ah[i])
-
-
-@kernel
-def root(al, ah, lo, hi):
-    """Square roots of a flat array."""
-    for i in range(lo.size):
-        lo[i], hi[i] = arithmetic.root(al[i], ah[i])
-
-
-@kernel
 def power(al, ah, n, lo, hi):
     """Integer powers of a flat array."""
     for i in range(lo.size):
         lo[i], hi[i] = arithmetic.power(al[i], ah[i], n)
-
-
-@kernel
-def sin(al, ah, lo, hi):
-    """Apply sin."""
-    for i in range(lo.size):
-        lo[i], hi[i] = trigonometry.sin(al[i], ah[i])
-
-
-@kernel
-def cos(al, ah, lo, hi):
-    """Apply cos."""
-    for i in range(lo.size):
-        lo[i], hi[i] = trigonometry.cos(al[i], ah[i])
-
-
-@kernel
-def tan(al, ah, lo, hi):
-    """Apply tan."""
-    for i in range(lo.size):
-        lo[i], hi[i] = trigonometry.tan(al[i], ah[i])
-
-
-@kernel
-def atan(al, ah, lo, hi):
-    """Apply atan."""
-    for i in range(lo.size):
-        lo[i], hi[i] = inverse.atan(al[i], ah[i])
-
-
-@kernel
-def asin(al, ah, lo, hi):
-    """Apply asin."""
-    for i in range(lo.size):
-        lo[i], hi[i] = inverse.asin(al[i], ah[i])
-
-
-@kernel
-def acos(al, ah, lo, hi):
-    """Apply acos."""
-    for i in range(lo.size):
-        lo[i], hi[i] = inverse.acos(al[i], ah[i])
-
-
-@kernel
-def exp(al, ah, lo, hi):
-    """Apply exp."""
-    for i in range(lo.size):
-        lo[i], hi[i] = exponential.exp(al[i], ah[i])
-
-
-@kernel
-def log(al, ah, lo, hi):
-    """Apply log."""
-    for i in range(lo.size):
-        lo[i], hi[i] = exponential.log(al[i], ah[i])
-
-
-@kernel
-def atan2(al, ah, bl, bh, lo, hi):
-    """Apply atan2."""
-    for i in range(lo.size):
-        lo[i], hi[i] = inverse.atan2(al[i], ah[i], bl[i], bh[i])
-
-
-@kernel
-def hypot(al, ah, bl, bh, lo, hi):
-    """Apply hypot."""
-    for i in range(lo.size):
-        lo[i], hi[i] = exponential.hypot(al[i], ah[i], bl[i], bh[i])

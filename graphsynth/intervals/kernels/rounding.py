@@ -13,12 +13,7 @@ PHI = 2.0**-53 * (1.0 + 2.0**-52)
 ETA = 2.0**-1074
 MAX = 1.7976931348623157e308
 INF = float("inf")
-NAN = float("nan")
 PRODUCT_MIN = 2.0**-960
-FACTOR_MAX = 2.0**500
-DIVISOR_MIN = 2.0**-500
-QUOTIENT_MIN = 2.0**-400
-QUOTIENT_MAX = 2.0**490
 ROOT_MAX = 2.0**1000
 NORMAL_MIN = 2.0**-1022
 SCALE = 2.0**600
@@ -105,22 +100,9 @@ def divide_both(a, b):
 
 
 @kernel(forceinline=True)
-def _root(a):
-    """Root, and a number with the sign of its error."""
+def root_both(a):
+    """Lower and upper bound of a root."""
     s = sqrt(a)
     f = 2.0**300 if a < PRODUCT_MIN else (2.0**-300 if a > ROOT_MAX else 1.0)
-    return s, fma(-s * f, s * f, a * f * f)
-
-
-@kernel(forceinline=True)
-def root_down(a):
-    """Lower bound of a root."""
-    s, r = _root(a)
-    return down(s, r >= 0.0)
-
-
-@kernel(forceinline=True)
-def root_up(a):
-    """Upper bound of a root."""
-    s, r = _root(a)
-    return up(s, r <= 0.0)
+    r = fma(-s * f, s * f, a * f * f)  # a number with the sign of the error
+    return down(s, r >= 0.0), up(s, r <= 0.0)

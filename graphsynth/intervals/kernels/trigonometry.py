@@ -52,8 +52,8 @@ def reduce_moderate(x):
 @kernel
 def reduce(x):
     """Return ``floor(x 2/pi) mod 4`` (-1 if not certain), the nearest integer mod 4, and the rest times pi/2."""
-    if x == 0.0:
-        return 0, 0, 0.0, 0.0
+    if abs(x) < 0.785:
+        return (0 if x >= 0.0 else 3), 0, x, 0.0
     if abs(x) <= _MODERATE:
         return reduce_moderate(x)
     # the integer of 53 bits times eight words of 2/pi: those before add whole turns, those after nothing that counts
@@ -104,13 +104,7 @@ def reduce(x):
 def sine_polynomial(h, l):
     """Sine of ``|h + l| <= 0.7854``."""
     sh, sl = dd.multiply(h, l, h, l)
-    tail = 0.0
-    for k in range(12, _SIN_EXACT - 1, -1):
-        tail = tail * sh + _SIN[k, 0]
-    ph, pl = tail, 0.0
-    for k in range(_SIN_EXACT - 1, 0, -1):
-        ph, pl = dd.multiply(ph, pl, sh, sl)
-        ph, pl = dd.add(ph, pl, _SIN[k, 0], _SIN[k, 1])
+    ph, pl = dd.polynomial(_SIN, _SIN_EXACT, 1, sh, sl)
     ph, pl = dd.multiply(ph, pl, sh, sl)
     ph, pl = dd.multiply(ph, pl, h, l)
     return dd.add(h, l, ph, pl)
@@ -120,23 +114,13 @@ def sine_polynomial(h, l):
 def cosine_polynomial(h, l):
     """Cosine of ``|h + l| <= 0.7854``."""
     sh, sl = dd.multiply(h, l, h, l)
-    tail = 0.0
-    for k in range(13, _COS_EXACT - 1, -1):
-        tail = tail * sh + _COS[k, 0]
-    ph, pl = tail, 0.0
-    for k in range(_COS_EXACT - 1, -1, -1):
-        ph, pl = dd.multiply(ph, pl, sh, sl)
-        ph, pl = dd.add(ph, pl, _COS[k, 0], _COS[k, 1])
-    return ph, pl
+    return dd.polynomial(_COS, _COS_EXACT, 0, sh, sl)
 
 
 @kernel
 def sine_at(x, turn):
     """Bounds of ``sin(x + turn pi/2)`` for finite x, and the quadrant of the argument (-1 if not certain)."""
-    if abs(x) < 0.785:
-        floor, nearest, h, l = (0 if x >= 0.0 else 3), 0, x, 0.0
-    else:
-        floor, nearest, h, l = reduce(x)
+    floor, nearest, h, l = reduce(x)
     if floor >= 0:
         floor = (floor + turn) & 3
     k = (nearest + turn) & 3
@@ -200,10 +184,7 @@ def tangent_at(x):
     if abs(x) < _SMALL:  # x < tan x < x + x^3 / 2
         lo, hi = (x, up(x, x == 0.0)) if x >= 0.0 else (down(x, False), x)
         return lo, hi, (0 if x >= 0.0 else 3)
-    if abs(x) < 0.785:
-        floor, nearest, h, l = (0 if x >= 0.0 else 3), 0, x, 0.0
-    else:
-        floor, nearest, h, l = reduce(x)
+    floor, nearest, h, l = reduce(x)
     sh, sl = sine_polynomial(h, l)
     ch, cl = cosine_polynomial(h, l)
     # an absolute error of the argument counts in proportion to a sine that is at least 2^-61
