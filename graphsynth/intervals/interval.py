@@ -178,7 +178,10 @@ class Interval(Measures):
         return _make(lo, hi, self.flags if self.flags.ndim == 0 else self.flags.reshape(*shape))
 
     def sum(self, axis: int | None = None) -> Interval:
-        """Sum along an axis (all for None), added in order, so independent of threads; `IntervalError` for none."""
+        """Sum along an axis (all for None), added in order, so independent of threads.
+
+        An axis that there is not is an `IntervalError`.
+        """
         if axis is None:
             return self.reshape(-1).sum(0)
         if not isinstance(axis, int | np.integer) or not -self.ndim <= axis < self.ndim:

@@ -168,58 +168,55 @@ def prove(system: MovingSystem, boxes: Boxes, radii: tuple[float, ...] = ()) -> 
     """Test every box, with radii found by inflation; then the larger ``radii`` (times the weights), largest first."""
     n = boxes.x.shape[1]
     size = max(1, _CHUNK // max(n * n, 1))
-    parts = [_Test(system, boxes.take(slice(k, k + size))).proof(radii) for k in range(0, len(boxes.x), size)]
+    parts = [_test(system, boxes.take(slice(k, k + size)), radii) for k in range(0, len(boxes.x), size)]
     if not parts:
         return Proof(np.zeros(0, dtype=bool), np.zeros((0, n)), np.zeros((0, n)))
     return reduce(Proof.join, parts)
 
 
-class _Test:
-    """Krawczyk's test of some moving boxes: what does not depend on their radii is computed once."""
+@np.errstate(all="ignore")
+def _test(system: MovingSystem, boxes: Boxes, radii: tuple[float, ...]) -> Proof:
+    """Krawczyk's test of some moving boxes: inflate until the image lies inside, then try larger boxes.
 
-    def __init__(self, system: MovingSystem, boxes: Boxes) -> None:
-        self.system, self.boxes = system, boxes
-        with np.errstate(all="ignore"):
-            self.units = system.units(boxes.x, boxes.u.mid)
-            f = system.residual(exact(boxes.x), exact(boxes.u.mid), self.units)
-            J, fu = system.derivatives(boxes.hull(np.zeros_like(boxes.x)), boxes.u, self.units)
-            self.Y, _ = inverses(J.mid)
-            # the change of f along the moving centre: (J V + f_u) times the half width of U
-            along = (J.times(exact(boxes.V)) + fu).size * boxes.u.rad[:, None]
-            self.newton = -exact(self.Y).times(f.wider(along * UP + TINY))
-            self.first = self.newton.size
+    Those give uniqueness in more room, of the same solution.
+    """
+    weights = system.weights
+    units = system.units(boxes.x, boxes.u.mid)
+    f = system.residual(exact(boxes.x), exact(boxes.u.mid), units)
+    J, fu = system.derivatives(boxes.hull(np.zeros_like(boxes.x)), boxes.u, units)
+    Y, _ = inverses(J.mid)
+    # the change of f along the moving centre: (J V + f_u) times the half width of U
+    along = (J.times(exact(boxes.V)) + fu).size * boxes.u.rad[:, None]
+    newton = -exact(Y).times(f.wider(along * UP + TINY))
+    first = newton.size
 
-    def image(self, which: Index, radius: Array) -> Array:
+    def image(which: Index, radius: Array) -> Array:
         """Radius of the Krawczyk image around the moving centres of some boxes; infinite where it is undefined."""
-        boxes = self.boxes.take(which)
-        J, _ = self.system.derivatives(boxes.hull(radius), boxes.u, self.units[which])
-        rest = exact(np.eye(radius.shape[-1])) - exact(self.Y[which]).times(J)
-        K = self.newton[which] + rest.times(Balls(np.zeros_like(radius), radius))
+        own = boxes.take(which)
+        J, _ = system.derivatives(own.hull(radius), own.u, units[which])
+        rest = exact(np.eye(radius.shape[-1])) - exact(Y[which]).times(J)
+        K = newton[which] + rest.times(Balls(np.zeros_like(radius), radius))
         return np.where(np.isfinite(K.size), K.size, np.inf)
 
-    def proof(self, radii: tuple[float, ...]) -> Proof:
-        """Inflate until the image lies inside; then try larger boxes: uniqueness in more room, the same solution."""
-        weights, first = self.system.weights, self.first
-        proved = np.zeros(len(first), dtype=bool)
-        radius, tight = np.full_like(first, np.inf), np.full_like(first, np.inf)
-        trial = _inflated(2.0 * first, weights)
-        with np.errstate(all="ignore"):
-            for _ in range(4):
-                left = np.flatnonzero(~proved & np.isfinite(first).all(axis=1))
-                if left.size == 0:
-                    break
-                image = self.image(left, trial[left])
-                inside = (image < trial[left]).all(axis=1)
-                proved[left[inside]] = True
-                radius[left[inside]], tight[left[inside]] = trial[left[inside]], image[inside]
-                trial[left] = _inflated(1.6 * np.where(np.isfinite(image), image, 0.0), weights)
-            for wide in radii:
-                trial = np.broadcast_to(wide * weights, first.shape)
-                left = np.flatnonzero(proved & (radius < trial).all(axis=1))
-                if left.size:
-                    wider = left[(self.image(left, trial[left]) < trial[left]).all(axis=1)]
-                    radius[wider] = trial[wider]
-        return Proof(proved, radius, tight)
+    proved = np.zeros(len(first), dtype=bool)
+    radius, tight = np.full_like(first, np.inf), np.full_like(first, np.inf)
+    trial = _inflated(2.0 * first, weights)
+    for _ in range(4):
+        left = np.flatnonzero(~proved & np.isfinite(first).all(axis=1))
+        if left.size == 0:
+            break
+        found = image(left, trial[left])
+        inside = (found < trial[left]).all(axis=1)
+        proved[left[inside]] = True
+        radius[left[inside]], tight[left[inside]] = trial[left[inside]], found[inside]
+        trial[left] = _inflated(1.6 * np.where(np.isfinite(found), found, 0.0), weights)
+    for wide in radii:
+        trial = np.broadcast_to(wide * weights, first.shape)
+        left = np.flatnonzero(proved & (radius < trial).all(axis=1))
+        if left.size:
+            wider = left[(image(left, trial[left]) < trial[left]).all(axis=1)]
+            radius[wider] = trial[wider]
+    return Proof(proved, radius, tight)
 
 
 def _inflated(radius: Array, weights: Array) -> Array:
