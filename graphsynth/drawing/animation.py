@@ -25,14 +25,14 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.bodies import bodies
 from graphsynth.drawing.diagram import mechanism_sketch
 from graphsynth.drawing.export import figure_of
-from graphsynth.drawing.frames import Frames, frames_of, shown_coordinate
+from graphsynth.drawing.frames import Frames, frames_of
 from graphsynth.drawing.moving import Moving
 from graphsynth.drawing.pages import policy
 from graphsynth.drawing.palette import LIGHT, STYLE, TRACE_COLOURS, VARIABLES
 from graphsynth.drawing.shapes import FIXED, Point, Shape, Text
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.drawing.svg import element, number, picture, words
-from graphsynth.mechanism.joints import Revolute
+from graphsynth.mechanism.joints import Prismatic, Revolute
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
@@ -139,14 +139,9 @@ def animation_html(
     )
     template = files("graphsynth.drawing").joinpath("player.html").read_text("utf-8")
     data = json.dumps(_data(stage, seconds, driver), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    parts = {
-        "POLICY": policy(re.findall("<script>(.*?)</script>", template, re.DOTALL)),
-        "STYLE": VARIABLES + STYLE,
-        "SVG": svg,
-        "NOTES": notes,
-        "DATA": data,
-        "TITLE": escape(name),
-    }
+    allowed = policy(re.findall("<script>(.*?)</script>", template, re.DOTALL))
+    parts = {"POLICY": allowed, "STYLE": VARIABLES + STYLE, "SVG": svg, "NOTES": notes, "DATA": data}
+    parts["TITLE"] = escape(name)
     pieces = re.split("@([A-Z]+)@", template)
     return "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
 
@@ -163,9 +158,10 @@ def _data(stage: _Stage, seconds: float, driver: int) -> dict[str, Any]:
         for link in range(mechanism.graph.links)
     ]
     drivers = []
-    for k in range(len(mechanism.drivers)):
-        name, angle, values = shown_coordinate(mechanism, k, frames.coordinates[:, k])
-        drivers.append({"name": name, "angle": angle, "values": values})
+    for driven, coordinates in zip(mechanism.drivers, frames.coordinates.T):  # in degrees or lengths, rounded
+        angle = not isinstance(mechanism.joint(*driven.pair), Prismatic)
+        values = [float(f"{math.degrees(v):.2f}" if angle else f"{v:.6g}") for v in coordinates]
+        drivers.append({"name": f"driver {driven.base}-{driven.link}", "angle": angle, "values": values})
     points = [
         {"name": name, "link": link, "colour": TRACE_COLOURS[k % len(TRACE_COLOURS)], "at": short(link, complex(*at))}
         for k, (name, (link, at)) in enumerate(mechanism.points.items())
@@ -254,26 +250,14 @@ def save_gif(
 def _pictures(stage: _Stage, title: str) -> list[Any]:
     """Draw every frame once."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.colors import to_rgb
     from PIL import Image
 
     poses = stage.frames.poses.tolist()
     figure, (canvas,) = figure_of([stage.sketch], poses[:1], above=title, below=stage.lines)
     agg = FigureCanvasAgg(figure)
     found: list[Any] = []
-    palette = _palette()
-    for pose in poses:
-        canvas.move(pose)
-        agg.draw()
-        image = Image.fromarray(np.asarray(agg.buffer_rgba())).convert("RGB")
-        found.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
-    return found
-
-
-def _palette() -> Any:
-    """Every ink in seven steps to the paper, and the ink of links in steps to the fill of plates."""
-    from matplotlib.colors import to_rgb
-    from PIL import Image
-
+    # every ink in seven steps to the paper, and the ink of links in steps to the fill of plates
     inks = dict.fromkeys(LIGHT[name] for name in ("link", "soft", "note", "a", "b", "c", "d"))
     pairs = [(ink, LIGHT["paper"]) for ink in inks] + [(LIGHT["link"], LIGHT["fill"])]
     colours = dict.fromkeys(
@@ -282,6 +266,11 @@ def _palette() -> Any:
         for k in range(7)
     )
     # Pillow looks colours up in boxes of eight: nothing may lie as close to the paper as the edge of a plate
-    image = Image.new("P", (1, 1))
-    image.putpalette([value for colour in colours for value in colour])
-    return image
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([value for colour in colours for value in colour])
+    for pose in poses:
+        canvas.move(pose)
+        agg.draw()
+        image = Image.fromarray(np.asarray(agg.buffer_rgba())).convert("RGB")
+        found.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
+    return found

@@ -156,11 +156,12 @@ def draw_mechanism(
     `what`, `pose`, `width`, `height`, `numbers`: as for :func:`mechanism_svg`. `ax`: axes of a new figure by default
     (``ax.figure.savefig(...)`` writes it). Raises `GeometryError`: there is no pose, or it is not assembled.
     """
-    from graphsynth.drawing.export import draw, figure_of
+    from graphsynth.drawing.export import Canvas, figure_of
 
     mechanism, poses, one = _pose_of(what, pose)
     sketch = mechanism_sketch(mechanism, poses, width=width, height=height, numbers=numbers)
     if ax is None:
         figure, _ = figure_of([sketch], [one.tolist()])
         return figure.axes[0]
-    return draw(sketch, ax, one.tolist())
+    Canvas(sketch, ax, one.tolist())
+    return ax

@@ -143,12 +143,6 @@ def _outline(path: Path) -> Any:
     return Outline(np.array(points), codes)
 
 
-def draw(sketch: Sketch, axes: Any, pose: Pose | None = None) -> Any:
-    """Draw a sketch on matplotlib axes; return the axes."""
-    Canvas(sketch, axes, pose)
-    return axes
-
-
 def figure_of(
     sketches: Sequence[Sketch],
     poses: Sequence[Pose | None],

@@ -106,14 +106,6 @@ def with_trace_points(motion: Motion, most: int = 1) -> Motion:
     return replace(motion, mechanism=replace(mechanism, points=points))
 
 
-def shown_coordinate(mechanism: Mechanism, k: int, values: Array) -> tuple[str, bool, list[float]]:
-    """Name of driver k, whether it is an angle, and its values for people: degrees or lengths, rounded."""
-    driver = mechanism.drivers[k]
-    angle = not isinstance(mechanism.joint(*driver.pair), Prismatic)
-    shown = [float(f"{math.degrees(v):.2f}" if angle else f"{v:.6g}") for v in values]
-    return f"driver {driver.base}-{driver.link}", angle, shown
-
-
 _STARTS = 24  # inputs tried where the first pose is not known
 
 

@@ -174,5 +174,7 @@ def levels_sketch(graph: MechanismGraph, width: float = 420.0, title: str = "") 
         for link in level:
             sketch.node(where[link], str(link), radius, filled=link == graph.frame)
     if graph.frame is not None:
-        sketch.hatch_over(where[graph.frame], radius)
+        middle = where[graph.frame] + 1j * sketch.pixel * (radius + 3)
+        half = radius * 1.3 * sketch.pixel
+        sketch.hatch(middle + half, middle - half, 1j * sketch.pixel * sketch.symbol)
     return sketch

@@ -119,23 +119,18 @@ def _driver_slides(motion: Motion) -> bool:
 def _over_input(
     motion: Motion, lines: list[Line], label: str, *, events: bool = True, levels: Sequence[Line] = ()
 ) -> Chart:
-    """Return curves over the input, its axis in quarters of a turn if it goes far."""
+    """Return curves over the input, in quarters of a turn if it goes far; events within it are upright lines."""
     sliding, reached = _driver_slides(motion), motion.inputs[motion.assembled]
     name = "driver displacement [length]" if sliding else "driver angle [rad]"
     wide = not sliding and reached.size > 0 and float(np.ptp(reached)) >= 0.75 * math.pi
-    return Chart(lines, name, label, marks=event_marks(motion) if events else (), levels=levels, in_pi=wide)
-
-
-def event_marks(motion: Motion) -> list[Mark]:
-    """Upright lines at the events within the inputs; those that end the motion stand out."""
     low, high = float(motion.inputs.min()), float(motion.inputs.max())
     marks = []
-    for event in motion.events:
+    for event in motion.events if events else ():
         colour, style = _ENDS if event.ends_motion else _PASSES
         if low <= event.input <= high:
-            label = f"{event.kind}: ends here" if event.ends_motion else event.kind
-            marks.append(Mark(event.input, label, colour, style))
-    return marks
+            told = f"{event.kind}: ends here" if event.ends_motion else event.kind
+            marks.append(Mark(event.input, told, colour, style))
+    return Chart(lines, name, label, marks=marks, levels=levels, in_pi=wide)
 
 
 def transmission_chart(motion: Motion, least: float | None = None) -> Chart:

@@ -97,7 +97,41 @@ class Chart:
             label = None if mark.label in seen else mark.label or None
             seen.add(mark.label)
             axes.axvline(mark.x, ls=mark.style, lw=1.4, color=LIGHT[mark.colour], label=label)
-        _dress(axes, self)
+        # labels of the axes, a light grid behind, a legend above the curves
+        ink, soft = LIGHT["ink"], LIGHT["soft"]
+        axes.set_xlabel(self.xlabel, color=ink, parse_math=False)  # names may hold any letters
+        axes.set_ylabel(self.ylabel, color=ink, parse_math=False)
+        axes.tick_params(colors=ink, which="both")
+        for side, spine in axes.spines.items():
+            spine.set_color(soft)
+            spine.set_visible(side in ("left", "bottom"))
+        axes.grid(True, color=soft, alpha=0.3, lw=0.6)
+        if self.equal:
+            axes.set_aspect("equal", adjustable="datalim")
+        else:
+            axes.margins(x=0)
+        if self.in_pi:
+            low, high = axes.get_xlim()
+            quarter = math.pi / 2 * max(1, math.ceil((high - low) / (4.5 * math.pi)))
+            steps = range(math.ceil(low / quarter - 1e-9), math.floor(high / quarter + 1e-9) + 1)
+            axes.set_xticks([k * quarter for k in steps], [_in_pi(round(k * quarter / (math.pi / 2))) for k in steps])
+        elif self.xticks is not None:
+            axes.set_xticks(list(self.xticks))
+        handles, labels = axes.get_legend_handles_labels()
+        if labels:
+            legend = axes.legend(
+                handles,
+                labels,
+                loc="lower left",
+                bbox_to_anchor=(0, 1.0),
+                ncols=min(len(labels), 4),
+                frameon=False,
+                borderaxespad=0.2,
+                columnspacing=1.2,
+                handlelength=1.6,
+            )
+            for text in legend.get_texts():
+                text.set(color=ink, parse_math=False)
         return axes
 
     def svg(self) -> str:
@@ -136,44 +170,6 @@ def line_plot(
 ) -> str:
     """Draw curves over one axis as SVG; see :class:`Chart`."""
     return Chart(lines, xlabel, ylabel, bands, (), levels, xticks, equal, size=size).svg()
-
-
-def _dress(axes: Any, chart: Chart) -> None:
-    """Label the axes, put a light grid behind and a legend above the curves."""
-    ink, soft = LIGHT["ink"], LIGHT["soft"]
-    axes.set_xlabel(chart.xlabel, color=ink, parse_math=False)  # names may hold any letters
-    axes.set_ylabel(chart.ylabel, color=ink, parse_math=False)
-    axes.tick_params(colors=ink, which="both")
-    for side, spine in axes.spines.items():
-        spine.set_color(soft)
-        spine.set_visible(side in ("left", "bottom"))
-    axes.grid(True, color=soft, alpha=0.3, lw=0.6)
-    if chart.equal:
-        axes.set_aspect("equal", adjustable="datalim")
-    else:
-        axes.margins(x=0)
-    if chart.in_pi:
-        low, high = axes.get_xlim()
-        quarter = math.pi / 2 * max(1, math.ceil((high - low) / (4.5 * math.pi)))
-        steps = range(math.ceil(low / quarter - 1e-9), math.floor(high / quarter + 1e-9) + 1)
-        axes.set_xticks([k * quarter for k in steps], [_in_pi(round(k * quarter / (math.pi / 2))) for k in steps])
-    elif chart.xticks is not None:
-        axes.set_xticks(list(chart.xticks))
-    handles, labels = axes.get_legend_handles_labels()
-    if labels:
-        legend = axes.legend(
-            handles,
-            labels,
-            loc="lower left",
-            bbox_to_anchor=(0, 1.0),
-            ncols=min(len(labels), 4),
-            frameon=False,
-            borderaxespad=0.2,
-            columnspacing=1.2,
-            handlelength=1.6,
-        )
-        for text in legend.get_texts():
-            text.set(color=ink, parse_math=False)
 
 
 def _in_pi(halves: int) -> str:

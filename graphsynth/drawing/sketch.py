@@ -119,13 +119,6 @@ class Sketch:
         feet = [start + across * ((i + 0.9) / strokes) for i in range(strokes)]
         self._path([(start, end), *((foot, foot + slant) for foot in feet)], Style("link", 1.6, round_ends=True))
 
-    def hatch_over(self, point: Point, radius: float) -> None:
-        """Draw ground above a vertex of radius `radius` pixels: the sign of the frame in a graph."""
-        up = 1j * self.pixel * self.symbol
-        middle = point + 1j * self.pixel * (radius + 3)
-        half = radius * 1.3 * self.pixel
-        self.hatch(middle + half, middle - half, up)
-
     def circle(
         self,
         centre: Point,

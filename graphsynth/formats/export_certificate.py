@@ -209,16 +209,8 @@ def certify_export(
         measured = [_nothing(s, "not run", "the engine is not installed", math.nan) for s in trials]
         statement = f"{names['engine']} is not installed, so nothing was measured."
         verdict, limit = "not run", math.nan
-    return ExportCertificate(
-        **common,
-        length=length,
-        reference=method,
-        reference_error=estimate,
-        trials=tuple(measured),
-        verdict=verdict,
-        limit=limit,
-        statement=statement,
-    )
+    common |= {"length": length, "reference": method, "reference_error": estimate, "trials": tuple(measured)}
+    return ExportCertificate(**common, verdict=verdict, limit=limit, statement=statement)
 
 
 def _nothing(settings: Settings, status: str, message: str, seconds: float) -> Trial:

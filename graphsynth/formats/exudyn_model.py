@@ -232,13 +232,9 @@ def _add_joint(work: _Work, joint: Any) -> None:
 
 def _add_element(work: _Work, element: Element) -> None:
     if isinstance(element, Spring):
-        work.add(
-            "ObjectConnectorSpringDamper",
-            markerNumbers=[work.spot(element.a, element.at_a), work.spot(element.b, element.at_b)],
-            referenceLength=element.free_length,
-            stiffness=element.stiffness,
-            damping=element.damping,
-        )
+        markers = [work.spot(element.a, element.at_a), work.spot(element.b, element.at_b)]
+        own = {"stiffness": element.stiffness, "damping": element.damping, "referenceLength": element.free_length}
+        work.add("ObjectConnectorSpringDamper", markerNumbers=markers, **own)
     elif isinstance(element, TorsionSpring):
         rest = element.free_angle - (work.angle(element.b) - work.angle(element.a))
         _torsion(work, element, element.stiffness, element.damping, rest)

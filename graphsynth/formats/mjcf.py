@@ -91,14 +91,8 @@ def fixed(work: Work, tendon: ET.Element, name: str, combined: dict[int, float],
 def write_load(work: Work, element: Element, name: str, tendon: ET.Element, actuator: ET.Element) -> None:
     """Write one spring, damper, torque or force."""
     if isinstance(element, Spring):
-        spatial = add(
-            tendon,
-            "spatial",
-            name=name,
-            stiffness=element.stiffness,
-            damping=element.damping,
-            springlength=element.free_length,
-        )
+        own = {"stiffness": element.stiffness, "damping": element.damping, "springlength": element.free_length}
+        spatial = add(tendon, "spatial", name=name, **own)
         for link, at in ((element.a, element.at_a), (element.b, element.at_b)):
             add(spatial, "site", site=site(work, link, at))
     elif isinstance(element, TorsionSpring):
@@ -307,16 +301,9 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
     for link, signs in work.chain.items():
         for k, sign in signs.items():
             angles[link, k] = sign
-    return MjcfModel(
-        ET.tostring(root, encoding="unicode") + "\n",
-        work.tree,
-        tuple(work.names),
-        np.array(work.qpos),
-        np.array(work.qvel),
-        angles,
-        start,
-        settings,
-    )
+    xml = ET.tostring(root, encoding="unicode") + "\n"
+    qpos, qvel = np.array(work.qpos), np.array(work.qvel)
+    return MjcfModel(xml, work.tree, tuple(work.names), qpos, qvel, angles, start, settings)
 
 
 def _check(model: DynamicModel, start: StartReport) -> None:
@@ -333,17 +320,9 @@ def _check(model: DynamicModel, start: StartReport) -> None:
 
 
 def _options(root: ET.Element, model: DynamicModel, settings: MujocoSettings) -> None:
-    option = add(
-        root,
-        "option",
-        timestep=settings.step,
-        integrator=settings.integrator,
-        solver="Newton",
-        jacobian="dense",
-        tolerance="1e-14",
-        iterations="100",
-        gravity=(*model.gravity, 0.0),
-    )
+    solver = {"solver": "Newton", "jacobian": "dense", "tolerance": "1e-14", "iterations": "100"}
+    option = add(root, "option", timestep=settings.step, integrator=settings.integrator, **solver)
+    option.set("gravity", text(*model.gravity, 0.0))
     add(option, "flag", contact="disable", refsafe="disable")
 
 
@@ -354,13 +333,8 @@ def _hang(work: Work, link: int) -> None:
         x, y, theta = (float(v) for v in work.start.poses[child])
         px, py, parent = (float(v) for v in work.start.poses[link])
         place, half = turn(-parent, (x - px, y - py)), 0.5 * (theta - parent)
-        element = add(
-            work.bodies[link],
-            "body",
-            name=f"link{child}",
-            pos=(*place, 0.0),
-            quat=(math.cos(half), 0.0, 0.0, math.sin(half)),
-        )
+        turned = (math.cos(half), 0.0, 0.0, math.sin(half))
+        element = add(work.bodies[link], "body", name=f"link{child}", pos=(*place, 0.0), quat=turned)
         add(element, "inertial", pos=(*body.centre, 0.0), mass=body.mass, diaginertia=(body.inertia,) * 3)
         work.bodies[child], work.chain[child] = element, dict(work.chain[link])
         _joint(work, element, work.model.mechanism.joints[index], child)

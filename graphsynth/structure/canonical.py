@@ -10,13 +10,13 @@ from __future__ import annotations
 from base64 import urlsafe_b64decode, urlsafe_b64encode
 from binascii import Error as Base64Error
 from dataclasses import dataclass
-from math import isqrt, prod
+from math import prod
 from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import FormatError
 from graphsynth.structure.connectivity import bits, breadth_first
 from graphsynth.structure.search import CanonicalSearch, find_root, join_images
-from graphsynth.structure.text import LINKS_MAX
+from graphsynth.structure.text import LINKS_MAX, pairs_of
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import Joint, MechanismGraph
@@ -171,13 +171,7 @@ def decode_key(text: object) -> tuple[int, list[tuple[int, int, int]], int | Non
     size = links * (links - 1) // 2
     # One leading 1 keeps the zeros in front.
     stream = bin(int.from_bytes(b"\x01" + data[2:], "big"))[3:]
-    pairs = []
-    bit = stream.find("1", 0, size)
-    while bit >= 0:
-        b = (1 + isqrt(1 + 8 * bit)) // 2
-        pairs.append((bit - b * (b - 1) // 2, b))
-        bit = stream.find("1", bit + 1, size)
-    pairs.sort()
+    pairs = pairs_of(stream[:size])
     total = size + (3 * len(pairs) if coloured else 0)
     if len(stream) != -(-total // 8) * 8 or "1" in stream[total:]:
         raise FormatError(f"{len(data) - 2} bytes of joints, not {-(-total // 8)}, or bits after the end", "key")

@@ -151,8 +151,6 @@ class MechanismGraph:
             value = cache[name] = compute(self)
         return value
 
-    # --- data and counts
-
     @property
     def joints(self) -> tuple[Joint, ...]:
         """The joints, sorted by ``(a, b)`` with ``a < b``."""
@@ -208,14 +206,9 @@ class MechanismGraph:
     def levels(self) -> tuple[tuple[int, ...], ...]:
         """Adjacency levels: the frame, the links jointed to it, the links jointed to those, and so on.
 
-        Raises
-        ------
-        GraphError
-            If no frame is chosen, or some link cannot be reached from it.
+        `GraphError` if no frame is chosen, or some link cannot be reached from it.
         """
         return self._lazy("levels", _levels)
-
-    # --- symmetry
 
     @property
     def labelling(self) -> Labelling:
@@ -271,13 +264,7 @@ class MechanismGraph:
         return self._lazy("canonical", lambda g: g.relabelled(g.labelling.permutation))
 
     def relabelled(self, permutation: Sequence[int]) -> MechanismGraph:
-        """Return the graph in which link ``i`` is called ``permutation[i]``.
-
-        Raises
-        ------
-        GraphError
-            If the argument is not a permutation of ``0..links-1``.
-        """
+        """Return the graph in which link ``i`` is called ``permutation[i]``; `GraphError` if it is no permutation."""
         try:
             permutation = list(map(index, permutation))
         except Exception:  # no sequence, no integers
@@ -317,8 +304,6 @@ class MechanismGraph:
         position = chain.labelling.permutation
         frames = sorted((min(orbit, key=position.__getitem__) for orbit in chain.orbits), key=position.__getitem__)
         return [chain.with_frame(link) for link in frames]
-
-    # --- connectivity and rigidity
 
     @property
     def cut_links(self) -> tuple[int, ...]:
@@ -370,15 +355,10 @@ class MechanismGraph:
 
         return generic_mobility(self, seed)
 
-    # --- exchange
-
     def graph6(self) -> str:
         """Return the graph6 text of an uncoloured chain.
 
-        Raises
-        ------
-        GraphError
-            If a frame is chosen or a joint has a mobility other than 1: graph6 cannot say so; use :meth:`to_text`.
+        `GraphError` if a frame is chosen or a joint has a mobility other than 1: use :meth:`to_text`.
         """
         if self.frame is not None or any(m != 1 for m in self.packed[2::3]) or self.space != 3:
             raise GraphError("graph6 has no place for a frame, joint mobilities or a space; use to_text()")
@@ -436,12 +416,8 @@ class MechanismGraph:
         """Read a ``networkx.Graph`` made by :meth:`to_networkx` or by hand.
 
         Nodes that are the integers 0..N-1 keep their number; others are numbered in their order.  Edge attribute
-        ``mobility`` (default 1), graph attributes ``frame`` (a node) and ``space`` (default 3) are read.
-
-        Raises
-        ------
-        FormatError
-            For anything else, with the node or edge.
+        ``mobility`` (default 1), graph attributes ``frame`` (a node) and ``space`` (default 3) are read; anything else
+        is a :class:`FormatError`, with the node or edge.
         """
         links, joints, frame, space = from_networkx(graph)
         return cls(links, joints, frame=frame, space=space)

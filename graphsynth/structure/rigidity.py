@@ -261,14 +261,8 @@ def generic_mobility(graph: MechanismGraph, seed: int = 0) -> GenericMobility:
     matrix = _loop_matrix(graph, whole(seed, "seed", 0, 10**100))
     rank = _rank(matrix)
     parts = len(graph.components)
-    return GenericMobility(
-        mobility=graph.sub_edges - rank + graph.space * (parts - 1),
-        structural=graph.mobility,
-        sub_edges=graph.sub_edges,
-        rank=rank,
-        loops=graph.loops,
-        failure_bound=rank / _PRIME,
-    )
+    mobility = graph.sub_edges - rank + graph.space * (parts - 1)
+    return GenericMobility(mobility, graph.mobility, graph.sub_edges, rank, graph.loops, rank / _PRIME)
 
 
 def _loop_matrix(graph: MechanismGraph, seed: int) -> Any:

@@ -102,17 +102,9 @@ class CanonicalSearch:
         self.trace = [0] * (n + 1)
         self.like_first = [True] * (n + 1)
         self.versus_best = [0] * (n + 1)
-        # The first and the best leaf.
+        # The first leaf sets what is known of the first and of the best one.
         self.have_leaf = False
         self.on_first = -1
-        self.first_trace: list[int] = []
-        self.first_path: list[int] = []
-        self.first_form: list[list[int]] = []
-        self.first_order: list[int] = []
-        self.best_trace: list[int] = []
-        self.best_path: list[int] = []
-        self.form: list[list[int]] = []
-        self.order_of_vertices: list[int] = []
 
     def run(self) -> CanonicalSearch:
         """Search the whole tree and return self.

@@ -72,8 +72,43 @@ def decode_graph6(text: str | bytes) -> tuple[int, bytes]:
             raise FormatError(
                 f"byte value {value + 63} is not graph6, whose bytes are 63 to 126", f"byte {start + index}"
             )
-    links, used = _read_size(values, start)
-    return links, _read_joints(links, values[used:], start + used)
+    if not values:
+        raise FormatError("empty text; graph6 starts with the number of links", f"byte {start}")
+    links, used = values[0], 1
+    if links == 63:
+        used = 8 if values[1:2] == [63] else 4
+        digits = values[used // 4 : used]
+        if len(digits) < (6 if used == 8 else 3):
+            raise FormatError("the number of links is cut short", f"byte {start + len(values)}")
+        links = 0
+        for digit in digits:
+            links = links << 6 | digit
+    if not 1 <= links <= LINKS_MAX:
+        raise FormatError(f"{links} links; a mechanism graph has 1 to {LINKS_MAX}", f"byte {start}")
+    values, start = values[used:], start + used
+    size = links * (links - 1) // 2
+    expected = -(-size // 6)
+    if len(values) != expected:
+        what = "is cut short" if len(values) < expected else "goes on after its end"
+        raise FormatError(
+            f"the text {what}: {links} links need {expected} bytes of joints, not {len(values)}",
+            f"byte {start + min(len(values), expected)}",
+        )
+    bits = "".join(f"{value:06b}" for value in values)
+    if "1" in bits[size:]:
+        raise FormatError("the last byte has bits after the last pair of links", f"byte {start + len(values) - 1}")
+    return links, b"".join(bytes((a, b, 1)) for a, b in pairs_of(bits))
+
+
+def pairs_of(bits: str) -> list[tuple[int, int]]:
+    """Return the sorted pairs a < b with digit 1 in the upper triangle of an adjacency matrix, column by column."""
+    pairs = []
+    bit = bits.find("1")
+    while bit >= 0:
+        b = (1 + isqrt(1 + 8 * bit)) // 2
+        pairs.append((bit - b * (b - 1) // 2, b))
+        bit = bits.find("1", bit + 1)
+    return sorted(pairs)
 
 
 def _ascii(text: object) -> str:
@@ -89,48 +124,6 @@ def _ascii(text: object) -> str:
         index = next(i for i, letter in enumerate(line) if ord(letter) > 127)
         raise FormatError(f"character {line[index]!r} is not ASCII", f"byte {index}")
     return line
-
-
-def _read_size(values: list[int], start: int) -> tuple[int, int]:
-    """Return the number of links and how many bytes say so."""
-    if not values:
-        raise FormatError("empty text; graph6 starts with the number of links", f"byte {start}")
-    links, used = values[0], 1
-    if links == 63:
-        used = 8 if values[1:2] == [63] else 4
-        digits = values[used // 4 : used]
-        if len(digits) < (6 if used == 8 else 3):
-            raise FormatError("the number of links is cut short", f"byte {start + len(values)}")
-        links = 0
-        for digit in digits:
-            links = links << 6 | digit
-    if not 1 <= links <= LINKS_MAX:
-        raise FormatError(f"{links} links; a mechanism graph has 1 to {LINKS_MAX}", f"byte {start}")
-    return links, used
-
-
-def _read_joints(links: int, values: list[int], start: int) -> bytes:
-    """Return the packed joints of the adjacency bits, or say which byte is missing or superfluous."""
-    size = links * (links - 1) // 2
-    expected = -(-size // 6)
-    if len(values) != expected:
-        what = "is cut short" if len(values) < expected else "goes on after its end"
-        raise FormatError(
-            f"the text {what}: {links} links need {expected} bytes of joints, not {len(values)}",
-            f"byte {start + min(len(values), expected)}",
-        )
-    pairs: list[tuple[int, int]] = []
-    for index, value in enumerate(values):
-        if not value:
-            continue
-        for offset in range(6):
-            if value & 32 >> offset:
-                bit = 6 * index + offset
-                if bit >= size:
-                    raise FormatError("the last byte has bits after the last pair of links", f"byte {start + index}")
-                b = (1 + isqrt(1 + 8 * bit)) // 2
-                pairs.append((bit - b * (b - 1) // 2, b))
-    return b"".join(bytes((a, b, 1)) for a, b in sorted(pairs))
 
 
 def encode_text(links: int, packed: bytes, frame: int | None, space: int) -> str:

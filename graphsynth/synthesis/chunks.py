@@ -172,8 +172,8 @@ def count_each(family: Family, start: int, stop: int) -> NDArray[np.int64]:
     while True:
         work = workspace(edge_labels, key_words)
         block = family.vertices, family.graphs, start, stop, family.frames, family.frame_degree
-        outcome = count_block(*block, edge_labels.tables, work, out)
-        if outcome == 0:
+        outcome = count_block(*block, edge_labels.tables, work, out, np.zeros((0, 5), np.int64))
+        if outcome >= 0:
             return out
         key_words *= 4
         if outcome != NO_ROOM or key_words > _MOST_STATES:

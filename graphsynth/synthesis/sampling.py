@@ -19,7 +19,7 @@ from graphsynth.core.wording import whole
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis.chunks import count_each, expansion_of, workspace
 from graphsynth.synthesis.families import Family
-from graphsynth.synthesis.kernels.counting import decode_fixed, fixed_table, open_fixed
+from graphsynth.synthesis.kernels.counting import count_block, decode_fixed, open_fixed
 from graphsynth.synthesis.kernels.expanding import expand_packed
 from graphsynth.synthesis.kernels.layout import HEADER
 from graphsynth.synthesis.problem import Problem
@@ -61,7 +61,8 @@ def _draw(family: Family, h: int, random: Random) -> MechanismGraph:
     work = workspace(family.edge_labels, 1 << 20)
     mult = family.graphs[h]
     table = np.empty((_PAIRS, 5), np.int64)
-    count = fixed_table(family.vertices, mult, family.frames, family.frame_degree, tables, work, table)
+    block = family.vertices, family.graphs, h, h + 1, family.frames, family.frame_degree
+    count = count_block(*block, tables, work, np.empty(1, np.int64), table)
     if count < 0:
         raise TooLargeError("a contracted graph has too many symmetries to draw from: fix more of the question")
     rows = table[:count].tolist()

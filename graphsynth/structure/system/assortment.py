@@ -111,10 +111,7 @@ class LinkAssortment:
     def check(self) -> None:
         """Verify all eight equations and the natural bounds again.
 
-        Raises
-        ------
-        SpecError
-            Naming the first equation that does not hold, or the value that is no whole number.
+        `SpecError` names the first equation that does not hold, or the value that is no whole number.
         """
         self._check_types()
         freedoms = [(mobility, number) for mobility, number in enumerate(self.p_i, start=1)]

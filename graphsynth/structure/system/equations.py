@@ -206,13 +206,9 @@ def _tighten(row: Row, domains: Domains) -> bool:
             floor = row.lowest - (most - (high or 0))
         if coefficient < 0:
             floor, ceiling = ceiling, floor
-        new = _meet(
-            domains[name],
-            (
-                None if floor is None else -(-floor // coefficient),
-                None if ceiling is None else ceiling // coefficient,
-            ),
-        )
+        lower = None if floor is None else -(-floor // coefficient)
+        upper = None if ceiling is None else ceiling // coefficient
+        new = _meet(domains[name], (lower, upper))
         if new[0] is not None and new[1] is not None and new[0] > new[1]:
             return False
         domains[name] = new
@@ -231,7 +227,7 @@ class _Item:
     default: bool = False
 
 
-def explain(problem: Problem, *, default_space: bool, default_mobilities: bool) -> InfeasibleSpecError:
+def explain(problem: Problem, default_space: bool, default_mobilities: bool) -> InfeasibleSpecError:
     """Name a smallest set of equations, and in it a minimal set of values, that contradict each other.
 
     The subsets of the equations are tried by increasing size; then every value that is not needed is dropped (a
@@ -257,7 +253,15 @@ def explain(problem: Problem, *, default_space: bool, default_mobilities: bool) 
     rules = [rule for rule in NATURAL if _possible(_only(problem, needed), equations, set(NATURAL) - {rule})]
     if not equations and not rules:  # only a joint mobility that the space does not have leaves this trace
         rules = ["i <= Pi - 1"]
-    return _sentence(needed, [*equations, *rules], default_mobilities)
+    broken = (*equations, *rules)
+    said = [item.text + (" (default)" if item.default and item.symbol == "Pi" else "") for item in needed]
+    verb = "clashes with" if len(said) == 1 else "clash in"
+    remedy = "free or change one of these values"
+    if any(item.symbol == "mobilities" for item in needed) and default_mobilities:
+        remedy += ", or allow higher pairs with max_joint_mobility"
+    values = _listed(said, "and") if said else "the natural bounds"
+    message = f"no integer solution: {values} {verb} {_listed(broken, 'and')}; {remedy}"
+    return InfeasibleSpecError(message, (*said, *broken))
 
 
 def _only(problem: Problem, items: Iterable[_Item]) -> Problem:
@@ -313,14 +317,3 @@ def _text(symbol: str, own: Range) -> str:
 def _listed(words: Iterable[str], last: str) -> str:
     listed = list(words)
     return listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])} {last} {listed[-1]}"
-
-
-def _sentence(needed: Sequence[_Item], equations: Sequence[str], default_mobilities: bool) -> InfeasibleSpecError:
-    said = [item.text + (" (default)" if item.default and item.symbol == "Pi" else "") for item in needed]
-    verb = "clashes with" if len(said) == 1 else "clash in"
-    remedy = "free or change one of these values"
-    if any(item.symbol == "mobilities" for item in needed) and default_mobilities:
-        remedy += ", or allow higher pairs with max_joint_mobility"
-    values = _listed(said, "and") if said else "the natural bounds"
-    message = f"no integer solution: {values} {verb} {_listed(equations, 'and')}; {remedy}"
-    return InfeasibleSpecError(message, (*said, *equations))

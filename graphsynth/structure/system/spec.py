@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from os import PathLike
 from pathlib import Path
@@ -21,6 +22,7 @@ from graphsynth.structure.system.variables import ALIASES, FAMILIES, SPACES, Ran
 SOURCE_LINK_JOINTS = 4
 
 
+@dataclass(init=False, repr=False, slots=True, unsafe_hash=True)
 class StructuralSpec:
     """A structural question: any of the variables fixed, bounded or free.
 
@@ -89,7 +91,6 @@ class StructuralSpec:
     (1, 28)
     """
 
-    __slots__ = ("_levels", "_options", "_ranges")
     _ranges: tuple[tuple[str, Range], ...]
     _options: tuple[tuple[str, Any], ...]
     _levels: tuple[tuple[int, Range], ...]
@@ -102,18 +103,12 @@ class StructuralSpec:
         object.__setattr__(self, "_options", tuple(sorted(options.items())))
         object.__setattr__(self, "_levels", tuple(sorted(levels.items())))
 
-    # ---- making one ------------------------------------------------------------------------------------------
-
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any], place: str = "") -> StructuralSpec:
         """Read plain data, as a TOML or JSON reader gives it.
 
-        Ranges are written ``[0, 2]`` or ``"0..2"``, with an open side ``"2.."``.
-
-        Raises
-        ------
-        FormatError
-            For anything wrong, with ``place`` and the key.
+        Ranges are written ``[0, 2]`` or ``"0..2"``, with an open side ``"2.."``; anything wrong is a `FormatError` with
+        ``place`` and the key.
         """
         return cls(**variables.plain_question(mapping, place, cls))
 
@@ -121,10 +116,7 @@ class StructuralSpec:
     def from_toml(cls, path: str | Path) -> StructuralSpec:
         """Read a TOML file; see docs/reference/structural-spec.md.
 
-        Raises
-        ------
-        FormatError
-            If the file cannot be read, is not TOML, or has an unknown key or a bad value.
+        `FormatError` if the file cannot be read, is not TOML, or has an unknown key or a bad value.
         """
         if not isinstance(path, str | PathLike):
             raise FormatError(f"{shown(path)} is not the path of a file", "path")
@@ -136,10 +128,7 @@ class StructuralSpec:
     def from_assignments(cls, assignments: Iterable[str]) -> StructuralSpec:
         """Read ``["W=1", "n4=0..2", "fractionated=true", "levels.-1=3"]``, the form of the command line.
 
-        Raises
-        ------
-        SpecError
-            For an assignment that is not ``name=value``, and whatever the constructor refuses.
+        `SpecError` for an assignment that is not ``name=value``, and whatever the constructor refuses.
         """
         return cls(**variables.assigned_question(assignments))
 
@@ -154,8 +143,6 @@ class StructuralSpec:
             else:
                 kept.pop("n" if symbol == "N" else symbol, None)
         return StructuralSpec(**{**kept, **changes})
-
-    # ---- reading it ------------------------------------------------------------------------------------------
 
     def bounds(self, name: str) -> Range:
         """Return (lowest, highest) of a variable as the question states it, None where it says nothing.
@@ -209,8 +196,6 @@ class StructuralSpec:
         frame = any(self.fixed(symbol) is not None for symbol in ("t0", "v_ct"))
         return size >= 2 and higher and frame
 
-    # ---- solving it ------------------------------------------------------------------------------------------
-
     def solve(self, *, limit: int = 1_000_000) -> list[LinkAssortment]:
         """Return all integer solutions (exact), lexicographically by (W, Pi, n, p, p_1.., t0, v_ct, n_2, n_3, ...).
 
@@ -244,20 +229,11 @@ class StructuralSpec:
         return list(self.iter_solutions())
 
     def iter_solutions(self) -> Iterator[LinkAssortment]:
-        """Yield the solutions of :meth:`solve` one by one, without storing them.
-
-        Raises
-        ------
-        InfeasibleSpecError
-            If there is none; the message names what clashes.
-        """
+        """Yield the solutions of :meth:`solve` one by one; `InfeasibleSpecError` if there is none."""
         reading_of, first = self._first()
         if reading_of is None or first is None:
-            raise explain(
-                self._readings(widest=True)[0],
-                default_space="Pi" not in self.ranges,
-                default_mobilities=self.max_joint_mobility is None,
-            )
+            default_space, default_mobilities = "Pi" not in self.ranges, self.max_joint_mobility is None
+            raise explain(self._readings(widest=True)[0], default_space, default_mobilities)
         return solutions(reading_of)
 
     def reading(self) -> Problem:
@@ -302,8 +278,6 @@ class StructuralSpec:
         loops = v if v is not None else (p or 0) - (n or 0)
         widest = max(2, loops + max(1, mobility or 1))  # a bound on v + W, two of n, p, v being fixed
         return [*range(max([SOURCE_LINK_JOINTS, *mentioned]), widest + 1), None]
-
-    # ---- showing it ------------------------------------------------------------------------------------------
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data by symbol: integers, pairs, options; ``StructuralSpec(**spec.as_dict()) == spec``."""
@@ -357,15 +331,6 @@ class StructuralSpec:
             raise AttributeError(f"'StructuralSpec' object has no attribute {name!r}")
         own = self.bounds(name)
         return None if own == (None, None) else _plain(own)
-
-    def _state(self) -> tuple[object, ...]:
-        return self._ranges, self._options, self._levels
-
-    def __eq__(self, other: object) -> bool:
-        return self._state() == other._state() if isinstance(other, StructuralSpec) else NotImplemented
-
-    def __hash__(self) -> int:
-        return hash(self._state())
 
     def __reduce__(self) -> tuple[Any, tuple[()]]:
         return partial(StructuralSpec, **self.as_dict()), ()

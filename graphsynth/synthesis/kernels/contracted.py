@@ -136,15 +136,6 @@ def automorphisms(k, mult, perms):
 
 
 @inner
-def popcount(x):
-    """Count the set bits of a non-negative 64-bit integer."""
-    x = x - ((x >> 1) & 0x5555555555555555)
-    x = (x & 0x3333333333333333) + ((x >> 2) & 0x3333333333333333)
-    x = (x + (x >> 4)) & 0x0F0F0F0F0F0F0F0F
-    return ((x * 0x0101010101010101) >> 56) & 0xFF
-
-
-@inner
 def critical_sets(k, m, classes, space, subsets, sets):
     """Find the vertex sets whose sparsity condition is neither automatic nor implied by a smaller set.
 

@@ -21,7 +21,6 @@ from graphsynth.synthesis.kernels.variables import (
     lay_lanes,
     load_graph,
     plain_entries,
-    start_needs,
     unconstrained_ways,
 )
 
@@ -183,12 +182,15 @@ def degree_of(k, mult, v):
 
 
 @kernel
-def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, out):
+def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, out, pairs):
     """Count the orbits of labellings of the contracted graphs ``mults[start:stop]``; one number each in ``out``.
 
     ``frame_modes`` is a sum of FRAME_NONE, FRAME_VERTEX, FRAME_PATH; ``frame_degree`` restricts FRAME_VERTEX to
-    vertices of that degree (0: any).  Returns 0, TOO_LARGE (a count passes 2**62, or a group is too large), or NO_ROOM.
+    vertices of that degree (0: any).  ``pairs``, unless it is empty, takes a row (mode, frame, automorphism,
+    automorphisms that keep the frame, labellings fixed) for each pair of frame and automorphism.  Returns the number of
+    these rows, TOO_LARGE (a count passes 2**62, or a group is too large), or NO_ROOM.
     """
+    rows = np.int64(0)
     for h in range(start, stop):
         mult = mults[h]
         order = automorphisms(k, mult, work.perms)
@@ -204,11 +206,12 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
                 if mode == FRAME_VERTEX and frame_degree and degree_of(k, mult, frame) != frame_degree:
                     continue
                 kept = frame_stabiliser(order, mode, frame, work)
-                if kept == 0:
+                if kept == 0:  # the first of its orbit stands for this frame
                     continue
                 if mode == FRAME_PATH:
                     work.classes[lay.KIND, frame] += 1
                 fixed = np.int64(0)
+                # Burnside: the mean number of labellings fixed
                 for i in range(kept):
                     n = fixed_by(work.members[i], m, sets, tables, work)
                     if n < 0:
@@ -216,13 +219,22 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
                     if fixed > (np.int64(1) << 62) - n:
                         return TOO_LARGE
                     fixed += n
+                    if pairs.shape[0]:  # wanted for drawing
+                        if rows == pairs.shape[0]:
+                            return TOO_LARGE
+                        pairs[rows, 0] = mode
+                        pairs[rows, 1] = frame
+                        pairs[rows, 2] = work.members[i]
+                        pairs[rows, 3] = kept
+                        pairs[rows, 4] = n
+                        rows += 1
                 if mode == FRAME_PATH:
                     work.classes[lay.KIND, frame] -= 1
                 if total > (np.int64(1) << 62) - fixed // kept:
                     return TOO_LARGE
                 total += fixed // kept
         out[h - start] = total
-    return 0
+    return rows
 
 
 @inner
@@ -315,44 +327,6 @@ def weigh_block(k, mults, chosen, purpose, tables, work, out):
 
 
 @kernel
-def fixed_table(k, mult, frame_modes, frame_degree, tables, work, out):
-    """Write a row (mode, frame, automorphism, automorphisms that keep the frame, labellings fixed) for each pair.
-
-    Returns the number of rows, or a negative outcome as ``count_block``.
-    """
-    order = automorphisms(k, mult, work.perms)
-    m, sets = load_graph(k, mult, tables, work)
-    if order < 0 or sets < 0:
-        return TOO_LARGE
-    n = 0
-    for mode in (FRAME_NONE, FRAME_VERTEX, FRAME_PATH):
-        if not frame_modes & mode:
-            continue
-        frames = 1 if mode == FRAME_NONE else (k if mode == FRAME_VERTEX else m)
-        for frame in range(frames):
-            if mode == FRAME_VERTEX and frame_degree and degree_of(k, mult, frame) != frame_degree:
-                continue
-            kept = frame_stabiliser(order, mode, frame, work)
-            if mode == FRAME_PATH:
-                work.classes[lay.KIND, frame] += 1
-            for i in range(kept):
-                if n == out.shape[0]:
-                    return TOO_LARGE
-                fixed = fixed_by(work.members[i], m, sets, tables, work)
-                if fixed < 0:
-                    return fixed
-                out[n, 0] = mode
-                out[n, 1] = frame
-                out[n, 2] = work.members[i]
-                out[n, 3] = kept
-                out[n, 4] = fixed
-                n += 1
-            if mode == FRAME_PATH:
-                work.classes[lay.KIND, frame] -= 1
-    return n
-
-
-@kernel
 def open_fixed(k, mult, mode, frame, member, tables, work):
     """Lay out the labellings fixed by one automorphism; return (variables, classes, sets, ways without sparsity)."""
     automorphisms(k, mult, work.perms)
@@ -387,7 +361,8 @@ def _nth_label(j, g, rank, tables, work):
 @kernel
 def decode_fixed(count, m, sets, number, tables, work, row):
     """Write labelling ``number`` of those laid out by ``open_fixed``; return whether it is admissible."""
-    start_needs(sets, work)
+    for s in range(sets):
+        work.sets[lay.LEFT, s] = work.sets[lay.NEED, s]
     index = np.int64(tables.target)
     chosen = np.empty(count, np.int64)
     for j in range(count):

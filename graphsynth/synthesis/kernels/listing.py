@@ -54,20 +54,6 @@ def _has_order(perm, k, p):
 
 
 @inner
-def _is_fixed(perm, m, tables, work):
-    """Tell whether the labelling of the current leaf is fixed by a vertex permutation."""
-    for e in range(m):
-        a = perm[work.classes[lay.U, e]]
-        b = perm[work.classes[lay.V, e]]
-        want = work.classes[lay.LABEL, e]
-        if a > b:
-            want = tables.labels[lay.REVERSE, want]
-        if work.classes[lay.LABEL, work.class_of[a, b]] != want:
-            return False
-    return True
-
-
-@inner
 def _is_first(kept, m, tables, work):
     """Tell whether no automorphism that keeps the frame maps the current leaf to a smaller labelling."""
     for i in range(1, kept):  # the first one is the identity
@@ -93,20 +79,22 @@ def _is_new(k, symmetry, tables, work):
     m = work.state[CLASSES]
     for i in range(min(witness, kept)):
         perm = work.perms[work.members[i]]
-        if _has_order(perm, k, symmetry) and _is_fixed(perm, m, tables, work):
+        fixed = _has_order(perm, k, symmetry)
+        e = 0
+        while fixed and e < m:
+            a = perm[work.classes[lay.U, e]]
+            b = perm[work.classes[lay.V, e]]
+            want = work.classes[lay.LABEL, e]
+            if a > b:
+                want = tables.labels[lay.REVERSE, want]
+            fixed = work.classes[lay.LABEL, work.class_of[a, b]] == want
+            e += 1
+        if fixed:
             return False
     for e in range(witness - kept):  # noqa: SIM110 (no generators in compiled code)
         if tables.labels[lay.FOLD, work.classes[lay.LABEL, e]] >= symmetry:
             return False
     return True
-
-
-@inner
-def _open_frame(k, mult, mode, frame, frame_degree, work):
-    """Try one choice of the frame; return the number of automorphisms that keep it (0: not a choice)."""
-    if mode == FRAME_VERTEX and frame_degree and degree_of(k, mult, frame) != frame_degree:
-        return 0
-    return frame_stabiliser(work.state[ORDER], mode, frame, work)
 
 
 @inner
@@ -152,8 +140,10 @@ def _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, wo
                 st[GRAPH] += 1
                 st[ORDER] = 0
             continue
-        st[KEPT] = _open_frame(k, mult, st[MODE], st[FRAME], frame_degree, work)
         st[WITNESS] = -1
+        if st[MODE] == FRAME_VERTEX and frame_degree and degree_of(k, mult, st[FRAME]) != frame_degree:
+            continue
+        st[KEPT] = frame_stabiliser(st[ORDER], st[MODE], st[FRAME], work)
         if st[KEPT] and st[MODE] == FRAME_PATH:
             work.classes[lay.KIND, st[FRAME]] += 1
     return 0

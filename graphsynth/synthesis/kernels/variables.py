@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from graphsynth.core.intrinsics import popcount
 from graphsynth.synthesis.kernels import layout as lay
-from graphsynth.synthesis.kernels.contracted import critical_sets, popcount
-from graphsynth.synthesis.kernels.layout import glue, inner
+from graphsynth.synthesis.kernels.contracted import critical_sets
+from graphsynth.synthesis.kernels.layout import inner
 
 
 @inner
-def lay_classes(k, mult, tables, work):
-    """Lay out the classes of a contracted graph; return their number."""
+def load_graph(k, mult, tables, work):
+    """Lay out a contracted graph; return the number of its classes and of its critical sets."""
     m = np.int64(0)
     for u in range(k):
         for v in range(u + 1, k):
@@ -23,13 +24,6 @@ def lay_classes(k, mult, tables, work):
                 work.class_of[u, v] = m
                 work.class_of[v, u] = m
                 m += 1
-    return m
-
-
-@glue
-def load_graph(k, mult, tables, work):
-    """Lay out a contracted graph; return the number of its classes and of its critical sets."""
-    m = lay_classes(k, mult, tables, work)
     return m, critical_sets(k, m, work.classes, tables.space, work.subsets, work.sets)
 
 
@@ -89,7 +83,7 @@ def build_variables(m, sets, perm, tables, work):
         work.variables[lay.ROW, j] = at
         mask = masks[order[j]]
         for s in range(sets):
-            c = popcount(work.sets[lay.MASK, s] & mask)
+            c = np.int64(popcount(np.uint64(work.sets[lay.MASK, s] & mask)))
             if c:
                 work.rows[lay.SET, at] = s
                 work.rows[lay.COEF, at] = c
@@ -104,6 +98,11 @@ def _smallest_sets_first(count, sets, masks, work):
     order = np.empty(count, np.int64)
     opened = np.zeros(count, np.bool_)
     placed = np.int64(0)
+    weights = np.zeros(count, np.int64)  # how many sets each variable serves
+    for j in range(count):
+        for s in range(sets):
+            if work.sets[lay.MASK, s] & masks[j]:
+                weights[j] += 1
     while placed < count:
         fewest = count + 1
         chosen = -1
@@ -125,22 +124,12 @@ def _smallest_sets_first(count, sets, masks, work):
         # within the set, variables that serve more sets come first
         for i in range(first + 1, placed):
             j = order[i]
-            weight = _coverage(masks[j], sets, work)
             at = i
-            while at > first and _coverage(masks[order[at - 1]], sets, work) < weight:
+            while at > first and weights[order[at - 1]] < weights[j]:
                 order[at] = order[at - 1]
                 at -= 1
             order[at] = j
     return order
-
-
-@inner
-def _coverage(mask, sets, work):
-    total = 0
-    for s in range(sets):
-        if work.sets[lay.MASK, s] & mask:
-            total += 1
-    return total
 
 
 @inner
@@ -255,10 +244,3 @@ def lay_lanes(count, sets, words, work):
             work.sets[lay.LEFT, s] += work.rows[lay.COEF, q] * most
             work.lanes[base + s // 8] |= np.uint64(work.rows[lay.COEF, q]) << np.uint64(8 * (s % 8))
     return True
-
-
-@inner
-def start_needs(sets, work):
-    """Reset what each critical set needs, for a depth-first search."""
-    for s in range(sets):
-        work.sets[lay.LEFT, s] = work.sets[lay.NEED, s]
