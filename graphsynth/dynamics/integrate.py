@@ -298,18 +298,11 @@ def _result(
     if done < count:
         why = run.stats.message if run.rows is not None and run.stats.message else run.form.why or run.stats.message
         message = f"the integration stopped at t = {run.stats.time:.9g} of {grid[-1]:.9g} s: {why}"
+    states = (*links, run.q, run.v, a, lam, run.slots, kinetic, potential, work)
     return DynamicMotion(
         compiled,
         grid,
-        *links,
-        run.q,
-        run.v,
-        a,
-        lam,
-        run.slots,
-        kinetic,
-        potential,
-        work,
+        *states,
         status="completed" if done == count else "failed",
         message=message,
         reached=run.stats.time,

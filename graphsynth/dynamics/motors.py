@@ -150,7 +150,7 @@ class IdealSpeed:
 
 @dataclass(frozen=True)
 class DCMotor:
-    """Direct-current motor with independent excitation and proportional speed control.
+    """Direct-current motor with independent excitation and proportional speed control (theory/motor-drive 1).
 
     ``L dI/dt = U - r I - c_e w_m`` with ``U = K (w_d - w_m)``, at most ``voltage_limit`` in size; torque ``K_m I``.
 
@@ -173,10 +173,6 @@ class DCMotor:
     ------
     SpecError
         A number that is not finite, negative where it must not be, or both armature constants zero.
-
-    Notes
-    -----
-    See theory/motor-drive 1.
 
     Examples
     --------
@@ -234,6 +230,8 @@ class DCMotor:
 class SynchronousMotor:
     """Permanent-magnet synchronous motor with non-salient rotor in the rotor frame, voltages prescribed.
 
+    ``T_e = 1.5 p psi i_q`` (theory/braider 4).
+
     Parameters
     ----------
     pole_pairs : int
@@ -250,10 +248,6 @@ class SynchronousMotor:
     ------
     SpecError
         A number that is not finite, or out of its bound.
-
-    Notes
-    -----
-    See theory/braider 4; ``T_e = 1.5 p psi i_q``.
 
     Examples
     --------

@@ -24,30 +24,15 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False)
 class JointReaction:
-    """Reaction in one joint over n instants.
-
-    Attributes
-    ----------
-    a, b : int
-        Links; the opposite of everything below acts on a.
-    kind : str
-        "R", "P", "pin-slot", "gear", "cam", "rack", "rigid", "driver".
-    force : ndarray, shape (n, 2)
-        On link b, N, world coordinates.
-    couple : ndarray, shape (n,)
-        On link b at ``point``, N m.
-    point : ndarray, shape (n, 2)
-        Point of application: the joint's point of b; of a gear its pitch point.
-    determined : ndarray of bool, shape (n, 3)
-        Whether the two force components and the couple are determined; with redundant constraints they need not be.
-    """
+    """Reaction in one joint over n instants: what acts on link b; the opposite acts on a."""
 
     a: int
     b: int
-    kind: str
-    force: Array
-    couple: Array
-    point: Array
+    kind: str  #: "R", "P", "pin-slot", "gear", "cam", "rack", "rigid", "driver"
+    force: Array  #: (n, 2), N, world coordinates
+    couple: Array  #: (n,), at ``point``, N m
+    point: Array  #: (n, 2), of application: the joint's point of b; of a gear its pitch point
+    #: (n, 3), whether the two components and the couple are determined; with redundant constraints they need not be
     determined: NDArray[np.bool_]
     angle_a: Array = field(repr=False)
     angle_b: Array = field(repr=False)
@@ -159,29 +144,12 @@ def reactions_from_multipliers(
     found = []
     for index, joint in enumerate(joints):
         a, b = _ends(compiled, joint)
-        at = points[index]
-        found.append(
-            JointReaction(
-                a,
-                b,
-                kind_of(joint),
-                wrench[index, :, :2],
-                wrench[index, :, 2],
-                np.column_stack([at.real, at.imag]),
-                determined[index],
-                angles[a],
-                angles[b],
-                apart[index],
-            )
-        )
+        kind = "driver" if isinstance(joint, Driver) else str(getattr(joint, "kind", type(joint).__name__.lower()))
+        force, couple = wrench[index, :, :2], wrench[index, :, 2]
+        at = np.column_stack([points[index].real, points[index].imag])
+        where = angles[a], angles[b], apart[index]
+        found.append(JointReaction(a, b, kind, force, couple, at, determined[index], *where))
     return Reactions(times, tuple(found))
-
-
-def kind_of(joint: Any) -> str:
-    """Name of a constraint."""
-    if isinstance(joint, Driver):
-        return "driver"
-    return str(getattr(joint, "kind", type(joint).__name__.lower()))
 
 
 def _ends(compiled: Compiled, joint: Any) -> tuple[int, int]:

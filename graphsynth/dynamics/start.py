@@ -176,22 +176,11 @@ def start_compiled(
     kept = Values(_keeping(compiled, keep), time, slots)
     q, residual = _close(kept, q0)
     values = Values(compiled, time, initial_slots(compiled, q, slots))
-    nan, count = np.full(compiled.n, np.nan), len(compiled.info)
-    report = StartReport(
-        compiled.model,
-        "consistent",
-        "",
-        time,
-        *compiled.to_links(q, nan, nan),
-        q,
-        nan,
-        nan,
-        np.full(count, np.nan),
-        np.zeros(count, dtype=np.bool_),
-        tuple(info.name for info in compiled.info),
-        float(np.abs((q - q0) / compiled.unit).max(initial=0.0)),
-        values.slots,
-    )
+    nan, names = np.full(compiled.n, np.nan), tuple(info.name for info in compiled.info)
+    unknown = np.full(len(names), np.nan), np.zeros(len(names), dtype=np.bool_)
+    moved = float(np.abs((q - q0) / compiled.unit).max(initial=0.0))
+    state = (*compiled.to_links(q, nan, nan), q, nan, nan, *unknown)
+    report = StartReport(compiled.model, "consistent", "", time, *state, names, moved, values.slots)
     scaled = np.abs(residual / kept.compiled.row_unit)
     if not np.isfinite(residual).all() or scaled.max(initial=0.0) > _CLOSED:
         worst = kept.compiled.info[int(np.argmax(scaled))]
@@ -330,7 +319,15 @@ def classify(values: Values, report: StartReport) -> StartReport:
     pose_class: PoseClass = "regular"
     nearby, tangents = rank, None
     if left.shape[1]:
-        sets = _dependent(left, report.rows)
+        # the smallest sets of dependent rows: the reduced echelon form of the left null vectors
+        basis = left.T.copy()
+        for k in range(len(basis)):
+            column = int(np.argmax(np.abs(basis[k])))
+            basis[k] /= basis[k, column]
+            for other in range(len(basis)):
+                if other != k:
+                    basis[other] -= basis[other, column] * basis[k]
+        sets = tuple(tuple(name for name, part in zip(report.rows, row) if abs(part) > 1e-8) for row in basis)
         pose_class, nearby, tangents = classify_pose(values, report.q, rank, left, Vt[rank:].T, RANK)
     return replace(
         report,
@@ -344,18 +341,6 @@ def classify(values: Values, report: StartReport) -> StartReport:
         tangents=tangents,
         determined=np.abs(left).max(axis=1, initial=0.0) < 1e-8,
     )
-
-
-def _dependent(left: Array, names: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
-    """Smallest sets of dependent rows: the reduced echelon form of the left null vectors."""
-    basis = left.T.copy()
-    for k in range(len(basis)):
-        column = int(np.argmax(np.abs(basis[k])))
-        basis[k] /= basis[k, column]
-        for other in range(len(basis)):
-            if other != k:
-                basis[other] -= basis[other, column] * basis[k]
-    return tuple(tuple(name for name, value in zip(names, row) if abs(value) > 1e-8) for row in basis)
 
 
 def _velocities(values: Values, report: StartReport, v0: Array, kept: Compiled) -> StartReport:

@@ -38,22 +38,22 @@ def prescribed_run(
     work = np.concatenate([[0.0], np.cumsum(_net_work(plant, motor, train, out, q, w))])
     reached, kinetic = int(np.isfinite(J).cumprod().sum()), 0.5 * J * w * w
     complete = reached == out.size
-    fields = {
-        "angle": q,
-        "speed": np.full(out.size, w),
-        "momentum": np.sqrt(J) * w,
-        "motor_torque": required / (train.ratio * eta),
-        "kinetic_energy": kinetic,
-        "work": work,
-    }
     there = np.arange(out.size) < reached
-    fields = {name: np.where(there, values, np.nan) for name, values in fields.items()}
     turns = np.where(there, np.round(q / math.tau), 0.0).astype(np.int64)
+    torque = required / (train.ratio * eta)
+    given = q, np.full(out.size, w), q - math.tau * turns, np.sqrt(J) * w, torque, kinetic, work
+    angles, speeds, reduced, momentum, torque, energy, moved = (np.where(there, part, np.nan) for part in given)
     return DriveRun(
         time=out,
+        angle=angles,
+        speed=speeds,
         currents=np.zeros((out.size, 0)),
-        reduced_angle=fields["angle"] - math.tau * turns,
+        reduced_angle=reduced,
         turns=turns,
+        momentum=momentum,
+        motor_torque=torque,
+        kinetic_energy=energy,
+        work=moved,
         energy_error=largest_defect(kinetic - kinetic[0] - work, kinetic, reached),
         electric_error=0.0,
         error=np.array([2.0**-52 * float(np.abs(q).max()), 0.0]),
@@ -66,7 +66,6 @@ def prescribed_run(
         rejected=0,
         rtol=math.nan,
         seconds=perf_counter() - begin,
-        **fields,
     )
 
 

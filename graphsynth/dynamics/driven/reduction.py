@@ -49,12 +49,8 @@ def simulate_drive(
     """Motion of any motor, integrated or given, with the limit L -> 0 where it may be taken, and a note of that.
 
     ``reduce`` is True, False or "auto"; the last takes the limit for L = 0, and for a small L if the error of first
-    order is below ``rtol`` (rad).  The options are those of `run`.
-
-    Raises
-    ------
-    SpecError
-        An unknown option, L = 0 with ``reduce=False``, a motor that has no linear limit.
+    order is below ``rtol`` (rad).  The options are those of `run`.  `SpecError` for L = 0 with ``reduce=False``, and
+    for a motor that has no linear limit.
     """
     start = {name: options[name] for name in ("angle", "speed")}
     if isinstance(motor, IdealSpeed):
@@ -116,12 +112,8 @@ def inductance_study(
 ) -> ReductionStudy:
     """Compare the full model at several inductances (H) with the limit L -> 0 (theory/motor-drive 4, theory/braider 6).
 
-    Times before ``after`` (s) are left out, twenty electrical time constants by default.
-
-    Raises
-    ------
-    SpecError
-        For a motor without inductance, an inductance that is not positive, or times all within the transient.
+    Times before ``after`` (s) are left out, twenty electrical time constants by default.  `SpecError` for a motor
+    without inductance, an inductance that is not positive, or times all within the transient.
     """
     motor, out = _with_inductance(motor), output_times(times)
     if not isinstance(inductances, Sequence | np.ndarray) or len(inductances) == 0:

@@ -18,7 +18,6 @@ from graphsynth.dynamics.start import StartReport
 from graphsynth.dynamics.stepping import ONE_STAGE, Form, Stages
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import applied_loads, initial_slots, joint_coordinate
-from graphsynth.kinematics.engine.follow import Tracker
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.engine.start import started
 from graphsynth.mechanism.laws import Linear
@@ -133,7 +132,11 @@ class OneCoordinateForm(Form):
         X, TH, V, W, PHI, M = trace.memory
         done, why = np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
         self.S = EngineState(trace.u, trace.q, X, TH, V, W, PHI, M, done, why, np.zeros((3, compiled.n)))
-        self.E = engine_tables(tracker)
+        program, wanted = tracker.program, np.ones(mechanism.graph.links, dtype=np.bool_)
+        empty2, empty3, empty4 = np.empty((0, 0)), np.empty((0, 0, 0)), np.empty((0, 0, 0, 0))
+        none = np.empty(0, np.int64)
+        kept = empty3, empty2, none, none, empty4, empty4, empty4, empty3
+        self.E = EngineTables(*program.tables, wanted, tracker.modes, *kept, 1, program.Lc, program.far, True)
         # start the engine at the start pose, in its sample 0
         first = tracker.blank(np.array([theta]))
         tracker.seed(first, start.poses)
@@ -288,15 +291,6 @@ class OneCoordinateForm(Form):
         """Accelerations of all coordinates in this form."""
         _, q1, q2 = self.transmission(float(y[0]))
         return np.asarray(q1 * self.rates(t, y)[1] + q2 * y[1] ** 2)
-
-
-def engine_tables(tracker: Tracker) -> EngineTables:
-    """Pack the program for the kernel."""
-    p = tracker.program
-    empty2, empty3, empty4 = np.empty((0, 0)), np.empty((0, 0, 0)), np.empty((0, 0, 0, 0))
-    wanted, none = np.ones(p.mechanism.graph.links, dtype=np.bool_), np.empty(0, np.int64)
-    kept = empty3, empty2, none, none, empty4, empty4, empty4, empty3
-    return EngineTables(*p.tables, wanted, tracker.modes, *kept, 1, p.Lc, p.far, True)
 
 
 @checked

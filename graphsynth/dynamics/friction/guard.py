@@ -47,16 +47,11 @@ class Guard:
         rates = piece.rows.directions(t, q, v, slots)[2] @ v
         self._fresh = np.array([bool(s) and not s * rates[f] > 1e-300 for f, s in enumerate(piece.senses)])
         self.value[self._fresh] = 0.0
-        self._held = [
-            f for f, e in enumerate(piece.rows.elements) if not piece.senses[f] and f not in piece.stuck and e.sticks
-        ]
+        elements = piece.rows.elements
+        self._held = [f for f, e in enumerate(elements) if not piece.senses[f] and f not in piece.stuck and e.sticks]
         # sliding speeds over which friction falls, in the unit of the rates
-        self._narrow = np.array(
-            [
-                e.stribeck / e.lever if e.static > e.kinetic and e.stribeck > 0.0 and not e.smooth else np.inf
-                for e in piece.rows.elements
-            ]
-        )
+        narrow = [e.static > e.kinetic and e.stribeck > 0.0 and not e.smooth for e in elements]
+        self._narrow = np.array([e.stribeck / e.lever if falls else np.inf for e, falls in zip(elements, narrow)])
 
     def longest(self) -> float:
         """Return the longest step that does not jump over the rise of friction at rest."""

@@ -47,7 +47,11 @@ def fitting_loads(elements: Sequence[FrictionElement], start: Array, slopes: Arr
         if x is None:
             known = False
             continue
-        x = _polished(elements, start, slopes, x)
+        for _ in range(3):  # a few steps of Newton's method, if they help
+            fresh, rest = _newton(elements, start, slopes, x)
+            if not np.isfinite(fresh).all() or _newton(elements, start, slopes, fresh)[1] >= rest:
+                break
+            x = fresh
         scale = max(size, float(np.abs(x).max()))
         summed = loads_of(elements, np.abs(start) + np.abs(slopes) @ np.abs(x))  # what cancels leaves its rounding
         fits = (np.abs(loads_of(elements, start + slopes @ x) - x) <= _SOLVED * np.maximum(summed, scale)).all()
@@ -122,16 +126,6 @@ def _unique(elements: Sequence[FrictionElement], start: Array, slopes: Array) ->
             fresh = loads_of(elements, start + slopes @ x)
         x = fresh
     return best
-
-
-def _polished(elements: Sequence[FrictionElement], start: Array, slopes: Array, x: Array) -> Array:
-    """Return loads after a few steps of Newton's method, if they help."""
-    for _ in range(3):
-        fresh, size = _newton(elements, start, slopes, x)
-        if not np.isfinite(fresh).all() or _newton(elements, start, slopes, fresh)[1] >= size:
-            break
-        x = fresh
-    return x
 
 
 def _candidates(

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.friction.guard import Guard
-from graphsynth.dynamics.friction.loads import FrictionRows
+from graphsynth.dynamics.friction.loads import FrictionRows, locked
 from graphsynth.dynamics.friction.problem import NO_LOADS, FrictionProblem, FrictionSolution, Senses
-from graphsynth.dynamics.friction.state import Piece, decide, make_piece, state_values
+from graphsynth.dynamics.friction.state import Piece, decide, state_values
 from graphsynth.dynamics.result import DynamicEvent, FrictionHistory
 from graphsynth.dynamics.start import StartReport
 from graphsynth.dynamics.stepping import Form, SolverStatistics, StepOptions, Stepper
-from graphsynth.dynamics.tables import Compiled
+from graphsynth.dynamics.tables import BY_SPEED, Compiled
 
 Array = NDArray[np.float64]
 
@@ -206,8 +206,18 @@ class DryMotion:
         if found.solution is None:
             self.stats.message = found.message or "the equations of motion have no value here"
             return None
-        _, _, _, coordinates, _ = self.rows.directions(self.stats.time, self._q, self._v, self._slots)
-        return make_piece(self.rows, problem, found.solution, coordinates, 1e3 * problem.noise + _QUIET)
+        # lock what sticks and fix the senses of what slides
+        rows, base, fit = self.rows, self.rows.compiled, found.solution
+        coordinates = rows.directions(self.stats.time, self._q, self._v, self._slots)[3]
+        stuck = [f for f, e in enumerate(rows.elements) if fit.senses[f] == 0 and e.sticks and not problem.idle(f)]
+        kept = problem._independent(stuck)
+        held = locked(base, rows, kept, coordinates[kept])
+        table = held.tables.friction_table.copy()
+        table[:, 6] = [BY_SPEED if e.smooth else float(s) for e, s in zip(rows.elements, fit.senses)]
+        compiled = replace(held, tables=held.tables._replace(friction_table=table))
+        rank = len(base.info) - problem._part.null.shape[1]
+        still, quiet = rank + len(kept) == base.n and not base.laws, 1e3 * problem.noise + _QUIET
+        return Piece(rows, compiled, fit.senses, tuple(kept), tuple(stuck), fit.shared, still, quiet)
 
     def _turn(self, piece: Piece, hit: int, uncertainty: float) -> Piece | None:
         """Decide what follows the end of an element's sliding or sticking."""

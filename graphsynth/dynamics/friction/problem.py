@@ -128,11 +128,8 @@ class FrictionProblem:
         """Bound of how much the loads change with the loads when all elements slide; below 1 they are unique."""
         if not self.elements:
             return 0.0
-        K = np.array(
-            [
-                [e.load(self._part.B[:, g]) * other.static * other.lever for g, other in enumerate(self.elements)]
-                for e in self.elements
-            ]
+        K = np.column_stack(
+            [loads_of(self.elements, B) * e.static * e.lever for B, e in zip(self._part.B.T, self.elements)]
         )
         return float(np.abs(np.linalg.eigvals(K)).max())
 
@@ -316,18 +313,6 @@ class FrictionProblem:
                 return forces
         return None
 
-    def open_shares(self, stuck: list[int]) -> Array:
-        """Return changes of the multipliers that leave every motion as it is where elements stick; largest 1."""
-        kept = self._independent(stuck)
-        rest = [f for f in stuck if f not in kept and not self.idle(f)]
-        shift = np.zeros((len(self.elements), len(rest)))
-        if kept:
-            shift[kept] = -np.linalg.solve(self.A[np.ix_(kept, kept)], self.A[np.ix_(kept, rest)])
-        shift[rest, range(len(rest))] = 1.0
-        changes = self._part.B @ shift
-        size = np.abs(changes).max(axis=0, initial=0.0)
-        return np.asarray(changes[:, size > 0.0] / size[size > 0.0])
-
     def at(self, senses: Senses, *, within: bool = True) -> FrictionSolution | None:
         """Return the solution with given senses: what an integration follows; None if there is none or several.
 
@@ -438,14 +423,24 @@ def _respond_massless(rows: FrictionRows, J: Array, sides: Array, loads: Array) 
 def open_shares(
     compiled: Compiled, times: Array, q: Array, v: Array, slots: Array, state: NDArray[np.int64]
 ) -> dict[int, Array]:
-    """Return changes of the multipliers that joints which stick together leave open, by index of the instant."""
+    """Return changes of the multipliers that joints which stick together leave open, by index of the instant.
+
+    They leave every motion as it is; the largest entry of each is 1.
+    """
     rows, found = FrictionRows(compiled), {}
     for k in range(len(times)):
-        stuck = np.flatnonzero([s == 0 and not e.smooth for s, e in zip(state[k], rows.elements)])
+        stuck = [f for f, (s, e) in enumerate(zip(state[k], rows.elements)) if s == 0 and not e.smooth]
         if len(stuck) < 2 or not np.isfinite(q[k]).all():
             continue
         problem = FrictionProblem(rows, float(times[k]), q[k], v[k], slots[k])
-        changes = problem.open_shares([int(f) for f in stuck])
-        if changes.shape[1]:
-            found[k] = changes
+        kept, A = problem._independent(stuck), problem.A
+        rest = [f for f in stuck if f not in kept and not problem.idle(f)]
+        shift = np.zeros((len(rows.elements), len(rest)))
+        if kept:
+            shift[kept] = -np.linalg.solve(A[np.ix_(kept, kept)], A[np.ix_(kept, rest)])
+        shift[rest, range(len(rest))] = 1.0
+        changes = problem._part.B @ shift
+        size = np.abs(changes).max(axis=0, initial=0.0)
+        if (size > 0.0).any():
+            found[k] = changes[:, size > 0.0] / size[size > 0.0]
     return found

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.dynamics.friction.loads import FrictionRows, locked
+from graphsynth.dynamics.friction.loads import FrictionRows
 from graphsynth.dynamics.friction.problem import MOST, FrictionProblem, FrictionSolution, Senses
 from graphsynth.dynamics.kernels import accelerate, constraint_system, load_vector, state_rows
-from graphsynth.dynamics.tables import BY_SPEED, Compiled
+from graphsynth.dynamics.tables import Compiled
+from graphsynth.dynamics.values import applied_loads
 
 Array = NDArray[np.float64]
 
@@ -123,30 +124,12 @@ class Piece:
     quiet: Array
 
 
-def make_piece(
-    rows: FrictionRows, problem: FrictionProblem, solution: FrictionSolution, coordinates: Array, quiet: Array
-) -> Piece:
-    """Lock what sticks and fix the senses of what slides; ``quiet`` are rates that count as 0."""
-    base = rows.compiled
-    stuck = [f for f, e in enumerate(rows.elements) if solution.senses[f] == 0 and e.sticks and not problem.idle(f)]
-    kept = problem._independent(stuck)
-    held = locked(base, rows, kept, coordinates[kept])
-    table = held.tables.friction_table.copy()
-    table[:, 6] = [BY_SPEED if e.smooth else float(s) for e, s in zip(rows.elements, solution.senses)]
-    compiled = replace(held, tables=held.tables._replace(friction_table=table))
-    rank = len(base.info) - problem._part.null.shape[1]
-    still = rank + len(kept) == base.n and not base.laws
-    return Piece(rows, compiled, solution.senses, tuple(kept), tuple(stuck), solution.shared, still, quiet)
-
-
 def state_values(piece: Piece, t: float, q: Array, v: Array, slots: Array) -> tuple[Array, Array, float]:
     """Values that stay positive within a piece, their derivatives (NaN of those that stick), return of the loads.
 
     Of an element that slides the rate in its sense; of one that sticks the friction still to be had (N or N m); 1 of
     others.
     """
-    from graphsynth.dynamics.values import applied_loads
-
     rows, base = piece.rows, piece.rows.compiled
     count, m = len(rows.elements), len(base.info)
     value, slope = np.ones(count), np.zeros(count)

@@ -8,16 +8,10 @@ from graphsynth.dynamics.kernels.partitioned import (
     place_partitioned as place_partitioned,
 )
 from graphsynth.dynamics.kernels.rubbing import friction_loads as friction_loads, friction_unit as friction_unit
-from graphsynth.dynamics.kernels.solving import (
-    accelerate as accelerate,
-    factor_rows as factor_rows,
-    least_step as least_step,
-    solve_rows as solve_rows,
-)
+from graphsynth.dynamics.kernels.solving import accelerate as accelerate
 from graphsynth.dynamics.kernels.systems import (
     constraint_system as constraint_system,
     finish as finish,
     load_vector as load_vector,
-    motor_torque as motor_torque,
     state_rows as state_rows,
 )

@@ -7,43 +7,36 @@ accelerations of the centres of mass follow.  It shares no code with `graphsynth
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.dynamics.model import Body, DynamicModel
+from graphsynth.dynamics.start import StartReport, consistent_start
+from graphsynth.evidence.drives import drive_problem
+from graphsynth.evidence.dynamics import Truth, dynamics_problem
+from graphsynth.evidence.position import four_bar, position_problem
 from graphsynth.evidence.precise_drive import NAME, Long, Shape, precise_drive
 from graphsynth.evidence.rows import Effort, Problem
-
-if TYPE_CHECKING:
-    from graphsynth.dynamics.model import Body, DynamicModel
-    from graphsynth.dynamics.start import StartReport
-    from graphsynth.systems.braider.linkage import FourBar
-    from graphsynth.systems.braider.model import Braider
+from graphsynth.mechanism.four_bar import TiltedFourBar
+from graphsynth.systems.braider.linkage import FourBar
+from graphsynth.systems.braider.model import Braider
+from graphsynth.systems.braider.stages import braider_of
 
 Array = NDArray[np.float64]
 
 
-def _braider(context: Any) -> Any:
-    from graphsynth.systems.braider.stages import braider_of
-
-    return braider_of(context)
-
-
 def start_up(context: Any, effort: Effort) -> Problem:
     """Start from rest with all currents."""
-    from graphsynth.evidence.drives import drive_problem
-
-    b = _braider(context)
+    b = braider_of(context)
     end = context.scene.mechanism.start.end
     return drive_problem(b.plant(), b.motor, b.train, end, effort, shape=shape_of_braider(b))
 
 
 def linkage_dynamics(context: Any, effort: Effort) -> Problem:
     """Measure the linkage without motor and thread, free to move from the speed of the scene."""
-    from graphsynth.evidence.dynamics import Truth, dynamics_problem
-
-    braider, speed = _braider(context), context.scene.mechanism.speed
+    braider, speed = braider_of(context), context.scene.mechanism.speed
     model, start = free_linkage(braider, speed)
     end, name = 1.0 if effort.quick else 2.0, "the braider's linkage, free"
     truth = Truth(lambda times: precise_swing(braider, speed, times, model.gravity), f"closed loop, {NAME}")
@@ -52,13 +45,13 @@ def linkage_dynamics(context: Any, effort: Effort) -> Problem:
 
 def positions(context: Any, effort: Effort) -> Problem:
     """Measure positions of the linkage over a turn."""
-    from graphsynth.evidence.position import four_bar, position_problem
-    from graphsynth.mechanism.four_bar import TiltedFourBar
-
-    bar = _braider(context).linkage
-    linkage = TiltedFourBar(bar.frame, bar.crank, bar.coupler, bar.rocker, sgn=bar.branch)
-    mechanism, closed = four_bar(linkage)
+    mechanism, closed = _mechanism(braider_of(context).linkage)
     return position_problem(mechanism, "the braider's linkage", closed, effort=effort)
+
+
+def _mechanism(bar: FourBar) -> tuple[Any, Any]:
+    """Return the linkage as a mechanism, and its positions in closed form."""
+    return four_bar(TiltedFourBar(bar.frame, bar.crank, bar.coupler, bar.rocker, sgn=bar.branch))
 
 
 class _Link(NamedTuple):
@@ -156,13 +149,7 @@ def shape_of_braider(braider: Braider) -> Shape:
 
 def free_linkage(braider: Braider, speed: float) -> tuple[DynamicModel, StartReport]:
     """Return the linkage of a braider without motor and thread, and a start at crank angle zero (speed in rad/s)."""
-    from graphsynth.dynamics.model import DynamicModel
-    from graphsynth.dynamics.start import consistent_start
-    from graphsynth.evidence.position import four_bar
-    from graphsynth.mechanism.four_bar import TiltedFourBar
-
-    bar = braider.linkage
-    mechanism, _ = four_bar(TiltedFourBar(bar.frame, bar.crank, bar.coupler, bar.rocker, sgn=bar.branch))
+    mechanism, _ = _mechanism(braider.linkage)
     model = DynamicModel(mechanism, braider.bodies)
     return model, consistent_start(model, pose=mechanism.pose, keep={(0, 1): 0.0}, keep_rates={(0, 1): speed})
 

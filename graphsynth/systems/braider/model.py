@@ -314,7 +314,11 @@ class Braider:
 
         A motion that reaches a change point of the linkage ends there with the status CHANGE_POINT: no continuation
         is chosen silently.  A crank that meets the end of its reach ends with NOT_FINITE or STEP_TOO_SMALL.
-        `SpecError` for options or numbers that make no sense, L = 0 with the unreduced model, a start out of reach.
+
+        Raises
+        ------
+        SpecError
+            Options or numbers that make no sense, L = 0 with the unreduced model, a start out of reach.
         """
         if not math.isfinite(float(self.linkage.motion(number("angle", angle)).k3)):
             raise SpecError(f"the linkage cannot be assembled at angle = {angle:g} rad; start within linkage.reach()")
@@ -400,6 +404,11 @@ class Braider:
         """First time after which ``|w / target - 1| <= band`` up to ``end``, from rest.
 
         The last crossing between samples is solved on the cubic through speeds and accelerations.
+
+        Raises
+        ------
+        SpecError
+            For ``target = 0``.
         """
         number("band", band, least=0.0, above=True)
         if number("target", target) == 0.0:

@@ -20,30 +20,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class JointForces:
-    """Reactions at the four joints and the shaft torque; forces in N in the fixed frame, torque in N m.
-
-    Attributes
-    ----------
-    F01, F12, F23, F03 : ndarray of shape (n, 2)
-        On the crank at O1 from the frame; on the coupler at A from the crank; on the rocker at B from the coupler;
-        on the rocker at O2 from the frame.
-    torque : ndarray of shape (n,)
-        Of the output shaft of the train on the crank.
-    power_error : float
-        Largest ``|T w + M w3 - dE_k/dt|`` over the largest of its terms, E_k of the links in closed form.
-    second_way : float
-        Largest difference of a force from the equilibrium of every body, over the largest force.
-    """
+    """Reactions at the four joints, N in the fixed frame (n, 2), and the shaft torque, N m (n,)."""
 
     theta: Array
     speed: Array
     acceleration: Array
-    F01: Array
-    F12: Array
-    F23: Array
-    F03: Array
-    torque: Array
+    F01: Array  #: on the crank at O1 from the frame
+    F12: Array  #: on the coupler at A from the crank
+    F23: Array  #: on the rocker at B from the coupler
+    F03: Array  #: on the rocker at O2 from the frame
+    torque: Array  #: of the output shaft of the train on the crank
+    #: largest ``|T w + M w3 - dE_k/dt|`` over the largest of its terms, E_k of the links in closed form
     power_error: float
+    #: largest difference of a force from the equilibrium of every body, over the largest force
     second_way: float
 
     def forces(self) -> Array:
@@ -58,15 +47,7 @@ class JointForces:
 def reactions(braider: Braider, theta: ArrayLike, speed: ArrayLike, acceleration: ArrayLike) -> JointForces:
     """Inverse dynamics at given crank angle (rad), speed and acceleration; arrays broadcast to (n,).
 
-    Returns
-    -------
-    JointForces
-        Estimated, a few roundings; NaN where the linkage cannot be assembled.
-
-    Raises
-    ------
-    SpecError
-        What is no number, or lengths that do not fit.
+    Estimated, a few roundings; NaN where the linkage cannot be assembled.  `SpecError` for lengths that do not fit.
 
     Examples
     --------
