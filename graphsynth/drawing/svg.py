@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable
 
 from graphsynth.drawing.palette import LIGHT, STYLE
-from graphsynth.drawing.shapes import Circle, Path, Point, Shape, Style, Text
+from graphsynth.drawing.shapes import Circle, Point, Shape, Style, Text
 
 ToPage = Callable[[Point], tuple[float, float]]
 
@@ -53,20 +53,15 @@ def element(shape: Shape, xy: ToPage, scale: float, symbol: float = 1.0, upright
         x, y = xy(shape.centre)
         where = f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(shape.radius * scale)}"'
     else:
-        where = f'<path d="{_data(shape, xy)}"'
+        pieces = []
+        for run in shape.runs:
+            points = [f"{number(x)} {number(y)}" for x, y in map(xy, run)]
+            if shape.curved:
+                pieces.append(f"M{points[0]} Q{points[1]} {points[2]}")
+            else:
+                pieces.append(f"M{' L'.join(points)}{'Z' if shape.closed else ''}")
+        where = f'<path d="{" ".join(pieces)}"'
     return f"{where}{_paint(shape.style, symbol)}{part}/>"
-
-
-def _data(path: Path, xy: ToPage) -> str:
-    """Path data of all runs."""
-    pieces = []
-    for run in path.runs:
-        points = [f"{number(x)} {number(y)}" for x, y in map(xy, run)]
-        if path.curved:
-            pieces.append(f"M{points[0]} Q{points[1]} {points[2]}")
-        else:
-            pieces.append(f"M{' L'.join(points)}{'Z' if path.closed else ''}")
-    return " ".join(pieces)
 
 
 def _paint(style: Style, symbol: float) -> str:

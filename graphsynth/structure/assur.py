@@ -401,8 +401,6 @@ def contour_class(joints: Iterable[tuple[int, int, int]]) -> int:
 
     ``joints`` (a, b, mobility): inner joints, and outer joints with -1 for ``b``.
 
-    Examples
-    --------
     A dyad, a triad on its ternary link, and four links in a loop:
 
     >>> contour_class([(1, 2, 1), (1, -1, 1), (2, -1, 1)])

@@ -113,8 +113,6 @@ class Counts(Mapping[int, int]):
 
     Only the non-zero counts are iterated over; two are equal when their non-zero counts are.
 
-    Examples
-    --------
     >>> kinds = Counts({2: 6, 3: 7, 4: 1})
     >>> kinds[3], kinds[9], dict(kinds)
     (7, 0, {2: 6, 3: 7, 4: 1})
