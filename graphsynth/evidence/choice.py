@@ -169,14 +169,10 @@ def seconds_text(seconds: float) -> str:
     """
     if not math.isfinite(seconds):
         return "no time"
-    for unit, factor in (("s", 1.0), ("ms", 1e3), ("µs", 1e6)):
-        if seconds * factor >= 1.0:
-            return f"{_two(seconds * factor)} {unit}"
-    return f"{_two(seconds * 1e9)} ns"
-
-
-def _two(value: float) -> str:
-    return f"{float(f'{value:.2g}'):g}"
+    for unit, factor in (("s", 1.0), ("ms", 1e3), ("µs", 1e6), ("ns", 1e9)):
+        if seconds * factor >= 1.0 or unit == "ns":
+            break
+    return f"{float(f'{seconds * factor:.2g}'):g} {unit}"
 
 
 def advice(problem: Problem) -> dict[str, str]:
@@ -264,7 +260,7 @@ def _beaten(good: list[Row], best: tuple[Row, ...], problem: Problem) -> str:
     if times < _NOISE:
         return f"as good as {other.label}, {than}"
     return (
-        f"{other.label} is better: {than}, {_two(times)} times faster than {_error(own.error, unit)} in "
+        f"{other.label} is better: {than}, {float(f'{times:.2g}'):g} times faster than {_error(own.error, unit)} in "
         f"{seconds_text(own.seconds)} here"
     )
 

@@ -10,17 +10,20 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from inspect import signature
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import mpmath
 import numpy as np
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.evidence.rows import Effort, Problem, Row, best_of
-
-if TYPE_CHECKING:
-    from graphsynth.intervals import Interval
-    from graphsynth.jamming.bearing.bearing import Bearing
-    from graphsynth.jamming.intersection.hull import CircleEllipse
+from graphsynth.intervals import Interval, pave
+from graphsynth.jamming.bearing.areas import ellipse_circle, surrogate_areas
+from graphsynth.jamming.bearing.areas_enclosed import enclose_surrogate_areas
+from graphsynth.jamming.bearing.bearing import Bearing
+from graphsynth.jamming.intersection.boxes import krawczyk_boxes
+from graphsynth.jamming.intersection.hull import CircleEllipse, exact_hull, surrogate_problem
+from graphsynth.jamming.intersection.readings import crescent_boxes, crescent_points, interval_shoelace
 
 _DIGITS = 50
 #: Parts of the search by boxes after which it is stopped.
@@ -29,8 +32,6 @@ _PARTS = (0.3, 0.6, 0.75, 0.85, 0.92, 0.97)
 
 def precise_crossing(problem: CircleEllipse) -> tuple[Any, Any]:
     """Crossing in the first quadrant with 50 digits, from the radii as they are; `GeometryError` if there is none."""
-    import mpmath
-
     with mpmath.workdps(_DIGITS):
         R, a, b = (mpmath.mpf(r.lo.numerator) / r.lo.denominator for r in (problem.R1, problem.a, problem.b))
         if not b < R < a:
@@ -67,9 +68,6 @@ def crossing_problem(bearing: Bearing, sine: str, effort: Effort | None = None) 
     >>> problem.methods, problem.rows[0].status.value
     (('exact hull', 'Krawczyk boxes'), 'ok')
     """
-    from graphsynth.jamming.intersection.boxes import krawczyk_boxes
-    from graphsynth.jamming.intersection.hull import surrogate_problem
-
     effort = effort or Effort()
     given = surrogate_problem(bearing, sine)
     truth = precise_crossing(given)
@@ -95,8 +93,6 @@ def crossing_problem(bearing: Bearing, sine: str, effort: Effort | None = None) 
 
 def _hull_row(problem: CircleEllipse, truth: tuple[Any, Any], effort: Effort) -> tuple[Interval, Row]:
     """Exact hull against 50 digits: its width, and whether it holds the crossing."""
-    from graphsynth.jamming.intersection.hull import exact_hull
-
     found, *timed = best_of(lambda: exact_hull(problem), effort)
     why = "" if _holds(found.hull, *truth) else "the hull does not hold the crossing"
     more = {"kind": "width of the enclosure", "reference": f"closed form with {_DIGITS} digits", "proved": True}
@@ -134,8 +130,6 @@ def _enclosed(
 
 def _paved(problem: CircleEllipse, boxes: int) -> Interval:
     """Hull of what the general solver leaves, from the equations alone."""
-    from graphsynth.intervals import Interval, pave
-
     Q, a, b = (r.outward() for r in (problem.circle_bounds, problem.a, problem.b))
     alpha, beta, side = 1 / a.sqr(), 1 / b.sqr(), float(Q.sqrt().hi)
     found = pave(
@@ -159,10 +153,6 @@ def precise_area(bearing: Bearing, sine: str) -> Any:
     >>> round(float(precise_area(Bearing(), worst)), 16)  # docs/explanation/errata.md
     0.9749683652811658
     """
-    import mpmath
-
-    from graphsynth.jamming.intersection.hull import surrogate_problem
-
     with mpmath.workdps(_DIGITS):
         R, S = mpmath.mpf(repr(bearing.Rb)), mpmath.mpf(sine)
         a = R + mpmath.mpf(repr(bearing.clearance))
@@ -198,11 +188,6 @@ def area_problem(bearing: Bearing, sine: str, effort: Effort | None = None) -> P
     >>> len(area_problem(Bearing(), "0.0133308643347", Effort(rounds=1, quick=True)).methods)
     5
     """
-    from graphsynth.intervals import Interval
-    from graphsynth.jamming.bearing.areas import ellipse_circle, surrogate_areas
-    from graphsynth.jamming.bearing.areas_enclosed import enclose_surrogate_areas
-    from graphsynth.jamming.intersection.readings import crescent_boxes, crescent_points, interval_shoelace
-
     effort = effort or Effort()
     truth = precise_area(bearing, sine)
     S, R, one = float(sine), bearing.Rb, Interval(sine)
@@ -254,8 +239,6 @@ def area_problem(bearing: Bearing, sine: str, effort: Effort | None = None) -> P
 
 def _area_row(method: str, setting: str, found: Any, truth: Any, timed: Sequence[float], **more: Any) -> Row:
     """Row of areas: an enclosure must hold the reference, and say more than that there is an area."""
-    from graphsynth.intervals import Interval
-
     reference = f"quadrature in polar coordinates with {_DIGITS} digits"
     if not isinstance(found, Interval):
         error = max(float(abs(truth - value)) for value in {float(v) for v in np.atleast_1d(found)})

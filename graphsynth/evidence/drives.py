@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import solve_ivp
 
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.run import run
@@ -118,8 +119,6 @@ def drive_work_precision(machine: Any, times: ArrayLike, **options: Any) -> Prob
 
 
 def _reference(drive: _Drive) -> _Truth:
-    from scipy.integrate import solve_ivp
-
     own, out = drive.run(1e-13), drive.times
     states = _states(own)
     constants = float(out[-1] - out[0]) / getattr(drive.motor, "electrical_time", math.inf)
@@ -147,8 +146,6 @@ class _TooManyCallsError(Exception):
 
 
 def _scipy_row(name: str, drive: _Drive, rtol: float, truth: _Truth, effort: Effort, most_calls: int) -> Row:
-    from scipy.integrate import solve_ivp
-
     (rhs, start), out, calls = drive.equations(), drive.times, 0
     unit = np.concatenate([[1.0], np.maximum(np.abs(truth.states).max(axis=0)[1:], 1e-300)])
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from inspect import signature
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,12 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import finite, whole
 from graphsynth.core.errors import GeometryError, GraphsynthError
 from graphsynth.dynamics.integrate import simulate_dynamics
+from graphsynth.dynamics.model import DynamicModel
+from graphsynth.dynamics.result import DynamicMotion
+from graphsynth.dynamics.start import StartReport
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
-
-if TYPE_CHECKING:
-    from graphsynth.dynamics.model import DynamicModel
-    from graphsynth.dynamics.result import DynamicMotion
-    from graphsynth.dynamics.start import StartReport
 
 Array = NDArray[np.float64]
 #: Beyond this many tolerances the error is not what was asked for.

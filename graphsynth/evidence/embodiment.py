@@ -10,14 +10,16 @@ from functools import cache
 from inspect import signature
 from statistics import median
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import mpmath
 import numpy as np
 
 from graphsynth.evidence.rows import Effort, Problem, Row
-
-if TYPE_CHECKING:
-    from graphsynth.kinematics.dimensional.goals import Goals
+from graphsynth.kinematics.dimensional.api import embody
+from graphsynth.kinematics.dimensional.goals import Goals, LineGoal, PathGoal
+from graphsynth.mechanism.four_bar import TiltedFourBar
+from graphsynth.structure.graph import MechanismGraph
 
 
 @cache
@@ -32,8 +34,6 @@ def precise_strip() -> float:
     >>> round(precise_strip() * 4, 7)
     0.0097537
     """
-    import mpmath
-
     with mpmath.workdps(50):
         b = mpmath.mpf(5) / 2
 
@@ -49,9 +49,6 @@ def _rows(
     goals: Goals, settings: tuple[tuple[float, int], ...], seeds: int, error: Any, kind: str, reference: str
 ) -> tuple[Row, ...]:
     """One row for each effort and number of tries; a seed without an acceptable result is infinitely wrong."""
-    from graphsynth.kinematics.dimensional.api import embody
-    from graphsynth.structure.graph import MechanismGraph
-
     graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     embody(graph)  # compiled and loaded
     given = signature(embody).parameters
@@ -80,8 +77,6 @@ def line_problem(effort: Effort | None = None) -> Problem:
     The error is how much wider the strip is than that of Chebyshev's proportions, which solve this exactly
     (``docs/explanation/embodiment.md``).
     """
-    from graphsynth.kinematics.dimensional.goals import Goals, LineGoal
-
     effort = effort or Effort()
     goals = Goals(
         target=LineGoal(length=4.0, on_bar=True), max_length_ratio=5.0, min_transmission_angle=math.radians(20)
@@ -89,11 +84,9 @@ def line_problem(effort: Effort | None = None) -> Problem:
     settings = ((0.15, 1), (0.15, 3), (0.3, 3))
     seeds = 1 if effort.quick else 3
 
-    def error(found: Any) -> float:
-        return float(abs(found.figures.goal_error - precise_strip()))
-
     kind = f"width of the strip over its length against the best, median of {seeds} seeds"
-    rows = _rows(goals, settings, seeds, error, kind, "closed form with 50 digits")
+    reference, best = "closed form with 50 digits", precise_strip()
+    rows = _rows(goals, settings, seeds, lambda found: abs(found.figures.goal_error - best), kind, reference)
     question = "Dimensions of a four-bar linkage for a straight line of four crank lengths (Chebyshev's lambda)"
     return Problem("dimensions", question, "relative", rows, "search", _NOTE)
 
@@ -106,10 +99,6 @@ _NOTE = (
 
 def path_problem(effort: Effort | None = None) -> Problem:
     """Find a four-bar linkage through eight points at given inputs, taken from a linkage: no error is possible."""
-    from graphsynth.kinematics.dimensional.api import embody
-    from graphsynth.kinematics.dimensional.goals import Goals, PathGoal
-    from graphsynth.mechanism.four_bar import TiltedFourBar
-
     effort = effort or Effort()
     inputs = np.arange(8) * math.tau / 8
     M = TiltedFourBar(2.2, 1.0, 2.4, 2.3, k=0.7).positions(inputs).M

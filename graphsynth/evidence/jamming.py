@@ -10,22 +10,26 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from inspect import signature
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import mpmath
 import numpy as np
 
 from graphsynth.core.errors import GeometryError
+from graphsynth.evidence.position import four_bar
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
-
-if TYPE_CHECKING:
-    from graphsynth.jamming.bearing.bearing import Bearing, Condition
-    from graphsynth.jamming.bearing.parameters import ToleranceBox
-    from graphsynth.jamming.joints.assess import CoupledReport
-    from graphsynth.jamming.joints.limits import Misalignment
-    from graphsynth.jamming.joints.scale import ScaleCertificate
-    from graphsynth.kinematics.engine.result import Motion
-    from graphsynth.mechanism.four_bar import TiltedFourBar
-    from graphsynth.mechanism.model import Mechanism
+from graphsynth.jamming.bearing.arcs import total_length
+from graphsynth.jamming.bearing.bearing import Bearing, Condition
+from graphsynth.jamming.bearing.certify import certify_jamming
+from graphsynth.jamming.bearing.parameters import ToleranceBox
+from graphsynth.jamming.bearing.sweep import sweep_linkage
+from graphsynth.jamming.joints.assess import CoupledReport, assess_coupled
+from graphsynth.jamming.joints.limits import Misalignment
+from graphsynth.jamming.joints.scale import ScaleCertificate, largest_scale
+from graphsynth.kinematics.engine.result import Motion
+from graphsynth.kinematics.simulation import simulate
+from graphsynth.mechanism.four_bar import TiltedFourBar
+from graphsynth.mechanism.model import Mechanism
 
 _DIGITS = 50
 #: Gap of the proved bounds that are the reference where no closed form is known.
@@ -45,8 +49,6 @@ def precise_arc_ends(box: ToleranceBox, condition: Condition = "A") -> tuple[flo
     >>> [round(math.degrees(f), 10) for f in precise_arc_ends(ToleranceBox(alpha="1/30"))]
     [27.0592203252, 152.9407796748, 207.0592203252, 332.9407796748]
     """
-    import mpmath
-
     if not box.is_point or box.rod != "rigid" or condition not in ("A", "B"):
         raise GeometryError("arc ends are known for single dimensions, a rigid rod and conditions A and B")
     with mpmath.workdps(_DIGITS):
@@ -78,8 +80,6 @@ def precise_critical_tilt(bearing: Bearing, condition: Condition = "A") -> Any:
     >>> print(f"{float(precise_critical_tilt(Bearing())):.16f}")
     0.0060643965591564
     """
-    import mpmath
-
     with mpmath.workdps(_DIGITS):
         given = {"Rb": bearing.Rb, "Hb": 2 * bearing.h, "clearance": bearing.clearance}
         sine = _critical_sine({name: mpmath.mpf(repr(value)) for name, value in given.items()}, condition)
@@ -88,8 +88,6 @@ def precise_critical_tilt(bearing: Bearing, condition: Condition = "A") -> Any:
 
 def _critical_sine(v: dict[str, Any], condition: str) -> Any:
     """Sine of the least tilt at which the parts touch; None if they never do (by bisection in 50 digits)."""
-    import mpmath
-
     R, h, c = v["Rb"], v["Hb"] / 2, v["clearance"]
 
     def gap(t: Any) -> Any:
@@ -126,9 +124,6 @@ def arc_problem(box: ToleranceBox, condition: Condition = "A", effort: Effort | 
     GeometryError
         A box with tolerances, which have no arc ends; or a bearing that never jams.
     """
-    from graphsynth.jamming.bearing.certify import certify_jamming
-    from graphsynth.jamming.bearing.sweep import sweep_linkage
-
     effort = effort or Effort()
     ends = precise_arc_ends(box, condition)
     if not ends:
@@ -161,7 +156,6 @@ def arc_problem(box: ToleranceBox, condition: Condition = "A", effort: Effort | 
 
 def _proved_row(method: str, setting: str, left: Any, ends: Sequence[float], timed: Sequence[float]) -> Row:
     """Row of a proof: the length of the angles left undecided, which must hold the ends."""
-    from graphsynth.jamming.bearing.arcs import total_length
 
     def held(end: float) -> bool:
         slack = 4.0 * math.ulp(end)  # the reference is rounded once
@@ -187,8 +181,6 @@ def exact_largest(linkage: TiltedFourBar, bearing: Bearing, condition: Condition
     >>> print(f"{float(exact_largest(TiltedFourBar(), Bearing())):.16f}")
     0.0121287931183128
     """
-    import mpmath
-
     crank = linkage.l2
     if (linkage.l1, linkage.l3, linkage.l4) != (2.0 * crank, 2.5 * crank, 2.5 * crank):
         return None
@@ -209,9 +201,6 @@ def lambda_problem(
     The linkage is planar, and its crank turns fully; `direction` is that of the axis about which the motor axis is
     tilted, radians from the frame line.
     """
-    from graphsynth.evidence.position import four_bar
-    from graphsynth.jamming.joints.limits import Misalignment
-
     mechanism, _ = four_bar(linkage)
     exact = exact_largest(linkage, bearing, condition) if direction == 0.0 else None
     size = ", ".join(f"{value:g}" for value in (linkage.l1, linkage.l2, linkage.l3, linkage.l4))
@@ -239,10 +228,6 @@ def coupled_problem(
     `inputs` the range of the input, radians. A `GeometryError` says that the mechanism does not move through it, or
     that no bounds can be proved.
     """
-    from graphsynth.jamming.joints.assess import assess_coupled
-    from graphsynth.jamming.joints.scale import largest_scale
-    from graphsynth.kinematics.simulation import simulate
-
     effort = effort or Effort()
     rounds = replace(effort, rounds=1 if effort.quick else min(2, effort.rounds))
 
@@ -287,8 +272,6 @@ def _gap_row(
 
 def _reference(prove: Any, tilt: Misalignment, exact: Any) -> tuple[Any, Any, str]:
     """Bounds of the largest factor on the misalignment, and where they are from."""
-    import mpmath
-
     if exact is not None:
         with mpmath.workdps(_DIGITS):
             scale = exact / mpmath.mpf(tilt.alpha)

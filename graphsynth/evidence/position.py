@@ -9,21 +9,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import mpmath
 import numpy as np
+from mpmath import mp
 from numpy.typing import NDArray
+from scipy.optimize import root
 
 from graphsynth.core.errors import GeometryError, GraphsynthError
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
+from graphsynth.kinematics.engine.batch import simulate_batch
+from graphsynth.kinematics.engine.result import Motion
 from graphsynth.kinematics.simulation import simulate
+from graphsynth.mechanism.constraints import residual
 from graphsynth.mechanism.equations import Plane, derivatives, seen
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.joints import Revolute
+from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Mechanism
-
-if TYPE_CHECKING:
-    from graphsynth.kinematics.engine.result import Motion
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -79,8 +83,6 @@ def precise_poses(mechanism: Mechanism, u: float, guess: Array) -> list[list[Any
     driver, of a revolute joint, that follows the input: a `GeometryError` refuses others, and says where there is no
     convergence.
     """
-    import mpmath
-
     with mpmath.workdps(_DIGITS + 10):
         pose = [[mpmath.mpf(float(value)) for value in row] for row in guess]
         pose[mechanism.frame] = [mpmath.mpf(0)] * 3
@@ -98,10 +100,6 @@ def precise_poses(mechanism: Mechanism, u: float, guess: Array) -> list[list[Any
 
 def _equations(mechanism: Mechanism, u: Any, pose: list[list[Any]]) -> tuple[list[Any], list[dict[Any, Any]]]:
     """Values and derivatives of all joint equations and of the driver; derivatives by (link, axis)."""
-    from mpmath import mp
-
-    from graphsynth.mechanism.laws import Linear
-
     plane = Plane(mp.sin, mp.cos, mp.hypot, mp.atan2)
     driver = mechanism.drivers[0]
     joint = next((j for j in mechanism.joints if j.pair == driver.pair), None)
@@ -123,8 +121,6 @@ def _equations(mechanism: Mechanism, u: Any, pose: list[list[Any]]) -> tuple[lis
 
 def _near(angle: Any, turns: float) -> Any:
     """Angle less the whole multiple of so many turns that is nearest to it."""
-    from mpmath import mp
-
     period = 2 * mp.pi * turns
     return angle - period * mp.nint(angle / period)
 
@@ -169,8 +165,6 @@ def position_problem(
 
 def precise_points(mechanism: Mechanism, inputs: Array) -> Complex:
     """Watched point at inputs (n,) with 50 digits, rounded once, shape (n,); the branch is that of `simulate`."""
-    import mpmath
-
     motion, watched = simulate(mechanism, inputs), _watched(mechanism)
     if not motion.completed:
         raise GeometryError(f"the motion ends: {motion.reason}")
@@ -197,10 +191,6 @@ def _closed_row(closed: Closed, grid: Array, truth: Complex, Lc: float, effort: 
 
 def _root_row(mechanism: Mechanism, truth: Complex, watched: Any, motion: Motion, tol: float, effort: Effort) -> Row:
     """Scipy's ``root`` on the same equations, from node to node with steps of five degrees between."""
-    from scipy.optimize import root
-
-    from graphsynth.mechanism.constraints import residual
-
     fine = np.linspace(motion.inputs[0], motion.inputs[-1], 6 * NODES + 1)
     free = [k for k in range(mechanism.graph.links) if k != mechanism.frame]
     driver = mechanism.drivers[0]
@@ -311,8 +301,6 @@ def batch_problem(crank: float, largest: float, effort: Effort | None = None) ->
 
 
 def _batch(mechanisms: list[Mechanism], f: Array, sets: int, rates: bool) -> Complex:
-    from graphsynth.kinematics.engine.batch import simulate_batch
-
     dimensions = np.stack([mechanisms[k % len(mechanisms)].dimensions for k in range(sets)])
     found = simulate_batch(mechanisms[0], f, dimensions, rates=rates, keep=(3,))
     x, y, cosine, sine = np.moveaxis(found.frames[: len(mechanisms), :, 0], -1, 0)

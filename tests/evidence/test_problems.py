@@ -42,9 +42,9 @@ def test_a_hull_without_the_crossing_is_a_failure(monkeypatch):
     from types import SimpleNamespace
 
     from graphsynth.evidence import crossing
-    from graphsynth.jamming.intersection import hull as circle_ellipse, surrogate_problem
+    from graphsynth.jamming.intersection import surrogate_problem
 
-    real = circle_ellipse.exact_hull
+    real = crossing.exact_hull
 
     def shifted(problem):
         found = real(problem)
@@ -52,7 +52,7 @@ def test_a_hull_without_the_crossing_is_a_failure(monkeypatch):
 
     truth = crossing.precise_crossing(problem := surrogate_problem(Bearing(), SINE))
     assert crossing._hull_row(problem, truth, QUICK)[1].status is RowStatus.OK
-    monkeypatch.setattr(circle_ellipse, "exact_hull", shifted)
+    monkeypatch.setattr(crossing, "exact_hull", shifted)
     row = crossing._hull_row(problem, truth, QUICK)[1]
     assert row.status is RowStatus.FAILED and not row.good
 

@@ -26,12 +26,10 @@ from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from string import Formatter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from graphsynth.core.errors import SpecError
-
-if TYPE_CHECKING:
-    from graphsynth.evidence.stress.checks import Checks
+from graphsynth.evidence.stress.checks import Checks
 
 #: First word of an id -> title of the page.
 PAGES = {
@@ -94,7 +92,20 @@ class Case:
 
     def load(self) -> Callable[[Checks], None]:
         """Import what the case uses; return the function that carries it out."""
-        names = _names(self)
+        import math
+        from fractions import Fraction
+
+        import mpmath
+        import numpy as np
+
+        names: dict[str, Any] = {"math": math, "np": np, "mp": mpmath.mp, "Fraction": Fraction}
+        for script in self.common["scripts"]:
+            names |= _functions(self.path.parent / script)
+        for line in self.common["use"]:
+            module, _, wanted = line.partition(":")
+            found = import_module(module.strip())
+            names |= {name.strip(): getattr(found, name.strip()) for name in wanted.split(",")}
+        _let(self.common["let"], names)
 
         def run(checks: Checks) -> None:
             for step in self.steps:
@@ -225,25 +236,6 @@ def stress_cases(names: Iterable[str] = (), *, slow: bool = True, files: Iterabl
     )
 
 
-def _names(case: Case) -> dict[str, Any]:
-    """Names that the expressions of a case may use."""
-    import math
-    from fractions import Fraction
-
-    import mpmath
-    import numpy as np
-
-    names: dict[str, Any] = {"math": math, "np": np, "mp": mpmath.mp, "Fraction": Fraction}
-    for script in case.common["scripts"]:
-        names |= _functions(case.path.parent / script)
-    for line in case.common["use"]:
-        module, _, wanted = line.partition(":")
-        found = import_module(module.strip())
-        names |= {name.strip(): getattr(found, name.strip()) for name in wanted.split(",")}
-    _let(case.common["let"], names)
-    return names
-
-
 @cache
 def _functions(path: Path) -> dict[str, Any]:
     return {name: value for name, value in runpy.run_path(str(path)).items() if not name.startswith("__")}
@@ -257,7 +249,14 @@ def _carry_out(step: dict[str, Any], names: dict[str, Any], checks: Checks) -> N
         if "when" in step and not _value(step["when"], scope):
             continue
         with scope["mp"].workdps(step["digits"]) if "digits" in step else nullcontext():
-            _act(step, scope, checks)
+            _let(step.get("let", {}), scope)
+            for name, expression in step.get("collect", {}).items():
+                scope[name].append(_value(expression, scope))
+            for kind in KINDS:
+                if kind in step:
+                    _compare(kind, step, scope, checks)
+            for inner in step.get("step", ()):
+                _carry_out(inner, scope, checks)
 
 
 def _scopes(loops: list[str], names: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -269,17 +268,6 @@ def _scopes(loops: list[str], names: dict[str, Any]) -> Iterator[dict[str, Any]]
         scope = dict(names)
         _bind(targets, value, scope)
         yield from _scopes(loops[1:], scope)
-
-
-def _act(step: dict[str, Any], names: dict[str, Any], checks: Checks) -> None:
-    _let(step.get("let", {}), names)
-    for name, expression in step.get("collect", {}).items():
-        names[name].append(_value(expression, names))
-    for kind in KINDS:
-        if kind in step:
-            _compare(kind, step, names, checks)
-    for inner in step.get("step", ()):
-        _carry_out(inner, names, checks)
 
 
 def _let(table: dict[str, Any], names: dict[str, Any]) -> None:

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import math
-from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import graphsynth
-from graphsynth.drawing.pages import whole_page
-from graphsynth.evidence.stress.checks import SEVERITY, Check, Status
-
-if TYPE_CHECKING:
-    from graphsynth.evidence.stress.running import Outcome, StressReport
+from graphsynth.drawing.pages import template, whole_page
+from graphsynth.evidence.stress.checks import SEVERITY, Status
+from graphsynth.evidence.stress.running import Outcome, StressReport
 
 _CSS = """
 :root{color-scheme:light dark;--ink:#1b2733;--soft:#5b6875;--paper:#fff;--card:#f5f7f9;--rule:#d5dbe1;
@@ -49,40 +45,51 @@ td,td.num{border:0;padding:0;text-align:left;white-space:normal}td:empty{display
 td[data-name]::before{content:attr(data-name) ": ";color:var(--soft)}td:first-child{font-weight:600}}
 """
 
-_HEAD = (
-    '<div class="head"><span>case</span><span>what</span><span>status</span><span>error of allowed</span>'
-    "<span>time</span></div>"
-)
+_PAGE = """<h1>Stress cases</h1><p>{{ report.statement }}</p>
+<p>Each case compares results of the library with the right values, which come from printed tables, closed forms or
+computations with many digits. <b>ok</b>: all numbers are within the error allowed. <b>flagged</b>: the situation is
+extreme, and the library reports it as required. <b>WRONG</b>: anything else. Open a case to see its comparisons.</p>
+{%- if left %}<p>Left out because they are slow: {{ left }}.</p>{% endif %}
+{%- if lost %}<p class="not-run">Interrupted, not reached: {{ lost }}.</p>{% endif %}<ul class="facts">
+{%- for status, number in facts %}<li><b class="{{ status | css if number else "ok" }}">{{ number }}</b>
+{{- status.value }}</li>{% endfor %}<li><b>{{ "%.0f" | format(report.seconds) }} s</b>run time</li></ul>
+{%- for title, outcomes in pages.items() %}<h2>{{ title }}</h2><div class="head"><span>case</span><span>what</span>
+<span>status</span><span>error of allowed</span><span>time</span></div>
+{%- for outcome in outcomes -%}
+<details{% if outcome.status.value == "WRONG" %} open{% endif %} id="{{ outcome.case.name }}"><summary>
+<span><code>{{ outcome.case.name }}</code></span><span>{{ outcome.case.title }}</span>
+<span class="{{ outcome.status | css }}">{{ outcome.status.value }}</span><span>{{ outcome | worst }}</span>
+<span>{{ "%.2f" | format(outcome.seconds) }} s</span></summary>
+{%- if outcome.reason %}<p class="{{ outcome.status | css }}">{{ outcome.reason }}</p>{% endif -%}
+<div class="scroll"><table><thead><tr><th>what</th><th>right</th><th>given</th><th>error</th><th>allowed</th>
+<th>status</th><th>source of the right value</th></tr></thead><tbody>
+{%- for check in outcome.checks %}<tr><td>{{ check.what }}</td><td data-name="right">{{ check.right }}</td>
+<td data-name="given">{{ check.given }}</td>
+{%- for name, value in (("error", check.error), ("allowed", check.bound)) %}
+{%- if check.error == check.error %}<td class="num" data-name="{{ name }}">{{ "%.2e" | format(value) }}</td>
+{%- else %}<td></td>{% endif %}{% endfor -%}
+<td class="{{ check.status | css }}">{{ check.status.value }}</td>
+<td data-name="source of the right value">{{ check.source }}</td></tr>
+{%- endfor %}</tbody></table></div></details>
+{%- endfor %}{% endfor %}<p class="soft">graphsynth {{ version }}</p>"""
 
 
 def stress_html(report: StressReport) -> str:
     """Return the page of a run as one string; values are escaped, nothing is loaded from elsewhere."""
-    facts = "".join(
-        f'<li><b class="{_class(status) if number else "ok"}">{number}</b>{status.value}</li>'
-        for status in SEVERITY
-        if (number := report.count(status)) or status is Status.WRONG
-    )
-    pages = [
-        f"<h2>{escape(title)}</h2>{_HEAD}" + "".join(map(_case, chosen))
-        for title in dict.fromkeys(o.case.page_title for o in report.outcomes)
-        if (chosen := [o for o in report.outcomes if o.case.page_title == title])
-    ]
+    pages: dict[str, list[Outcome]] = {}
+    for outcome in report.outcomes:
+        pages.setdefault(outcome.case.page_title, []).append(outcome)
+    facts = [(status, report.count(status)) for status in SEVERITY]
     left, lost = (", ".join(case.name for case in cases) for cases in (report.left_out, report.not_reached))
-    return whole_page(
-        "Stress cases",
-        _CSS,
-        "<h1>Stress cases</h1>"
-        f"<p>{escape(report.statement)}</p>"
-        + "<p>Each case compares results of the library with the right values, which come from printed tables, closed "
-        "forms or computations with many digits. <b>ok</b>: all numbers are within the error allowed. <b>flagged</b>: "
-        "the situation is extreme, and the library reports it as required. <b>WRONG</b>: anything else. Open a case to "
-        "see its comparisons.</p>"
-        + (f"<p>Left out because they are slow: {escape(left)}.</p>" if left else "")
-        + (f'<p class="not-run">Interrupted, not reached: {escape(lost)}.</p>' if lost else "")
-        + f'<ul class="facts">{facts}<li><b>{report.seconds:.0f} s</b>run time</li></ul>'
-        + "".join(pages)
-        + f'<p class="soft">graphsynth {escape(graphsynth.__version__)}</p>',
+    body = template(_PAGE, css=_class, worst=_worst).render(
+        report=report,
+        pages=pages,
+        facts=[(status, number) for status, number in facts if number or status is Status.WRONG],
+        left=left,
+        lost=lost,
+        version=graphsynth.__version__,
     )
+    return whole_page("Stress cases", _CSS, body)
 
 
 def write_report(report: StressReport, folder: Path) -> tuple[Path, Path]:
@@ -98,31 +105,8 @@ def _class(status: Status) -> str:
     return status.value.replace(" ", "-")
 
 
-def _case(outcome: Outcome) -> str:
-    status, worst = outcome.status, outcome.worst
-    error = ""
-    if worst and not math.isnan(worst.error):
-        error = f"{worst.error:.1e} of {worst.bound:.1e}" if worst.error or worst.bound else "none: exact"
-    opened = " open" if status is Status.WRONG else ""
-    rows = "".join(map(_row, outcome.checks))
-    reason = f'<p class="{_class(status)}">{escape(outcome.reason)}</p>' if outcome.reason else ""
-    return (
-        f'<details{opened} id="{outcome.case.name}"><summary><span><code>{outcome.case.name}</code></span>'
-        f'<span>{escape(outcome.case.title)}</span><span class="{_class(status)}">{status.value}</span>'
-        f"<span>{error}</span><span>{outcome.seconds:.2f} s</span></summary>{reason}"
-        '<div class="scroll"><table><thead><tr><th>what</th><th>right</th><th>given</th><th>error</th><th>allowed</th>'
-        f"<th>status</th><th>source of the right value</th></tr></thead><tbody>{rows}</tbody></table></div></details>"
-    )
-
-
-def _row(check: Check) -> str:
-    numbers = ""
-    for name, value in (("error", check.error), ("allowed", check.bound)):
-        missing = math.isnan(check.error)
-        numbers += "<td></td>" if missing else f'<td class="num" data-name="{name}">{value:.2e}</td>'
-    return (
-        f'<tr><td>{escape(check.what)}</td><td data-name="right">{escape(check.right)}</td>'
-        f'<td data-name="given">{escape(check.given)}</td>{numbers}'
-        f'<td class="{_class(check.status)}">{check.status.value}</td>'
-        f'<td data-name="source of the right value">{escape(check.source)}</td></tr>'
-    )
+def _worst(outcome: Outcome) -> str:
+    worst = outcome.worst
+    if not worst or math.isnan(worst.error):
+        return ""
+    return f"{worst.error:.1e} of {worst.bound:.1e}" if worst.error or worst.bound else "none: exact"

@@ -70,11 +70,8 @@ class Outcome:
             "seconds": round(self.seconds, 4),
             "reason": self.reason,
             "checks": [
-                {
-                    **{name: getattr(check, name) for name in ("what", "right", "given", "source")},
-                    **{n: None if math.isnan(v) else v for n, v in (("error", check.error), ("bound", check.bound))},
-                    "status": check.status.value,
-                }
+                {name: None if value != value else value for name, value in vars(check).items()}
+                | {"status": check.status.value}
                 for check in self.checks
             ],
         }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,10 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.moving import Moving
 from graphsynth.drawing.svg import painted, words
+from graphsynth.systems.antenna.mechanism import PointingMechanism
 from graphsynth.systems.antenna.model import Poses, crank_direction, joints, legs
-
-if TYPE_CHECKING:
-    from graphsynth.systems.antenna.mechanism import PointingMechanism
 
 Array = NDArray[np.float64]
 _ROUND = 'stroke-linecap="round" stroke-linejoin="round"'

@@ -7,17 +7,20 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from mpmath import mp
 from numpy.typing import NDArray
+from scipy.optimize import root
 
 from graphsynth.core.checks import finite
 from graphsynth.core.errors import GeometryError
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
-
-if TYPE_CHECKING:
-    from graphsynth.systems.antenna import PointingMechanism
+from graphsynth.systems.antenna import PointingMechanism
+from graphsynth.systems.antenna.loop_equations import loop_equations
+from graphsynth.systems.antenna.precise import precise_angles
+from graphsynth.systems.antenna.scene import antenna_of
 
 Array = NDArray[np.float64]
 _DIGITS = 50
@@ -29,8 +32,6 @@ _ORDER = (_CLOSED, _NEWTON, _SCIPY)
 
 def poses(context: Any, effort: Effort) -> Problem:
     """Poses over the sweep of the scene."""
-    from graphsynth.systems.antenna.scene import antenna_of
-
     return pose_problem(antenna_of(context), context.scene.mechanism.sweep.largest, effort)
 
 
@@ -47,8 +48,6 @@ def rod_angles(mechanism: PointingMechanism, phi_x: float, phi_y: float, near: t
     >>> [round(math.degrees(x), 9) for x in rod_angles(PointingMechanism(), phi, phi, (0.4, 0.4))]
     [23.712080016, 22.447857254]
     """
-    from mpmath import mp
-
     with mp.workdps(_DIGITS + 10):
         l1, rod_y, crank_y, rod_x, crank_x = (mp.mpf(repr(length)) for length in mechanism.lengths)
         x, y = mp.mpf(phi_x), mp.mpf(phi_y)
@@ -110,9 +109,9 @@ def pointing_errors(
 
 
 def _row(method: str, setting: str, run: Callable[[], Array], truth: Array, count: int, effort: Effort) -> Row:
-    found, seconds, rounds = best_of(run, effort)
+    found, *timed = best_of(run, effort)
     error = float(np.abs(found - truth).max())
-    return Row(method, setting, error, seconds / count, rounds, _KIND, _REFERENCE)
+    return Row.of(method, setting, error, timed, many=count, kind=_KIND, reference=_REFERENCE)
 
 
 def _closed(mechanism: PointingMechanism, angles: Array) -> Array:
@@ -126,15 +125,12 @@ def _newton(mechanism: PointingMechanism, angles: Array) -> Array:
 
 def _scipy(mechanism: PointingMechanism, phi: Array, tolerance: float) -> Callable[[], Array]:
     """Continue from pose to pose; the unknowns are shifted by 1, because the step of ``hybr`` scales with them."""
-    from graphsynth.systems.antenna.loop_equations import loop_equations
 
     def residual(y: Array, x: float) -> Array:
         found: Array = loop_equations(mechanism, y[None] - 1.0, np.array([[x, x]]), "corrected").residual[0]
         return found
 
     def run() -> Array:
-        from scipy.optimize import root
-
         y, found = np.ones(12), []
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -168,7 +164,13 @@ def pose_problem(mechanism: PointingMechanism, largest: float, effort: Effort | 
             truth = np.resize(_truths(mechanism, phi)[::-1], (size, 2))
             setting = f"{size} pose{'s' if size > 1 else ''} at once"
             given.append(_row(method, setting, partial(way, mechanism, angles), truth, size, effort))
-    away = _disagreement(mechanism, phi)
+    gaps = (
+        float(abs(p - q))
+        for value in phi.tolist()
+        for p, q in zip(precise_angles(mechanism, value, value), _truth(mechanism, value), strict=True)
+    )
+    far = max(gaps)
+    away = "" if far < 1e-40 else f"the closed form with 50 digits is {far:.1e} rad from the reference"
     rows = []
     for row in sorted(given, key=lambda row: _ORDER.index(row.method)):
         lost = not math.isfinite(row.error) or row.error > 0.01
@@ -187,15 +189,3 @@ def _truths(mechanism: PointingMechanism, phi: Array) -> Array:
     if not mechanism.poses(phi, phi).assembled.all():
         raise GeometryError("the mechanism cannot be assembled at all of these crank angles; lower largest")
     return np.array([[float(x) for x in _truth(mechanism, value)] for value in phi.tolist()])
-
-
-def _disagreement(mechanism: PointingMechanism, phi: Array) -> str:
-    """Why the closed form with 50 digits is not what the lengths of the rods give; "" if it is."""
-    from graphsynth.systems.antenna.precise import precise_angles
-
-    away = max(
-        float(abs(p - q))
-        for value in phi.tolist()
-        for p, q in zip(precise_angles(mechanism, value, value), _truth(mechanism, value), strict=True)
-    )
-    return "" if away < 1e-40 else f"the closed form with 50 digits is {away:.1e} rad from the reference"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,88 +118,103 @@ def _critical_points(c1: float, s1: float, c2: float, s2: float) -> list[float]:
 class _Own(NamedTuple):
     """P, Q, K of a leg and their derivatives along the path."""
 
-    p: float
-    q: float
-    k: float
-    dp: float
-    dq: float
-    dk: float
-
-    def touching(self) -> tuple[float, float, int]:
-        """Output of the leg at its fold, from ``atan2`` without the square root; coefficient and assembled side.
-
-        ``C = sqrt(2 |dF/dt| / |d2F/dy2|)`` with ``F = A cos y + B sin y - K``; there ``d2F/dy2 = -K``.  The root is
-        real for growing t if ``dF + F_yy dy^2 / 2 = 0`` says so.
-        """
-        y = math.remainder(math.atan2(self.q, self.p) + (0.0 if self.k > 0.0 else math.pi), math.tau)
-        slope = self.dp * math.cos(y) + self.dq * math.sin(y) - self.dk
-        return y, math.sqrt(2.0 * abs(slope / self.k)), 1 if slope * self.k > 0.0 else -1
+    p: Any
+    q: Any
+    k: Any
+    dp: Any
+    dq: Any
+    dk: Any
 
 
 @dataclass(frozen=True)
 class Path:
-    """Crank angles ``offset + t * direction`` on one assembly mode."""
+    """Crank angles ``offset + t * direction`` on one assembly mode; with mpmath as ``context`` in many digits."""
 
     mechanism: PointingDimensions
-    offset: tuple[float, float]
+    offset: tuple[Any, Any]
     direction: tuple[float, float]
     s_y: int = 1
     s_x: int = -1
+    context: Any = math
 
-    def legs(self) -> tuple[Leg, Leg, float]:
-        """Return the leg solved first, the other one, and l1, all scaled."""
-        scale = scale_of(self.mechanism)
-        return (*solution_order(self.mechanism, scale), self.mechanism.l1 / scale)
+    def legs(self) -> tuple[Leg, Leg, Any]:
+        """Return the leg solved first, the other one, and l1: scaled, or as the decimals that the lengths print as."""
+        if self.context is math:
+            scale = scale_of(self.mechanism)
+            return (*solution_order(self.mechanism, scale), self.mechanism.l1 / scale)
+        first, second = solution_order(self.mechanism)
+        sizes = (first.crank, first.rod, second.crank, second.rod, self.mechanism.l1)
+        c1, r1, c2, r2, l1 = (self.context.mpf(repr(size)) for size in sizes)
+        return first._replace(crank=c1, rod=r1), second._replace(crank=c2, rod=r2), l1
 
     def sign(self, leg: Leg) -> int:
         """Branch sign of a leg."""
         return self.s_y if leg.name == "Y" else self.s_x
 
-    def _own(self, leg: Leg, l1: float, t: float) -> _Own:
+    def _own(self, leg: Leg, l1: Any, t: Any) -> _Own:
         index = 0 if leg.name == "Y" else 1
         rate = self.direction[index]
         phi = self.offset[index] + t * rate
-        s, c = leg.crank * math.sin(phi), leg.crank * math.cos(phi)
-        bend = leg.crank * 2.0 * math.sin(0.5 * phi) ** 2
+        s, c = leg.crank * self.context.sin(phi), leg.crank * self.context.cos(phi)
+        bend = leg.crank * 2.0 * self.context.sin(0.5 * phi) ** 2
         p, q = l1 - bend, leg.side * leg.rod + s
         k = 0.5 * (l1 * l1 + p * p + s * (2.0 * leg.side * leg.rod + s)) / l1
         return _Own(p, q, k, -s * rate, c * rate, rate * (q * c - p * s) / l1)
 
-    def _output(self, leg: Leg, own: _Own, factor: float = 1.0) -> float:
+    def _touching(self, own: _Own) -> tuple[Any, Any, int]:
+        """Output of a leg at its fold, from ``atan2`` without the square root; coefficient and assembled side.
+
+        ``C = sqrt(2 |dF/dt| / |d2F/dy2|)`` with ``F = A cos y + B sin y - K``; there ``d2F/dy2 = -K``.  The root is
+        real for growing t if ``dF + F_yy dy^2 / 2 = 0`` says so.
+        """
+        y = self.context.atan2(own.q * own.k, own.p * own.k)
+        slope = own.dp * self.context.cos(y) + own.dq * self.context.sin(y) - own.dk
+        return y, self.context.sqrt(2.0 * abs(slope / own.k)), 1 if slope * own.k > 0.0 else -1
+
+    def _output(self, leg: Leg, own: _Own, factor: Any = 1.0) -> Any:
         """Output of a leg whose Q counts ``factor`` times; NaN out of reach."""
         p, q, k = own.p, factor * own.q, own.k
         square = p * p + q * q
         rest = square - k * k
-        if rest < 0.0 or square == 0.0:
+        if not rest >= 0.0 or square == 0.0:
             return math.nan
-        root = self.sign(leg) * math.sqrt(rest)
-        return math.atan2(q * k + p * root, p * k - q * root)
+        root = self.sign(leg) * self.context.sqrt(rest)
+        return self.context.atan2(q * k + p * root, p * k - q * root)
 
-    def first(self, t: float) -> float:
+    def first(self, t: Any) -> Any:
         """Angle u of the fixed gimbal axis; NaN out of reach."""
         leg, _, l1 = self.legs()
         return self._output(leg, self._own(leg, l1, t))
 
-    def discriminant(self, t: float, leg: Leg) -> float:
+    def outputs(self, t: Any) -> tuple[Any, Any]:
+        """Elevation and azimuth; both NaN where the mechanism cannot be assembled."""
+        first, second, l1 = self.legs()
+        u = self.first(t)
+        v = self._output(second, self._own(second, l1, t), self.context.cos(u))
+        if math.isnan(v):
+            return math.nan, math.nan
+        return (u, v) if first.name == "Y" else (v, u)
+
+    def discriminant(self, t: Any, leg: Leg) -> Any:
         """``A^2 + B^2 - K^2`` of a leg, scaled; NaN for the second one where the first is out of reach."""
         first, _, l1 = self.legs()
         own = self._own(leg, l1, t)
-        q = own.q if leg == first else own.q * math.cos(self.first(t))
+        q = own.q if leg.name == first.name else own.q * self.context.cos(self.first(t))
         return own.p * own.p + q * q - own.k * own.k
 
-    def at_fold(self, name: str, t: float) -> tuple[float, float, float, int]:
+    def at_fold(self, name: str, t: Any) -> tuple[Any, Any, Any, int]:
         """Elevation, azimuth, square-root coefficient and assembled side (+1: for growing t) at a fold of a leg."""
         first, second, l1 = self.legs()
         one, two = self._own(first, l1, t), self._own(second, l1, t)
         if first.name == name:
-            u, coefficient, side = one.touching()
-            v = self._output(second, two, math.cos(u))
+            u, coefficient, side = self._touching(one)
+            v = self._output(second, two, self.context.cos(u))
         else:
             u = self.first(t)
-            c, s = math.cos(u), math.sin(u)
+            c, s = self.context.cos(u), self.context.sin(u)
             f_u = -one.p * s + one.q * c
             du = -(one.dp * c + one.dq * s - one.dk) / f_u if f_u != 0.0 else math.nan
-            v, coefficient, side = two._replace(q=two.q * c, dq=two.dq * c - two.q * s * du).touching()
+            v, coefficient, side = self._touching(two._replace(q=two.q * c, dq=two.dq * c - two.q * s * du))
         return (u, v, coefficient, side) if first.name == "Y" else (v, u, coefficient, side)
 
 

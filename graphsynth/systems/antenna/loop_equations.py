@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import choice
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.antenna.closed_form import crank_arrays, poses
 from graphsynth.systems.antenna.model import PointingDimensions, Poses, joints
@@ -170,8 +171,7 @@ def loop_equations(
     of `CHARTS`, `scaled` divides the position rows by ``l1``. Rows: three positions of leg Y, three of leg X, direction
     z of both legs (two each), direction x of both.
     """
-    if chart not in CHARTS:
-        raise GeometryError(f"chart = {chart!r} is unknown; use one of {', '.join(map(repr, CHARTS))}")
+    choice("chart", chart, CHARTS)
     angles = np.concatenate([x, phi], axis=1)
     n = len(x)
     l1, l2, l3, l4, l5 = mechanism.lengths
@@ -267,8 +267,7 @@ def check_chart(
     >>> report.rank, report.verdict, report.use
     (11, 'coordinates singular, mechanism regular', 'corrected')
     """
-    if chart not in CHARTS:
-        raise GeometryError(f"chart = {chart!r} is unknown; use one of {', '.join(map(repr, CHARTS))}")
+    choice("chart", chart, CHARTS)
     pose = poses(self, phi_x, phi_y, s_y, s_x)
     if not pose.assembled:
         raise GeometryError(f"no rank at phi_x = {phi_x}, phi_y = {phi_y}: {pose.reasons()[0]}; choose another pose")

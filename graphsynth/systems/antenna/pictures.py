@@ -14,15 +14,15 @@ from graphsynth.drawing.plots import Line, new_figure, themed_svg
 from graphsynth.pipeline.display import chart, unit_in
 from graphsynth.pipeline.products import Picture
 from graphsynth.pipeline.stages import Context
+from graphsynth.systems.antenna.animation import pointing_animation
+from graphsynth.systems.antenna.closed_form import Convention, ModelComparison
+from graphsynth.systems.antenna.mechanism import PointingMechanism
 from graphsynth.systems.antenna.model import Leg, crank_direction, joints, legs, orientation
 from graphsynth.systems.antenna.scene import antenna_of, other_model, table_of, widths_of
+from graphsynth.systems.antenna.stages import AntennaMotion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from graphsynth.systems.antenna.closed_form import Convention, ModelComparison
-    from graphsynth.systems.antenna.mechanism import PointingMechanism
-    from graphsynth.systems.antenna.stages import AntennaMotion
 
 Array = NDArray[np.float64]
 
@@ -343,8 +343,6 @@ def sketches(context: Context) -> tuple[Picture, ...]:
 
 def animations(context: Context, motion: AntennaMotion) -> tuple[Picture, ...]:
     """Let the reflector scan a figure of eight, or follow equal cranks where a fold forbids that."""
-    from graphsynth.systems.antenna.animation import pointing_animation
-
     antenna, largest = antenna_of(context), table_of(context).sweep.largest
     turn = np.linspace(0.0, math.tau, _FRAMES)
     x, y = largest * np.sin(turn), largest * np.sin(2.0 * turn)

@@ -10,8 +10,8 @@ from the fold (theory/extreme-cases 3, case 5).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,9 +21,6 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.systems.antenna.closed_form import poses
 from graphsynth.systems.antenna.folds import Fold, Path
 from graphsynth.systems.antenna.model import Leg, PointingDimensions
-
-if TYPE_CHECKING:
-    from graphsynth.systems.antenna.folds import Fold
 
 
 @dataclass(frozen=True)
@@ -93,22 +90,6 @@ class PreciseFold(NamedTuple):
     coefficient: Any
 
 
-def _exact_terms(mp: Any, mechanism: PointingDimensions, name: str, phi: Any) -> tuple[Any, Any, Any]:
-    l1, l2, l3, l4, l5 = (mp.mpf(repr(length)) for length in mechanism.lengths)
-    crank, rod, side = (l3, l2, -1) if name == "Y" else (l5, l4, 1)
-    p, q = l1 - crank + crank * mp.cos(phi), side * rod + crank * mp.sin(phi)
-    return p, q, (l1 * l1 + p * p + q * q - rod * rod) / (2 * l1)
-
-
-def _linear(mp: Any, a: Any, b: Any, k: Any, sign: int) -> Any:
-    """Solve ``a cos t + b sin t = k`` on a branch; NaN without a real root."""
-    rest = a * a + b * b - k * k
-    if rest < 0:
-        return mp.nan
-    root = sign * mp.sqrt(rest)
-    return mp.atan2(b * k + a * root, a * k - b * root)
-
-
 def precise_angles(
     mechanism: PointingDimensions, phi_x: Any, phi_y: Any, s_y: int = 1, s_x: int = -1, digits: int = 50
 ) -> tuple[Any, Any]:
@@ -128,14 +109,7 @@ def precise_angles(
     from mpmath import mp
 
     with mp.workdps(digits + 15):
-        given = {"Y": (mp.mpf(phi_x), s_y), "X": (mp.mpf(phi_y), s_x)}
-        first, second = ("X", "Y") if mechanism.order == "YX" else ("Y", "X")
-        u = _linear(mp, *_exact_terms(mp, mechanism, first, given[first][0]), given[first][1])
-        p, q, k = _exact_terms(mp, mechanism, second, given[second][0])
-        v = mp.nan if mp.isnan(u) else _linear(mp, p, q * mp.cos(u), k, given[second][1])
-        if mp.isnan(v):
-            return mp.nan, mp.nan
-        return (v, u) if mechanism.order == "YX" else (u, v)
+        return Path(mechanism, (mp.mpf(phi_x), mp.mpf(phi_y)), (0.0, 0.0), s_y, s_x, mp).outputs(0.0)
 
 
 def precise_fold(mechanism: PointingDimensions, fold: Fold, digits: int = 50) -> PreciseFold:
@@ -150,41 +124,12 @@ def precise_fold(mechanism: PointingDimensions, fold: Fold, digits: int = 50) ->
             f"the fold of leg {fold.leg} has order {fold.order}; only simple folds (order 2) are refined"
         )
     with mp.workdps(digits + 20):
-        first, second = ("X", "Y") if mechanism.order == "YX" else ("Y", "X")
-        signs = {"Y": fold.merging[0][0], "X": fold.merging[0][1]}
-        index = {"Y": 0, "X": 1}
-
-        def phi(name: str, t: Any) -> Any:
-            return mp.mpf(fold.offset[index[name]]) + t * mp.mpf(fold.direction[index[name]])
-
-        def coefficients(t: Any) -> tuple[Any, Any, Any, Any]:
-            """Return A, B, K of the folding leg and the output of the other one, if it comes first."""
-            p, q, k = _exact_terms(mp, mechanism, fold.leg, phi(fold.leg, t))
-            if fold.leg == first:
-                return p, q, k, mp.nan
-            u = _linear(mp, *_exact_terms(mp, mechanism, first, phi(first, t)), signs[first])
-            return p, q * mp.cos(u), k, u
-
-        def rest(t: Any) -> Any:
-            a, b, k, _ = coefficients(t)
-            return a * a + b * b - k * k
-
-        begin = mp.mpf(fold.parameter)
-        t = mp.findroot(rest, (begin, begin + mp.mpf("1e-9")), tol=mp.mpf(10) ** (-2 * digits), verify=False)
-        a, b, k, u = coefficients(t)
-        y = mp.atan2(b * k, a * k)
-
-        def residual(s: Any) -> Any:
-            a, b, k, _ = coefficients(s)
-            return a * mp.cos(y) + b * mp.sin(y) - k
-
-        coefficient = mp.sqrt(2 * abs(mp.diff(residual, t) / k))
-        if fold.leg == first:
-            p, q, k = _exact_terms(mp, mechanism, second, phi(second, t))
-            outputs = {first: y, second: _linear(mp, p, q * mp.cos(y), k, signs[second])}
-        else:
-            outputs = {first: u, second: y}
-        return PreciseFold(t, outputs["Y"], outputs["X"], coefficient)
+        path = Path(mechanism, fold.offset, fold.direction, *fold.merging[0], mp)
+        leg = next(leg for leg in path.legs()[:2] if leg.name == fold.leg)
+        begin, tolerance = mp.mpf(fold.parameter), mp.mpf(10) ** (-2 * digits)
+        ends = (begin, begin + mp.mpf("1e-9"))
+        t = mp.findroot(lambda at: path.discriminant(at, leg), ends, tol=tolerance, verify=False)
+        return PreciseFold(t, *path.at_fold(fold.leg, t)[:3])
 
 
 Array = NDArray[np.float64]
@@ -270,22 +215,17 @@ def approach(self: PointingDimensions, fold: Fold, distances: ArrayLike, *, bran
         raise GeometryError(f"the fold of leg {fold.leg} is not simple; its output is no square root of the distance")
     s_y, s_x = fold.merging[0 if branch == 1 else 1]
     path = Path(self, fold.offset, fold.direction, s_y, s_x)
-    which = 0 if path.legs()[0].name == fold.leg else 1
-    sharp = precise_fold(self, fold, 60)
-    at = sharp.a if fold.leg == "Y" else sharp.b
+    which, own = 0 if path.legs()[0].name == fold.leg else 1, 0 if fold.leg == "Y" else 1
+    sharp, exactly = precise_fold(self, fold, 60), replace(path, context=mp)
     rows = []
     for e in distance.tolist():
         step = fold.side * e
         with mp.workdps(75):
-            phi_x, phi_y = (
-                mp.mpf(o) + (sharp.parameter + step) * mp.mpf(d) for o, d in zip(fold.offset, fold.direction)
-            )
-            y = precise_angles(self, phi_x, phi_y, s_y, s_x, 60)[0 if fold.leg == "Y" else 1]
-            exact = mp.arg(mp.expj(y - at))
-            t = fold.parameter + step
-            near_x, near_y = (o + t * d for o, d in zip(fold.offset, fold.direction))
-            got = poses(self, near_x, near_y, s_y, s_x)
-            plain = mp.mpf(float(got.a if fold.leg == "Y" else got.b))
+            y = exactly.outputs(sharp.parameter + step)[own]
+            exact = mp.arg(mp.expj(y - (sharp.a, sharp.b)[own]))
+            near = (o + (fold.parameter + step) * d for o, d in zip(fold.offset, fold.direction))
+            got = poses(self, *near, s_y, s_x)
+            plain = mp.mpf(float((got.a, got.b)[own]))
             error = float("nan") if mp.isnan(plain) else float(abs(mp.arg(mp.expj(plain - y))))
         rows.append((float(exact), deviations(path, fold.leg, fold.parameter, step)[which], error))
     exact_, compensated, plain_error = np.array(rows).reshape(-1, 3).T

@@ -117,7 +117,4 @@ def other_model(context: Context) -> tuple[PointingMechanism, Convention]:
     from graphsynth.systems.antenna import Convention
 
     c = table_of(context).comparison
-    return (
-        replace(antenna_of(context), order=c.order),
-        Convention(c.sense_y, c.sense_x, c.side_y, c.side_x, c.output),
-    )
+    return (replace(antenna_of(context), order=c.order), Convention(c.sense_y, c.sense_x, c.side_y, c.side_x, c.output))

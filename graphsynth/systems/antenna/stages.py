@@ -4,32 +4,32 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.pipeline.display import quantity_table, table, unit_in
 from graphsynth.pipeline.products import Quantity, Record, Table
 from graphsynth.pipeline.stages import Context
+from graphsynth.systems.antenna import (
+    ChartReport,
+    Convention,
+    DeadPoint,
+    Fold,
+    ModelComparison,
+    PassiveAngles,
+    PointingMechanism,
+    PointingSweep,
+    Rates,
+    RootSurvey,
+    Tolerance,
+)
 from graphsynth.systems.antenna.scene import LENGTH_NAMES, antenna_of, other_model, table_of, widths_of
+from graphsynth.systems.antenna.tolerance import outward_text
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from graphsynth.systems.antenna import (
-        ChartReport,
-        Convention,
-        DeadPoint,
-        Fold,
-        ModelComparison,
-        PassiveAngles,
-        PointingMechanism,
-        PointingSweep,
-        Rates,
-        RootSurvey,
-        Tolerance,
-    )
-
+Bounds = tuple[tuple[float, Tolerance], ...]
 _CHECKED_POSES = 9
 _STARTS = 60
 _ROWS = 8
@@ -72,8 +72,6 @@ class SingularPoses:
 
 def sweep(context: Context) -> AntennaMotion:
     """Turn both cranks together on the assembly mode of the rest pose; beyond a fold everything is NaN."""
-    import numpy as np
-
     antenna, table = antenna_of(context), table_of(context).sweep
     phi = np.linspace(0.0, table.largest, table.samples)
     path = antenna.sweep(phi)
@@ -85,8 +83,6 @@ def sweep(context: Context) -> AntennaMotion:
 
 def compare(context: Context) -> ModelComparison:
     """Compare the outputs of the two models over the sweep."""
-    import numpy as np
-
     (other, reading), table = other_model(context), table_of(context).sweep
     phi = np.linspace(0.0, table.largest, table.samples)
     return antenna_of(context).compare(other, phi, other_reading=reading)
@@ -94,8 +90,6 @@ def compare(context: Context) -> ModelComparison:
 
 def cross_check(context: Context, motion: AntennaMotion) -> CrossCheck | None:
     """Solve the twelve equations at some poses of the sweep; None if it cannot start."""
-    import numpy as np
-
     antenna, reached = antenna_of(context), np.flatnonzero(motion.path.reached)
     if reached.size == 0:
         return None
@@ -124,15 +118,13 @@ def cross_check(context: Context, motion: AntennaMotion) -> CrossCheck | None:
 
 def singular_poses(context: Context) -> SingularPoses:
     """Find folds and dead points over a turn of each crank, and the first fold of equal cranks up to half a turn."""
-    import numpy as np
-
     antenna = antenna_of(context)
     path = antenna.sweep(np.linspace(0.0, math.pi, 181))
     folds, dead = antenna.folds("Y") + antenna.folds("X"), antenna.dead_points("Y") + antenna.dead_points("X")
     return SingularPoses(folds, dead, path.fold, path.message)
 
 
-def tolerances(context: Context) -> tuple[tuple[float, Tolerance], ...]:
+def tolerances(context: Context) -> Bounds:
     """Prove bounds of both outputs at the equal crank angles asked for, radians."""
     antenna, widths = antenna_of(context), widths_of(context)
     found = []
@@ -160,22 +152,23 @@ def assess(
     comparison: ModelComparison,
     check: CrossCheck | None,
     singular: SingularPoses,
-    bounds: tuple[tuple[float, Tolerance], ...],
+    bounds: Bounds,
 ) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
     """Give the verdict and the tables."""
     margins = _margins(context, motion, comparison, bounds)
-    record = _verdict(context, motion, comparison, bounds, margins)
+    words, good = _verdict(context, motion, comparison, bounds)
+    record = Record(recognised_as="pointing mechanism", verdict=words, good=good, margins=tuple(margins))
     note = "Angles are of the closed form, bounds are proved by intervals."
-    rows = ((motion.phi[k], *motion.rates.jacobian[k].ravel()) for k in _every(motion.phi.size))
     ratios = ("∂elevation/∂φx", "∂elevation/∂φy", "∂azimuth/∂φx", "∂azimuth/∂φy")
-    columns = ("cranks [°] | .6g", *(f"{name} | 14 .12g" for name in ratios))
+    slopes = motion.rates.jacobian.reshape(-1, 4).T
+    columns = {"cranks [°] | .6g": motion.phi} | {f"{name} | 14 .12g": s for name, s in zip(ratios, slopes)}
     tables = [
         quantity_table("Results", margins, note),
         _structure_table(context),
         _sweep_table(motion, comparison),
         _conventions_table(context),
         _tolerance_table(context, bounds),
-        table("Velocities of the reflector over those of the cranks", columns, rows, "Closed form; no unit."),
+        _over_sweep("Velocities of the reflector over those of the cranks", columns, "Closed form; no unit."),
         _modes_table(context),
         _singular_table(singular),
     ]
@@ -188,18 +181,7 @@ def _degrees(angle: float) -> str:
     return f"{math.degrees(angle):.10g}°"
 
 
-def _every(count: int, rows: int = _ROWS) -> list[int]:
-    return sorted({round(i * (count - 1) / rows) for i in range(rows + 1)})
-
-
-def _margins(
-    context: Context,
-    motion: AntennaMotion,
-    comparison: ModelComparison,
-    bounds: tuple[tuple[float, Tolerance], ...],
-) -> tuple[Quantity, ...]:
-    import numpy as np
-
+def _margins(context: Context, motion: AntennaMotion, comparison: ModelComparison, bounds: Bounds) -> list[Quantity]:
     limits = table_of(context).sweep
     poses, last, ends = motion.path.poses, motion.phi.size - 1, f"at {_degrees(limits.largest)}"
     found = []
@@ -222,19 +204,13 @@ def _margins(
             worst = max(map(abs, side.deviation))
             if math.isfinite(worst):
                 found.append(Quantity(f"largest deviation of the {name} at {_degrees(at)}", worst, "″", "certified"))
-    return tuple(found)
+    return found
 
 
-def _verdict(
-    context: Context,
-    motion: AntennaMotion,
-    comparison: ModelComparison,
-    bounds: tuple[tuple[float, Tolerance], ...],
-    margins: tuple[Quantity, ...],
-) -> Record:
-    name = "pointing mechanism"
+def _verdict(context: Context, motion: AntennaMotion, comparison: ModelComparison, bounds: Bounds) -> tuple[str, bool]:
+    """Return the verdict, and whether it is good news."""
     if not motion.path.reached.all():
-        return Record(recognised_as=name, verdict=motion.path.message, good=False, margins=margins)
+        return motion.path.message, False
     undecided = [at for at, found in bounds if found.status]
     difference = float(comparison.arcminutes[-1])
     words = "the second model cannot be assembled throughout"
@@ -247,7 +223,7 @@ def _verdict(
 
         worst = max(max(map(abs, side.deviation)) for _, found in bounds for side in (found.a, found.b))
         words += f"; tolerances move the beam by at most {outward_text(worst, 1, 2)[1:]}″ about either axis (certified)"
-    return Record(recognised_as=name, verdict=words, good=not undecided, margins=margins)
+    return words, not undecided
 
 
 def _structure_table(context: Context) -> Table:
@@ -265,40 +241,30 @@ def _structure_table(context: Context) -> Table:
     return table("Structure", ("quantity", "value", "guarantee"), rows, note)
 
 
+def _over_sweep(title: str, columns: dict[str, NDArray[Any]], note: str) -> Table:
+    """Lay out some poses of the sweep; each column has all values of the sweep."""
+    last = len(next(iter(columns.values()))) - 1
+    picked = sorted({round(i * last / _ROWS) for i in range(_ROWS + 1)})
+    return table(title, tuple(columns), zip(*(values[picked].tolist() for values in columns.values())), note)
+
+
 def _sweep_table(motion: AntennaMotion, comparison: ModelComparison) -> Table:
-    poses = motion.path.poses
-    rows = (
-        (
-            motion.phi[k],
-            poses.a[k],
-            poses.b[k],
-            poses.a[k] - poses.b[k],
-            comparison.a[1, k],
-            comparison.b[1, k],
-            f"{comparison.arcminutes[k]:.9g}",
-        )
-        for k in _every(motion.phi.size)
-    )
-    columns = (
-        "cranks [°] | .6g",
-        "elevation [°] | 12 .12g",
-        "azimuth [°] | 12 .12g",
-        "elevation − azimuth [′] | 10 .9g",
-        "elevation, second model [°] | 12 .12g",
-        "azimuth, second model [°] | 12 .12g",
-        "difference of means [′]",
-    )
-    ended = motion.path.message
+    poses, ended = motion.path.poses, motion.path.message
+    columns = {
+        "cranks [°] | .6g": motion.phi,
+        "elevation [°] | 12 .12g": poses.a,
+        "azimuth [°] | 12 .12g": poses.b,
+        "elevation − azimuth [′] | 10 .9g": poses.a - poses.b,
+        "elevation, second model [°] | 12 .12g": comparison.a[1],
+        "azimuth, second model [°] | 12 .12g": comparison.b[1],
+        "difference of means [′]": np.array([f"{minutes:.9g}" for minutes in comparison.arcminutes]),
+    }
     note = f"Closed form; rounding error about 1e-16 rad over the sines to the folds. {ended[:1].upper()}{ended[1:]}."
-    return table("Both cranks together, two models", columns, rows, note)
+    return _over_sweep("Both cranks together, two models", columns, note)
 
 
 def _conventions_table(context: Context) -> Table:
     """Compare other conventions and length errors: which of them could explain a difference that was seen."""
-    import numpy as np
-
-    from graphsynth.systems.antenna import Convention
-
     antenna, largest = antenna_of(context), table_of(context).sweep.largest
     phi = largest * np.array([0.125, 0.25, 0.375, 0.5, 0.75, 1.0])
     swapped = antenna.other_order()
@@ -313,11 +279,13 @@ def _conventions_table(context: Context) -> Table:
         ("cardans farther by 0.5 mm", replace(antenna, l1=antenna.l1 + 5e-4), Convention()),
         ("crank of leg Y longer by 0.5 mm", replace(antenna, l3=antenna.l3 + 5e-4), Convention()),
     ]
-    rows = []
+    rows, here = [], antenna.poses(phi, phi)
     for name, other, reading in cases:
         minutes = antenna.compare(other, phi, other_reading=reading).arcminutes
-        if name.endswith("reversed"):
-            minutes = _sizes(antenna, phi, reading)
+        if name.endswith("reversed"):  # their outputs are counted positive in the direction in which the cranks turn
+            there = antenna.poses(reading.sense_y * phi, reading.sense_x * phi)
+            gap = reading.sense_y * there.a - here.a + reading.sense_x * there.b - here.b
+            minutes = 0.5 * np.asarray(unit_in("[′]").from_si(gap))
         rows.append((name, *minutes))
     columns = ("change", *(f"{math.degrees(x):g}° | 3 .3f" for x in phi))
     note = (
@@ -327,18 +295,7 @@ def _conventions_table(context: Context) -> Table:
     return table("What makes two models disagree", columns, rows, note)
 
 
-def _sizes(antenna: PointingMechanism, phi: NDArray[np.float64], reading: Convention) -> NDArray[np.float64]:
-    """Difference of means, minutes of arc, if reversed cranks are counted positive in the direction they turn."""
-    import numpy as np
-
-    here, there = antenna.poses(phi, phi), antenna.poses(reading.sense_y * phi, reading.sense_x * phi)
-    gap = reading.sense_y * there.a - here.a + reading.sense_x * there.b - here.b
-    return np.asarray(0.5 * unit_in("[′]").from_si(gap))
-
-
-def _tolerance_table(context: Context, bounds: tuple[tuple[float, Tolerance], ...]) -> Table:
-    from graphsynth.systems.antenna.tolerance import outward_text
-
+def _tolerance_table(context: Context, bounds: Bounds) -> Table:
     rows: list[tuple[object, ...]] = []
     for phi, found in bounds:
         for name, side in (("elevation", found.a), ("azimuth", found.b)):
@@ -434,20 +391,8 @@ def _check_table(check: CrossCheck) -> Table:
 
 def _unknowns_table(check: CrossCheck) -> Table:
     ends = (0, check.phi.size // 2, check.phi.size - 1)
-    names = (
-        "x1 cardan of leg Y",
-        "x2",
-        "x3 ball joint of leg Y",
-        "x4",
-        "x5",
-        "x6 elevation",
-        "x7 cardan of leg X",
-        "x8",
-        "x9 ball joint of leg X",
-        "x10",
-        "x11",
-        "x12 azimuth",
-    )
-    rows = ((name, *(check.angles[k, i] for k in ends)) for i, name in enumerate(names))
+    named = {1: "cardan of leg Y", 3: "ball joint of leg Y", 6: "elevation"}
+    named |= {7: "cardan of leg X", 9: "ball joint of leg X", 12: "azimuth"}
+    rows = ((f"x{i + 1} {named.get(i + 1, '')}".rstrip(), *(check.angles[k, i] for k in ends)) for i in range(12))
     columns = ("angle", *(f"at cranks {math.degrees(check.phi[k]):g}° [°] | 12 .12g" for k in ends))
     return table("The twelve unknowns", columns, rows, "Of the equations; the closed form gives the same.")

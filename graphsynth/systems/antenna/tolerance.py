@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
+from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from enum import IntEnum
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -32,13 +33,17 @@ INFLATIONS, SHRINKS = 40, 8
 PLACES = {"Y": (0, 2, 1), "X": (0, 4, 3)}
 
 
+#: Intervals of the five lengths, or of derivatives by them.
+Box = tuple[Any, ...]
+
+
 class OutputEnclosure(NamedTuple):
     """Intervals of both outputs and of their derivatives by the five lengths, for every length in the box."""
 
     u: Any
     v: Any
-    du: tuple[Any, ...]
-    dv: tuple[Any, ...]
+    du: Box
+    dv: Box
 
 
 class NoProof(Exception):  # noqa: N818  (a result that is caught, not an error)
@@ -50,7 +55,7 @@ class NoProof(Exception):  # noqa: N818  (a result that is caught, not an error)
         self.spread = spread
 
 
-def middle_of(box: tuple[Any, ...]) -> tuple[Any, ...]:
+def middle_of(box: Box) -> Box:
     """Return a point of the box near its middle, of full precision.
 
     Rounded to double it could lie outside a narrow box, and the mean-value form does not hold on the way to it.
@@ -122,7 +127,7 @@ class LengthBoxProblem:
         a, b = float(pose.a), float(pose.b)
         return (b, a) if self.mechanism.order == "YX" else (a, b)
 
-    def terms(self, leg: Leg, lengths: tuple[Any, ...], output: Any, u: Any) -> _Terms:
+    def terms(self, leg: Leg, lengths: Box, output: Any, u: Any) -> _Terms:
         """Equation ``P (cos y - 1) + Q cos u sin y - lift / l1 = 0`` of a leg; ``u`` is None for the first leg."""
         sine, bend = self._crank[leg.name]
         l1, crank, rod = (lengths[i] for i in PLACES[leg.name])
@@ -142,16 +147,14 @@ class LengthBoxProblem:
             0 if u is None else -q * self._sine(u) * s,
         )
 
-    def _gradient(self, leg: Leg, terms: _Terms, du: tuple[Any, ...] | None) -> tuple[Any, ...]:
+    def _gradient(self, leg: Leg, terms: _Terms, du: Box | None) -> Box:
         """Numerators of the derivatives of an output by the five lengths."""
         parts = [self.iv.mpf(0)] * 5
         for place, part in zip(PLACES[leg.name], terms.by_lengths):
             parts[place] = part
         return tuple(parts) if du is None else tuple(part + terms.by_u * rate for part, rate in zip(parts, du))
 
-    def _prove(
-        self, leg: Leg, box: tuple[Any, ...], middle: tuple[Any, ...], start: float, u: Any, u_mid: Any, du: Any
-    ) -> Any:
+    def _prove(self, leg: Leg, box: Box, middle: Box, start: float, u: Any, u_mid: Any, du: Any) -> Any:
         """Interval Newton with inflation: an interval that holds exactly one root for every length in the box."""
         iv = self.iv
         centre = iv.mpf(start)
@@ -176,9 +179,7 @@ class LengthBoxProblem:
             trial = iv.mpf([(low - reach).a, (high + reach).b])
         raise NoProof(leg.name, spread)
 
-    def _shrink(
-        self, leg: Leg, box: tuple[Any, ...], middle: tuple[Any, ...], output: Any, at_mid: Any, u: Any, du: Any
-    ) -> tuple[Any, tuple[Any, ...]]:
+    def _shrink(self, leg: Leg, box: Box, middle: Box, output: Any, at_mid: Any, u: Any, du: Any) -> tuple[Any, Box]:
         """Mean-value form, repeated until it stops shrinking: the output and its gradient over the box."""
         for _ in range(SHRINKS):
             terms = self.terms(leg, box, output, u)
@@ -193,13 +194,13 @@ class LengthBoxProblem:
                 break
         return output, gradient
 
-    def enclose(self, box: tuple[Any, ...]) -> OutputEnclosure:
+    def enclose(self, box: Box) -> OutputEnclosure:
         """Enclose both outputs and their gradients over a box of lengths; `NoProof` if a fold is in or near it."""
         middle = middle_of(box)
         starts = self.nominal(tuple(float(length.a) for length in middle))
         if math.isnan(starts[0]):
             raise NoProof(self.legs[1].name, math.inf)
-        found: list[tuple[Any, tuple[Any, ...]]] = []
+        found: list[tuple[Any, Box]] = []
         u_mid = None
         for leg, start in zip(self.legs, starts):
             u, du = found[0] if found else (None, None)
@@ -307,21 +308,17 @@ def outward_text(value: float, side: int, places: int = 4) -> str:
     """
     if not math.isfinite(value):
         return str(value)
-    from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
-
     digits = Decimal(value).quantize(Decimal(1).scaleb(-places), ROUND_FLOOR if side < 0 else ROUND_CEILING)
     return f"{digits:+f}"
 
 
-def _box(problem: LengthBoxProblem, widths: tuple[float, ...]) -> tuple[Any, ...]:
+def _box(problem: LengthBoxProblem, widths: tuple[float, ...]) -> Box:
     iv = problem.iv
     around = iv.mpf([1.0 - problem.slack, 1.0 + problem.slack])
     return tuple((iv.mpf(l) + iv.mpf([-w, w])) * around for l, w in zip(problem.mechanism.lengths, widths))
 
 
-def _face_bound(
-    problem: LengthBoxProblem, box: tuple[Any, ...], found: OutputEnclosure, which: int, upward: bool
-) -> Any:
+def _face_bound(problem: LengthBoxProblem, box: Box, found: OutputEnclosure, which: int, upward: bool) -> Any:
     """Bound of one output with every proved monotone length at its end, the others in mean-value form (step 3)."""
     iv = problem.iv
     gradient = found.dv if which else found.du

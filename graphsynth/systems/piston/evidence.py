@@ -5,29 +5,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import mpmath
 import numpy as np
 
 from graphsynth.core.errors import GeometryError
+from graphsynth.evidence.position import position_problem
 from graphsynth.evidence.rows import Effort, Problem, Row, best_of
-
-if TYPE_CHECKING:
-    from graphsynth.systems.piston.loads import CompressorCycle
-    from graphsynth.systems.piston.machine import PistonMachine
+from graphsynth.systems.piston.loads import CompressorCycle
+from graphsynth.systems.piston.machine import PistonMachine
+from graphsynth.systems.piston.stages import machines_of
+from graphsynth.systems.piston.turn import piston_turn
 
 
 def _first(context: Any) -> Any:
-    from graphsynth.systems.piston.stages import machines_of
-
     kind, machine = machines_of(context)[0]
     return kind.replace("_", "-"), machine
 
 
 def positions(context: Any, effort: Effort) -> Problem:
     """Measure the motion of the first machine of the scene."""
-    from graphsynth.evidence.position import position_problem
-
     name, machine = _first(context)
     return position_problem(machine.mechanism.mechanism("crowned"), f"the floating piston on a {name}", effort=effort)
 
@@ -67,9 +65,6 @@ def work_problem(machine: PistonMachine, name: str, effort: Effort | None = None
 
     A `GeometryError` refuses a gas law without work.
     """
-    from graphsynth.systems.piston.loads import CompressorCycle
-    from graphsynth.systems.piston.turn import piston_turn
-
     effort = effort or Effort()
     exact = machine.gas.work(machine.mechanism.stroke)
     reference = "area of the p-V diagram, closed form of the gas law"
@@ -110,8 +105,6 @@ def precise_work(gas: CompressorCycle, stroke: float) -> Any:
     >>> abs(float(precise_work(gas, 0.1)) / gas.work(0.1) - 1.0) < 1e-15
     True
     """
-    import mpmath
-
     with mpmath.workdps(50):
         low, high, c, n = (mpmath.mpf(float(v)) for v in (gas.suction, gas.discharge, gas.clearance, gas.exponent))
         area = mpmath.pi * mpmath.mpf(gas.bore) ** 2 / 4

@@ -9,7 +9,6 @@ import cmath
 import math
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +16,9 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.plots import Chart, Line, Mark
 from graphsynth.drawing.sketch import Sketch, degrees
-
-if TYPE_CHECKING:
-    from graphsynth.kinematics.engine.result import Motion
-    from graphsynth.systems.piston.machine import PistonMachine
-    from graphsynth.systems.piston.model import FloatingPiston
+from graphsynth.kinematics.engine.result import Motion
+from graphsynth.systems.piston.machine import PistonMachine
+from graphsynth.systems.piston.model import FloatingPiston
 
 Array = NDArray[np.float64]
 
@@ -138,10 +135,9 @@ class _Drawing:
             self.sketch.on(layer="bar")
             self.sketch.bar(self.crosshead, self.crosshead + group.lead)
             slot = cmath.exp(1j * group.slot_angle)
-            ends = [self._slot_end(sense, self.crosshead) for sense in (1.0, -1.0)]
-            side = 0.16j * self.r * slot
+            head, foot = (self._slot_end(sense, self.crosshead) for sense in (1.0, -1.0))
             self.sketch.on(layer="block")
-            self.sketch.outline([ends[0] + side, ends[1] + side, ends[1] - side, ends[0] - side])
+            self._block(0.5 * (head + foot), slot, abs(head - foot) / self.r, 0.32)
             self._block(self._on_axis(self.place), slot, 0.42, 0.3, filled=True)
             self._block(self.crosshead + self.shoe, 1.0 + 0j, 0.7, 0.4)
         self.sketch.on()
@@ -155,13 +151,10 @@ class _Drawing:
             sketch.joint(self.crosshead)
         else:
             along = cmath.exp(1j * self.machine.drive.yoke_angle)  # type: ignore[union-attr]
-            half = 1.75 * self.r / math.sin(self.machine.drive.yoke_angle) * along  # type: ignore[union-attr]
-            side = 0.2j * self.r * along
-            middle = self.crosshead
             sketch.on(layer="plate")
-            sketch.outline([middle + half + side, middle - half + side, middle - half - side, middle + half - side])
+            self._block(self.crosshead, along, 3.5 / along.imag, 0.4)
             sketch.on(layer="bar")
-            sketch.bar(middle, middle + self.shoe)
+            sketch.bar(self.crosshead, self.crosshead + self.shoe)
             sketch.on(layer="joint")
             self._block(self.pin, along, 0.6, 0.4, filled=True)
         sketch.on(layer="joint")

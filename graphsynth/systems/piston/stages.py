@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.pipeline.display import table
 from graphsynth.pipeline.products import Candidate, Picture, Quantity, Recognised, Record, Table, exact
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.steps import recognise_by_key
+from graphsynth.structure.graph import MechanismGraph
+from graphsynth.systems.piston.loads import CompressorCycle, ConstantForce, PistonFriction, PistonMasses
+from graphsynth.systems.piston.machine import PistonMachine
+from graphsynth.systems.piston.model import CrankSlider, FloatingGroup, FloatingPiston, ScotchYoke
+from graphsynth.systems.piston.spaces import Assignment, LoopSpaces, loop_spaces, rotary_assignments
+from graphsynth.systems.piston.turn import PistonComparison, PistonTurn, compare_pistons
 
-if TYPE_CHECKING:
-    from graphsynth.systems.piston.machine import PistonMachine
-    from graphsynth.systems.piston.spaces import Assignment, LoopSpaces
-    from graphsynth.systems.piston.turn import PistonComparison, PistonTurn
-
-    Loops = tuple[tuple[tuple[str, LoopSpaces], ...], tuple[Assignment, ...]]
-
+Loops = tuple[tuple[tuple[str, LoopSpaces], ...], tuple[Assignment, ...]]
 _KINDS = {"crank_slider": "crank-slider", "scotch_yoke": "Scotch yoke"}
 _POSES = (1.0, 4.0)
 
@@ -49,8 +51,6 @@ class Turn:
 
 def recognise(context: Context, candidates: tuple[Candidate, ...]) -> tuple[Recognised, ...]:
     """Mark the candidates isomorphic to the graph with the crowned slot, whose count in one space is right."""
-    from graphsynth.structure.graph import MechanismGraph
-
     known = MechanismGraph(5, [(0, 1), (1, 2), (2, 3), (0, 3), (0, 4), (3, 4, 2)], frame=0)
     return recognise_by_key(candidates, known, "floating_piston")
 
@@ -65,10 +65,6 @@ def machines_of(context: Context) -> tuple[tuple[str, PistonMachine], ...]:
 
 
 def _machine(own: Any, kind: str) -> PistonMachine:
-    from graphsynth.systems.piston.loads import CompressorCycle, ConstantForce, PistonFriction, PistonMasses
-    from graphsynth.systems.piston.machine import PistonMachine
-    from graphsynth.systems.piston.model import CrankSlider, FloatingGroup, FloatingPiston, ScotchYoke
-
     def values(part: Any, **changed: float) -> dict[str, Any]:
         return {item.name: getattr(part, item.name) for item in fields(part)} | changed
 
@@ -90,8 +86,6 @@ def _machine(own: Any, kind: str) -> PistonMachine:
 
 def loops(context: Context) -> Loops:
     """Find the spaces of the loops of every machine, and all kinds of joints with such loops."""
-    from graphsynth.systems.piston.spaces import loop_spaces, rotary_assignments
-
     found = tuple((kind, loop_spaces(machine.mechanism.mechanism())) for kind, machine in machines_of(context))
     return found, tuple(rotary_assignments(context.scene.scene.seed))
 
@@ -105,10 +99,6 @@ def turn(context: Context) -> tuple[Turn, ...]:
 
 
 def _turn(context: Context, kind: str, machine: PistonMachine) -> Turn:
-    import numpy as np
-
-    from graphsynth.systems.piston.turn import compare_pistons
-
     own: Any = context.scene.mechanism
     angles = (np.arange(own.positions) + 0.5) * math.tau / own.positions
     crowned, sliding = (machine.inverse_dynamics(angles, slot).reactions for slot in ("crowned", "sliding"))
@@ -216,47 +206,29 @@ def _motion_table(turns: tuple[Turn, ...]) -> Table:
         mechanism = own.machine.mechanism
         angles = [dead.angle for dead in mechanism.dead_centres()]
         rows.append((own.name, mechanism.stroke, *angles, mechanism.time_ratio))
-    columns = (
-        "mechanism",
-        "stroke [mm] | .10g",
-        "outer dead centre [°] | .8g",
-        "inner dead centre [°] | .8g",
-        "time ratio | .8g",
-    )
+    centres = ("outer dead centre [°] | .8g", "inner dead centre [°] | .8g")
+    columns = ("mechanism", "stroke [mm] | .10g", *centres, "time ratio | .8g")
     return table("Motion", columns, rows, "Closed form; exact but for rounding.")
 
 
-def _both(turns: Iterable[Turn]) -> Iterable[tuple[Turn, bool, PistonTurn]]:
-    """Every machine with and without its second group."""
-    return ((own, k == 0, one) for own in turns for k, one in enumerate((own.found.floating, own.found.plain)))
+def _of_pistons(title: str, turns: Iterable[Turn], columns: dict[str, Callable[..., object]], note: str) -> Table:
+    """Lay out every machine with and without its second group; columns are functions of turn, floating, works."""
+    both = ((own, k == 0, one) for own in turns for k, one in enumerate((own.found.floating, own.found.plain)))
+    return table(title, tuple(columns), ([get(*given) for get in columns.values()] for given in both), note)
 
 
 def _load_table(turns: tuple[Turn, ...]) -> Table:
-    rows = [
-        (
-            own.name if floats else "",
-            "floating" if floats else "plain",
-            one.peak_wall,
-            one.mean_wall,
-            one.peak_edge,
-            one.peak_guide if floats else None,
-            one.peak_guide_edge if floats else None,
-            one.gas,
-            one.friction,
-        )
-        for own, floats, one in _both(turns)
-    ]
-    columns = (
-        "mechanism",
-        "piston",
-        "wall, peak [N] | 9 .5g",
-        "wall, mean [N] | 9 .5g",
-        "end of piston [N] | 9 .5g",
-        "guide, peak [N] | .5g",
-        "end of shoe [N] | .5g",
-        "gas work [J] | .6g",
-        "friction loss [J] | .5g",
-    )
+    columns: dict[str, Callable[..., object]] = {
+        "mechanism": lambda own, floats, one: own.name if floats else "",
+        "piston": lambda own, floats, one: "floating" if floats else "plain",
+        "wall, peak [N] | 9 .5g": lambda own, floats, one: one.peak_wall,
+        "wall, mean [N] | 9 .5g": lambda own, floats, one: one.mean_wall,
+        "end of piston [N] | 9 .5g": lambda own, floats, one: one.peak_edge,
+        "guide, peak [N] | .5g": lambda own, floats, one: one.peak_guide if floats else None,
+        "end of shoe [N] | .5g": lambda own, floats, one: one.peak_guide_edge if floats else None,
+        "gas work [J] | .6g": lambda own, floats, one: one.gas,
+        "friction loss [J] | .5g": lambda own, floats, one: one.friction,
+    }
     held = max(own.found.floating.peak_held for own in turns)
     note = (
         "Forces at the ends are those of a crowned slot, which carries no couple. A sliding pair may send back to the "
@@ -267,7 +239,7 @@ def _load_table(turns: tuple[Turn, ...]) -> Table:
             f" Where the slot does not slide, its static friction can hold up to {held:.4g} N across the cylinder, and "
             "the wall may carry so much more."
         )
-    return table("Side loads over a turn", columns, rows, note)
+    return _of_pistons("Side loads over a turn", turns, columns, note)
 
 
 def _square_table(turns: tuple[Turn, ...]) -> Table:
@@ -293,34 +265,28 @@ def _square_table(turns: tuple[Turn, ...]) -> Table:
 
 
 def _trust_table(turns: tuple[Turn, ...]) -> Table:
-    rows = []
-    for own, floats, one in _both(turns):
-        gas = abs(one.gas - one.gas_closed_form) / max(abs(one.gas_closed_form), 1e-300)
-        warned = "" if one.balance_error <= 1e-9 else " (WARNING)"
-        couples = "undetermined, as the structure says" if own.redundant else "DETERMINED"
-        rows.append(
-            (
-                f"{own.name}, {'floating' if floats else 'plain'}",
-                f"{one.balance_error:.1e}{warned}",
-                f"{gas:.1e}" if one.gas_closed_form else "0",
-                own.power,
-                own.difference if floats else None,
-                couples if floats else "",
-            )
-        )
-    columns = (
-        "machine",
-        "energy over a turn",
-        "gas work against p-V area",
-        "power, at every angle | .1e",
-        "forces against a sliding slot | .1e",
-        "couples of a sliding slot",
-    )
+    def gas(own: Turn, floats: bool, one: PistonTurn) -> str:
+        known = one.gas_closed_form
+        return f"{abs(one.gas - known) / max(abs(known), 1e-300):.1e}" if known else "0"
+
+    def couples(own: Turn, floats: bool, one: PistonTurn) -> str:
+        return ("undetermined, as the structure says" if own.redundant else "DETERMINED") if floats else ""
+
+    columns: dict[str, Callable[..., object]] = {
+        "machine": lambda own, floats, one: f"{own.name}, {'floating' if floats else 'plain'}",
+        "energy over a turn": lambda own, floats, one: (
+            f"{one.balance_error:.1e}" + ("" if one.balance_error <= 1e-9 else " (WARNING)")
+        ),
+        "gas work against p-V area": gas,
+        "power, at every angle | .1e": lambda own, floats, one: own.power,
+        "forces against a sliding slot | .1e": lambda own, floats, one: own.difference if floats else None,
+        "couples of a sliding slot": couples,
+    }
     note = (
         "All relative. The reactions are the multipliers of all bodies at once; with the sliding slot of the source "
         "one constraint is redundant, and the same forces must come out."
     )
-    return table("How far it can be trusted", columns, rows, note)
+    return _of_pistons("How far it can be trusted", turns, columns, note)
 
 
 def sketches(context: Context) -> tuple[Picture, ...]:

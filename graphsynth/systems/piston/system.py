@@ -106,8 +106,7 @@ class PistonTable:
             "has kinds with a crank_slider, but [mechanism.drive] gives no rod_mm; give its length",
         )
         require(
-            self.gas is None or self.force == 0.0,
-            "has force_N and [mechanism.gas]; the gas is one of them: remove one",
+            self.gas is None or self.force == 0.0, "has force_N and [mechanism.gas]; the gas is one of them: remove one"
         )
 
 

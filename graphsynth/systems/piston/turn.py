@@ -42,7 +42,6 @@ class PistonTurn:
     peak_wall: float  #: side load of the cylinder
     mean_wall: float
     peak_guide: float  #: of the crosshead's guide
-    mean_guide: float
     peak_edge: float  #: at an end of the piston
     peak_guide_edge: float  #: at an end of the crosshead's shoe
     peak_held: float  #: side load that the slot's static friction can add; 0 where the slot slides
@@ -140,7 +139,6 @@ def _turn(machine: PistonMachine, size: float) -> PistonTurn:
         peak_wall=wall,
         mean_wall=float(weights @ np.abs(loads.wall) / weights.sum()),
         peak_guide=guide,
-        mean_guide=float(weights @ np.abs(loads.guide) / weights.sum()),
         peak_edge=edge,
         peak_guide_edge=guide_edge,
         peak_held=float(loads.held.max()),

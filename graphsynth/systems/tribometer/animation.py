@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,8 @@ from graphsynth.core.errors import SpecError
 from graphsynth.drawing.moving import Moving
 from graphsynth.drawing.svg import painted, words
 from graphsynth.pipeline.products import Picture
-
-if TYPE_CHECKING:
-    from graphsynth.pipeline.stages import Context
-    from graphsynth.systems.tribometer.motion import StickSlipMotion
+from graphsynth.pipeline.stages import Context
+from graphsynth.systems.tribometer.motion import StickSlipMotion
 
 Array = NDArray[np.float64]
 _WIDTH, _SCENE, _CURVES = 640.0, 200.0, 130.0

@@ -11,19 +11,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from inspect import signature
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import SpecError
+from graphsynth.dynamics.integrate import simulate_dynamics
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 from graphsynth.systems.tribometer.forms import model_error
 from graphsynth.systems.tribometer.model import Tribometer, general_model
 from graphsynth.systems.tribometer.motion import RunStatus, StickSlipMotion
-
-if TYPE_CHECKING:
-    from graphsynth.systems.tribometer.precise import PreciseMotion
+from graphsynth.systems.tribometer.precise import PreciseMotion, precise_motion
 
 Array = NDArray[np.float64]
 _DIGITS = 22
@@ -160,8 +159,6 @@ def event_problem(model: Tribometer, duration: float, effort: Effort | None = No
     The law of the model has a Taylor series at rest, or `SpecError` is raised; multiple precision takes seconds for
     each second of ``duration``.
     """
-    from graphsynth.systems.tribometer.precise import precise_motion
-
     effort = effort or Effort()
     default = _default("event_driven", "rtol")
     truth = precise_motion(model, duration, digits=_DIGITS)
@@ -193,8 +190,6 @@ def tolerance_rows(
 
 def _general_rows(model: Tribometer, truth: PreciseMotion, duration: float, effort: Effort) -> list[Row]:
     """Compare the same as a model of the general dynamics, with sticking as a state of its joint."""
-    from graphsynth.dynamics.integrate import simulate_dynamics
-
     own = signature(simulate_dynamics).parameters["rtol"].default
     general, start = general_model(model)
     rows = []

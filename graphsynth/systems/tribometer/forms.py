@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError, TooLargeError
-from graphsynth.systems.tribometer.motion import RunStatus, StickSlipEvent, StickSlipMotion, event_driven, output_times
+from graphsynth.dynamics.motors import whole
+from graphsynth.systems.tribometer.motion import (
+    RunStatus,
+    StickSlipEvent,
+    StickSlipMotion,
+    event_driven,
+    motion_of,
+    output_times,
+)
 from graphsynth.systems.tribometer.platforms import Platforms, StribeckLaw, TwoCoefficientLaw, finite, positive
 
 Array = NDArray[np.float64]
@@ -21,6 +29,9 @@ _IMPLICIT = ("LSODA", "BDF", "Radau")
 _MOST_STEPS = 20_000_000
 #: A solver is called unreliable if another one differs by more than this share of the error of the form.
 _SHARE = 0.5
+
+
+_Events = tuple[StickSlipEvent, ...]
 
 
 def time_stepping(
@@ -63,19 +74,13 @@ def time_stepping(
         statement = (
             f"Failed: the numbers left the range of floating point at {end:.9g} s; use a weight of at least 0.5."
         )
-    drive = self.drive.motion(times)
-    _, _, state, friction = march.path[np.minimum(np.ceil(times / h - 1e-9).astype(int), count)].T
+    state, friction = march.path[np.minimum(np.ceil(times / h - 1e-9).astype(int), count), 2:].T
     driven, heat, damped = march.energies.tolist()
-    return StickSlipMotion(
-        model=self,
-        method="time stepping",
-        t=times,
-        x1=drive.x,
-        v1=drive.v,
-        x2=x2,
-        v2=march.between(times, duration, 1),
-        friction=friction,
-        state=np.nan_to_num(state).astype(np.int64),
+    return motion_of(
+        self,
+        "time stepping",
+        times,
+        np.stack([x2, march.between(times, duration, 1), state, friction]),
         status=RunStatus.FAILED if failed else RunStatus.COMPLETE,
         statement=statement,
         end=end,
@@ -101,7 +106,7 @@ class _March(NamedTuple):
         """Interpolate between steps, linearly: the method itself knows no more."""
         return np.asarray(np.interp(times, np.linspace(0.0, duration, len(self.path)), self.path[:, column]))
 
-    def changes(self, h: float) -> tuple[StickSlipEvent, ...]:
+    def changes(self, h: float) -> _Events:
         """Return the changes of the contact."""
         path = self.path[: self.done + 1]
         at = np.flatnonzero(np.diff(path[:, 2])) + 1
@@ -122,14 +127,8 @@ def _march(model: Platforms, duration: float, count: int, weight: float) -> _Mar
 
 
 def _stepping_error(
-    model: Platforms,
-    duration: float,
-    times: Array,
-    weight: float,
-    count: int,
-    x2: Array,
-    events: tuple[StickSlipEvent, ...],
-) -> tuple[float, tuple[StickSlipEvent, ...]]:
+    model: Platforms, duration: float, times: Array, weight: float, count: int, x2: Array, events: _Events
+) -> tuple[float, _Events]:
     """Estimate the errors from two coarser runs: one alone agrees by chance where releases fall alike on the steps.
 
     Errors of the event times are from the run with steps of twice the length; NaN if its events differ.
@@ -214,8 +213,6 @@ def regularised(
     `RunStatus.FAILED` if the solver stopped, `RunStatus.UNRELIABLE` if the cross-check objects; `SpecError` if the law
     has two coefficients, or a number is out of its bounds.
     """
-    from graphsynth.dynamics.motors import whole
-
     duration, times = output_times(duration, times)
     if not 1e-13 <= finite("relative tolerance", rtol) <= 1e-2:
         raise SpecError(f"The relative tolerance is {rtol:g}; give a number from 1e-13 to 1e-2.")
@@ -232,18 +229,13 @@ def regularised(
         statement = f"Failed: {stopped}; use Radau."
     elif solver == "LSODA" if check is None else check:
         status, statement = _cross_checked(self, duration, times, how, found.y[0], exact)
-    drive = self.drive.motion(times)
-    u = drive.v - found.y[1]
-    return StickSlipMotion(
-        model=self,
-        method=f"regularised ({how.solver})",
-        t=times,
-        x1=drive.x,
-        v1=drive.v,
-        x2=found.y[0],
-        v2=found.y[1],
-        friction=self.normal * self.law.coefficient(np.abs(u)) * np.tanh(u / how.speed),
-        state=np.nan_to_num(np.sign(u)).astype(np.int64),
+    u = self.drive.motion(times).v - found.y[1]
+    friction = self.normal * self.law.coefficient(np.abs(u)) * np.tanh(u / how.speed)
+    return motion_of(
+        self,
+        f"regularised ({how.solver})",
+        times,
+        np.stack([*found.y, np.sign(u), friction]),
         status=status,
         statement=statement,
         end=found.end,

@@ -6,12 +6,13 @@ import math
 import time
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
+from graphsynth.dynamics.motors import numbers
 from graphsynth.systems.tribometer.platforms import Platforms, finite, positive
 
 if TYPE_CHECKING:
@@ -248,10 +249,21 @@ class StickSlipMotion:
         return pd.DataFrame(rows, columns=["time", "state", "x2", "error"])
 
 
+def motion_of(
+    model: Platforms, method: str, times: Array, values: Array, *, sticks: bool = False, **more: Any
+) -> StickSlipMotion:
+    """Return the motion from x2, v2, state and friction at the times, shape (4, n), and its other fields.
+
+    With ``sticks`` nothing slides while the state is 0, not even by rounding.
+    """
+    (x2, v2, state, friction), drive = values, model.drive.motion(times)
+    v1 = np.where(sticks & (state == 0.0), v2, drive.v)
+    known = np.nan_to_num(state).astype(np.int64)
+    return StickSlipMotion(model, method, times, drive.x, v1, x2, v2, friction, known, **more)
+
+
 def output_times(duration: float, times: ArrayLike | None) -> tuple[float, Array]:
     """Check the final time and the times of the curves, s; 1001 equal steps if these are not given."""
-    from graphsynth.dynamics.motors import numbers
-
     duration = positive("duration", duration)
     if times is None:
         return duration, np.linspace(0.0, duration, 1001)
@@ -302,18 +314,12 @@ def event_driven(
         )
     if status is RunStatus.COMPLETE and ((other is not None and not _alike(path, other)) or _tied(self, path)):
         status, error = RunStatus.UNRELIABLE, math.nan
-    x2, v2, state, friction = values.T
-    drive = self.drive.motion(times)
-    motion = StickSlipMotion(
-        model=self,
-        method="event-driven",
-        t=times,
-        x1=drive.x,
-        v1=np.where(state == 0.0, v2, drive.v),  # no sliding while sticking, not even by rounding
-        x2=x2,
-        v2=v2,
-        friction=friction,
-        state=np.nan_to_num(state).astype(np.int64),
+    motion = motion_of(
+        self,
+        "event-driven",
+        times,
+        values.T,
+        sticks=True,
         events=_events(path, other),
         status=status,
         statement="",

@@ -6,6 +6,7 @@ Figures are those of matplotlib and belong to no window; write one with ``figure
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,18 +14,17 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import SpecError
 from graphsynth.drawing.palette import LIGHT
-from graphsynth.drawing.plots import legend_place, new_figure, themed_svg
+from graphsynth.drawing.plots import Line, legend_place, new_figure, themed_svg
 from graphsynth.pipeline.display import chart
 from graphsynth.pipeline.products import Picture
+from graphsynth.pipeline.stages import Context
+from graphsynth.systems.tribometer.cycles import LimitCycle
+from graphsynth.systems.tribometer.motion import StickSlipMotion, event_driven
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from graphsynth.evidence.rows import Problem
-    from graphsynth.pipeline.stages import Context
-    from graphsynth.systems.tribometer.cycles import LimitCycle
-    from graphsynth.systems.tribometer.motion import StickSlipMotion
-
 Array = NDArray[np.float64]
 #: Readable in grey and by colour-blind readers [Okabe & Ito 2008].
 _LOWER, _UPPER, _FRICTION = "#0072B2", "#D55E00", "#009E73"
@@ -57,10 +57,6 @@ def _shown(title: str, figure: Figure, caption: str, *, wide: bool = False) -> P
 
 def _once(motion: StickSlipMotion, cycle: LimitCycle) -> StickSlipMotion:
     """One period of the cycle by itself."""
-    from dataclasses import replace
-
-    from graphsynth.systems.tribometer.motion import event_driven
-
     model = motion.model
     stuck = bool(abs(cycle.v2 - float(model.drive.motion(0.0).v)) < 1e-12 * max(model.frequency * model.reach, 1e-12))
     start = replace(model, x2=cycle.x2, v2=None if stuck else cycle.v2)
@@ -68,8 +64,6 @@ def _once(motion: StickSlipMotion, cycle: LimitCycle) -> StickSlipMotion:
 
 
 def _curves(motion: StickSlipMotion) -> list[Picture]:
-    from graphsynth.drawing.plots import Line
-
     t = motion.t
     both = [Line(t, motion.v1, "lower platform", "a"), Line(t, motion.v2, "upper platform", "b", "--")]
     zero = "Lower minus upper platform; exactly zero while they stick."
@@ -97,8 +91,6 @@ def _curves(motion: StickSlipMotion) -> list[Picture]:
 
 
 def _errors(study: Problem | None) -> list[Picture]:
-    from dataclasses import replace
-
     from graphsynth.evidence.pictures import work_precision_picture
 
     if study is None or not any(row.good and row.error > 0.0 for row in study.rows):

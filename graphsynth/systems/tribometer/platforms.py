@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, Self, overload
+from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,7 @@ from graphsynth.core.checks import check_fields, finite_array
 from graphsynth.core.errors import GeometryError, SpecError
 
 Array = NDArray[np.float64]
+Speed = TypeVar("Speed", float, Array)
 
 
 def finite(name: str, value: float) -> float:
@@ -60,25 +61,16 @@ class FrictionLaw(ABC):
     def _weakening(self, v: Array) -> tuple[Array, Array]:
         """Return the part above the kinetic coefficient, and its slope."""
 
-    @overload
-    def coefficient(self, v: float) -> float: ...
-    @overload
-    def coefficient(self, v: Array) -> Array: ...
-    def coefficient(self, v: ArrayLike) -> float | Array:
-        """Friction coefficient while slipping at the speed ``v >= 0``, m/s."""
-        v = np.asarray(v, float)
-        found: Array = self.kinetic + self._weakening(v)[0] + self.viscous * v
-        return found if found.ndim else float(found)
+    def coefficient(self, v: Speed) -> Speed:
+        """Friction coefficient while slipping at the speed ``v >= 0``, m/s, a number or an array."""
+        speed = np.asarray(v, float)
+        found = np.asarray(self.kinetic + self._weakening(speed)[0] + self.viscous * speed)
+        return found if found.ndim else float(found)  # type: ignore[return-value]
 
-    @overload
-    def slope(self, v: float) -> float: ...
-    @overload
-    def slope(self, v: Array) -> Array: ...
-    def slope(self, v: ArrayLike) -> float | Array:
+    def slope(self, v: Speed) -> Speed:
         """Return the derivative of the coefficient by the sliding speed, s/m; negative where friction weakens."""
-        v = np.asarray(v, float)
-        found: Array = self._weakening(v)[1] + self.viscous
-        return found if found.ndim else float(found)
+        found = np.asarray(self._weakening(np.asarray(v, float))[1] + self.viscous)
+        return found if found.ndim else float(found)  # type: ignore[return-value]
 
     @abstractmethod
     def _packed(self) -> tuple[float, float, float, float, float, float]:

@@ -9,6 +9,9 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any, NamedTuple
 
+import mpmath
+from mpmath import cos, exp, fdot, findroot, mpf, polyval, sin, sqrt
+
 from graphsynth.core.errors import SpecError, TooLargeError
 from graphsynth.systems.tribometer.platforms import BeltDrive, CrankDrive, Platforms, StribeckLaw, TwoCoefficientLaw
 
@@ -46,8 +49,6 @@ def precise_motion(model: Platforms, duration: float, *, digits: int = 30, most_
     >>> precise_motion(Tribometer(), 0.5, digits=20).events[0].state
     -1
     """
-    import mpmath
-
     if not 15 <= digits <= 200:
         raise SpecError(f"The number of digits is {digits}; give 15 to 200.")
     with mpmath.workdps(digits + 10):
@@ -58,8 +59,6 @@ def precise_motion(model: Platforms, duration: float, *, digits: int = 30, most_
 
 def _times(a: Series, b: Series, n: int) -> Any:
     """Return coefficient ``n`` of a product."""
-    from mpmath import fdot
-
     return fdot(a[: n + 1], b[n::-1])
 
 
@@ -67,8 +66,6 @@ class _Run:
     """State of a run; every number is an mpmath number."""
 
     def __init__(self, model: Platforms, digits: int) -> None:
-        from mpmath import mpf
-
         law, drive = model.law, model.drive
 
         def number(value: float) -> Any:
@@ -106,8 +103,6 @@ class _Run:
 
     def drive(self, t: Any) -> tuple[Any, Any, Any]:
         """Return displacement, velocity and acceleration of the lower platform."""
-        from mpmath import cos, mpf, sin, sqrt
-
         r, w = self.r, self.w
         if self.kind == 0:
             return w * t, w, mpf(0)
@@ -132,8 +127,6 @@ class _Run:
 
     def stick(self, end: Any) -> int | None:
         """Move with the lower platform to the release or the end; return the new state at a release."""
-        from mpmath import mpf
-
         start, offset = self.t, self.x - self.drive(self.t)[0]
 
         def force(t: Any) -> Any:
@@ -157,8 +150,6 @@ class _Run:
 
     def root(self, f: Any, low: Any, high: Any) -> Any:
         """Return the root in a bracket; bisection until the secant converges."""
-        from mpmath import findroot, mpf
-
         fl = f(low)
         for _ in range(20):
             middle = (low + high) / 2
@@ -171,8 +162,6 @@ class _Run:
 
     def slip(self, end: Any) -> int | None:
         """Take one Taylor step; return the new state if the slip ends in it with an event."""
-        from mpmath import mpf, polyval
-
         X, V, V1 = self.series()
         size = max(abs(self.v), abs(V1[0]), self.static * self.N / self.k)
         h = end - self.t
@@ -201,8 +190,6 @@ class _Run:
 
     def rise(self, sliding: Series, high: Any) -> tuple[Any, Any]:
         """Find where a slip shorter than a sample is positive."""
-        from mpmath import polyval
-
         for _ in range(self.digits):
             if polyval(sliding, high / 4) > 0:
                 return high / 4, high
@@ -217,8 +204,6 @@ class _Run:
 
     def drive_series(self) -> Series:
         """Return the Taylor coefficients of the velocity of the lower platform."""
-        from mpmath import cos, mpf, sin, sqrt
-
         n, w = self.order + 1, self.w
         if self.kind == 0:
             return [w] + [mpf(0)] * (n - 1)
@@ -239,8 +224,6 @@ class _Run:
 
     def series(self) -> tuple[Series, Series, Series]:
         """Return the Taylor coefficients of position and velocity, and of the velocity of the lower platform."""
-        from mpmath import exp
-
         V1, X, V = self.drive_series(), [self.x], [self.v]
         s, drop = self.state, self.static - self.kinetic
         powers: list[Series] = [[] for _ in range(max(self.power, 1))]

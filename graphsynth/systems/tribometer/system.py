@@ -161,18 +161,15 @@ def cycle(context: Context) -> LimitCycle:
     return limit_cycle(_table(context).tribometer(context.scene.place), most_turns=_table(context).run.most_turns)
 
 
-def methods(context: Context, motion: StickSlipMotion) -> Problem | None:
+def methods(context: Context, motion: StickSlipMotion, solvers: tuple[str, ...] = ()) -> Problem | None:
     """Compare the methods with the event-driven run; None if that one did not finish."""
-    return _study(context, motion, _table(context).methods.solvers)
-
-
-def _study(context: Context, motion: StickSlipMotion, solvers: tuple[str, ...]) -> Problem | None:
     from graphsynth.systems.tribometer.evidence import method_study
 
     if not motion.complete:
         return None
     scene, m = _table(context), _table(context).methods
-    settings: dict[str, Any] = {"tolerances": m.tolerances, "steps": m.steps, "speeds": m.speeds, "solvers": solvers}
+    settings: dict[str, Any] = {"tolerances": m.tolerances, "steps": m.steps, "speeds": m.speeds}
+    settings["solvers"] = solvers or m.solvers
     try:
         return method_study(scene.tribometer(context.scene.place), scene.run.duration, **settings)
     except SpecError as error:
@@ -181,7 +178,7 @@ def _study(context: Context, motion: StickSlipMotion, solvers: tuple[str, ...]) 
 
 def solvers(context: Context, motion: StickSlipMotion) -> tuple[Table, ...]:
     """Error against run time with every solver; some minutes, not part of the shipped outputs."""
-    study = _study(context, motion, ("LSODA", "BDF", "Radau"))
+    study = methods(context, motion, ("LSODA", "BDF", "Radau"))
     return () if study is None else (_methods_table("Error against run time", study, study.note),)
 
 

@@ -147,10 +147,7 @@ def step(p, s, t, x, v, h, tolerance, work):
         dx += WEIGHTS[i] * work[0, i]
         dv += WEIGHTS[i] * work[1, i]
     span = p[STATIC] * p[NORMAL] / p[STIFFNESS]
-    scales = (
-        max(abs(x), abs(span)),
-        max(abs(v), abs(v + h * dv), abs(span) * math.sqrt(p[STIFFNESS] / p[MASS])),
-    )
+    scales = (max(abs(x), abs(span)), max(abs(v), abs(v + h * dv), abs(span) * math.sqrt(p[STIFFNESS] / p[MASS])))
     for row in range(2):
         e3 = e5 = 0.0
         for i in range(STAGES):
