@@ -328,7 +328,7 @@ def _zero_of(path: Path, leg: Leg, start: float, stop: float) -> tuple[float, in
     from scipy.optimize import brentq, minimize_scalar
 
     def value(t: float) -> float:
-        return path.discriminant(t, leg)
+        return float(path.discriminant(t, leg))
 
     turn = abs(stop - start) * max(map(abs, path.direction))
     grid = np.linspace(start, stop, max(64, math.ceil(DENSITY * turn)) + 1).tolist()

@@ -223,8 +223,8 @@ def approach(self: PointingDimensions, fold: Fold, distances: ArrayLike, *, bran
         with mp.workdps(75):
             y = exactly.outputs(sharp.parameter + step)[own]
             exact = mp.arg(mp.expj(y - (sharp.a, sharp.b)[own]))
-            near = (o + (fold.parameter + step) * d for o, d in zip(fold.offset, fold.direction))
-            got = poses(self, *near, s_y, s_x)
+            near_x, near_y = (o + (fold.parameter + step) * d for o, d in zip(fold.offset, fold.direction))
+            got = poses(self, near_x, near_y, s_y, s_x)
             plain = mp.mpf(float((got.a, got.b)[own]))
             error = float("nan") if mp.isnan(plain) else float(abs(mp.arg(mp.expj(plain - y))))
         rows.append((float(exact), deviations(path, fold.leg, fold.parameter, step)[which], error))
