@@ -228,23 +228,20 @@ class PartFolder:
 
     def __init__(self, folder: Path | None, done: Sequence[Outcome], kinds: Sequence[str] = ()) -> None:
         self._folder = folder
-        self._kinds = tuple(kinds)
         self._kept: set[str] = set()
         self._begun: set[Path] = set()
         for outcome in done if folder is not None else ():
             for part in outcome.products.values():
-                if isinstance(part, Part):
-                    self._check_kinds(part)
-                    for path, digest in part.files:
-                        self._check(path, digest)
-
-    def _check_kinds(self, part: Part) -> None:
-        had = {path.rpartition(".")[2] for path, _ in part.files}
-        if self._kinds and had != set(self._kinds):
-            raise SceneError(
-                f"the interrupted run in {self._folder} wrote {part.name} as {', '.join(sorted(had))}, and now files = "
-                f"{list(self._kinds)} are asked for; add --fresh to start anew"
-            )
+                if not isinstance(part, Part):
+                    continue
+                had = {path.rpartition(".")[2] for path, _ in part.files}
+                if kinds and had != set(kinds):
+                    raise SceneError(
+                        f"the interrupted run in {folder} wrote {part.name} as {', '.join(sorted(had))}, and now files "
+                        f"= {list(kinds)} are asked for; add --fresh to start anew"
+                    )
+                for path, digest in part.files:
+                    self._check(path, digest)
 
     def _check(self, path: str, digest: str) -> None:
         assert self._folder is not None
@@ -301,8 +298,18 @@ def data_files(report: Report) -> dict[str, bytes]:
 
 def column_files(name: str, columns: Mapping[str, Any], kinds: Sequence[str]) -> dict[str, bytes]:
     """Return columns as files of the kinds asked for: name with its ending, to the content."""
-    made = {"csv": lambda: _csv(columns).encode(), "parquet": lambda: _parquet(columns)}
-    return {f"{name}.{kind}": made[kind]() for kind in kinds}
+    made = {}
+    for kind in kinds:
+        if kind == "csv":
+            made[f"{name}.csv"] = _csv(columns).encode()
+            continue
+        import pyarrow
+        from pyarrow import parquet
+
+        stream, arrays = io.BytesIO(), {header: pyarrow.array(values) for header, values in columns.items()}
+        parquet.write_table(pyarrow.table(arrays), stream)
+        made[f"{name}.{kind}"] = stream.getvalue()
+    return made
 
 
 def results_csv(records: Sequence[Record]) -> str:
@@ -343,13 +350,4 @@ def _csv(columns: Mapping[str, Any]) -> str:
     writer.writerow(columns)
     lists = [values.tolist() if hasattr(values, "tolist") else values for values in columns.values()]
     writer.writerows(zip(*lists, strict=True))
-    return stream.getvalue()
-
-
-def _parquet(columns: Mapping[str, Any]) -> bytes:
-    import pyarrow
-    from pyarrow import parquet
-
-    stream = io.BytesIO()
-    parquet.write_table(pyarrow.table({name: pyarrow.array(values) for name, values in columns.items()}), stream)
     return stream.getvalue()

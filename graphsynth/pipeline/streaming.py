@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -75,8 +74,8 @@ def _cheapest_first(each: Sequence[Stage], ready: set[str]) -> tuple[Stage, ...]
     order: list[Stage] = []
     have = set(ready)
     while waiting:
-        possible = [(stage.cost, place) for place, stage in waiting.items() if set(stage.needs) <= have]
-        stage = waiting.pop(heapq.nsmallest(1, possible)[0][1])
+        possible = ((stage.cost, place) for place, stage in waiting.items() if set(stage.needs) <= have)
+        stage = waiting.pop(min(possible)[1])
         order.append(stage)
         have |= set(stage.gives)
     return tuple(order)
@@ -175,7 +174,15 @@ def stream(
     """
     done = Streamed()
     numbered = enumerate(items, 1)
-    _skip(numbered, journal.done, done)
+    for outcome in journal.done:  # these an interrupted run has finished, if they are the same ones
+        number, item = next(numbered, (0, None))
+        if (number, str(getattr(item, "key", ""))) != (outcome.number, outcome.key):
+            raise SceneError(
+                f"candidate {outcome.number} of the interrupted run ({outcome.key or 'no key'}) is not candidate "
+                f"{number or 'any'} of this one; add --fresh to start anew"
+            )
+        done.outcomes.append(outcome)
+    done.resumed = len(journal.done)
     parts = PartFolder(journal.path.parent if journal.path else None, journal.done, context.scene.outputs.files)
     executor: Executor | None = context.executor
     size = [1]
@@ -209,16 +216,3 @@ def _chunks(numbered: Iterator[tuple[int, Any]], size: list[int]) -> Iterator[li
             chunk = []
     if chunk:
         yield chunk
-
-
-def _skip(numbered: Iterator[tuple[int, Any]], stored: Sequence[Outcome], done: Streamed) -> None:
-    """Pass over the candidates an interrupted run has finished, making sure they are the same ones."""
-    for outcome in stored:
-        number, item = next(numbered, (0, None))
-        if (number, str(getattr(item, "key", ""))) != (outcome.number, outcome.key):
-            raise SceneError(
-                f"candidate {outcome.number} of the interrupted run ({outcome.key or 'no key'}) is not candidate "
-                f"{number or 'any'} of this one; add --fresh to start anew"
-            )
-        done.outcomes.append(outcome)
-    done.resumed = len(stored)

@@ -292,7 +292,11 @@ def _read(kind: Any, value: object, place: Place, field: Field, unit_needed: boo
     if dataclasses.is_dataclass(kind):
         return read_table(typing.cast(type, kind), value, place)
     if origin is Literal:
-        return _read_choice(typing.get_args(kind), value, place)
+        choices = typing.get_args(kind)
+        if any(type(choice) is type(value) and choice == value for choice in choices):
+            return value
+        hint = nearest(value, [c for c in choices if isinstance(c, str)]) if isinstance(value, str) else ""
+        raise place.error(f"must be one of {', '.join(map(repr, choices))}, not {_shown(value)}{hint}")
     if origin in (Union, types.UnionType):
         (inner,) = (a for a in typing.get_args(kind) if a is not type(None))
         return _read(inner, value, place, field, unit_needed)
@@ -374,14 +378,6 @@ def _wanted(unit: Unit, unit_needed: bool = False) -> str:
     if unit_needed:
         return f'{unit.quantity} with its unit, such as "17.5 {unit.text}"'
     return f'a finite number in {unit.text}, or {unit.quantity} such as "17.5 {unit.text}"'
-
-
-def _read_choice(choices: tuple[Any, ...], value: object, place: Place) -> Any:
-    for choice in choices:
-        if type(choice) is type(value) and choice == value:
-            return choice
-    hint = nearest(value, [c for c in choices if isinstance(c, str)]) if isinstance(value, str) else ""
-    raise place.error(f"must be one of {', '.join(map(repr, choices))}, not {_shown(value)}{hint}")
 
 
 def _read_tuple(
