@@ -32,6 +32,7 @@ from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 Array = NDArray[np.float64]
 
 _LADDER = (64, 128, 256, 512, 1024)
+_TRANSLATES = "at one orientation the platform translates on a circle: congruent triangles and equal legs"
 
 
 class AssemblyVerdict(StrEnum):
@@ -204,15 +205,12 @@ def certify_direct(
     platform : ParallelPlatform
     theta : sequence of three numbers
         Rocker angles, radians; floats, integers, fractions or decimal text.
-    max_bits : int, optional
-        Precision at which an undecided count is given up.
-    cross_check : bool, optional
-        Also count by a second method and compare.
+    max_bits, cross_check : optional
+        As in `certify_assembly_modes`.
 
     Returns
     -------
     AssemblyCertificate
-        Number of modes, enclosures of the poses, or the reason why undecided (certified).
 
     Examples
     --------
@@ -255,9 +253,7 @@ def _certify(problem: _Problem, max_bits: int, cross_check: bool) -> AssemblyCer
         with precision(max(bits, 128)):
             if self_motion(problem.anchors, problem.vertices, problem.lengths):
                 verdict, method = AssemblyVerdict.SELF_MOTION, "exact"
-                statement = reason = (
-                    "at one orientation the platform translates on a circle: congruent triangles and equal legs"
-                )
+                statement = reason = _TRANSLATES
             else:
                 modes, reason = _decide_exactly(problem, reason)
                 method = method if modes is None else "exact polynomial"
@@ -267,16 +263,8 @@ def _certify(problem: _Problem, max_bits: int, cross_check: bool) -> AssemblyCer
         verdict, merged = AssemblyVerdict.CERTIFIED, sum(mode.multiplicity > 1 for mode in modes)
         statement = f"certified: exactly {len(modes)} assembly modes, each enclosed"
         statement += f"; {merged} of them multiple roots (type-II singularity)" if merged else ""
-    return AssemblyCertificate(
-        verdict,
-        tuple(modes or ()),
-        reason,
-        bits,
-        method,
-        checked,
-        perf_counter() - begin,
-        statement or f"undecided: {reason}",
-    )
+    seconds, statement = perf_counter() - begin, statement or f"undecided: {reason}"
+    return AssemblyCertificate(verdict, tuple(modes or ()), reason, bits, method, checked, seconds, statement)
 
 
 def _subdivide(problem: _Problem, bits: int) -> tuple[list[ModeEnclosure] | None, str]:

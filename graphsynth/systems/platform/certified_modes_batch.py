@@ -115,7 +115,6 @@ def certify_direct_batch(platform: ParallelPlatform, theta: ArrayLike) -> Assemb
     Returns
     -------
     AssemblyCertificateBatch
-        For each problem the number of modes and enclosures, or undecided (certified).
 
     Raises
     ------

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from inspect import signature
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -139,13 +140,10 @@ def _proved_rows(
 def _batch(platform: ParallelPlatform, theta: Array, size: float) -> Proved:
     proof = certify_direct_batch(platform, theta)
     radii = np.linalg.norm(proof.radii / [size, size, 1.0], axis=-1)
-    found: Proved = []
     starts = np.searchsorted(proof.problem, np.arange(len(theta) + 1))
-    for k in range(len(theta)):
-        own = slice(starts[k], starts[k + 1])
-        known = proof.counts[k] >= 0
-        found.append((proof.poses[own], float(radii[own].max(initial=0.0))) if known else None)
-    return found
+    parts = (slice(*ends) for ends in pairwise(starts))
+    found = [(proof.poses[own], float(radii[own].max(initial=0.0))) for own in parts]
+    return [modes if count >= 0 else None for modes, count in zip(found, proof.counts)]
 
 
 def _singly(platform: ParallelPlatform, theta: Array, bits: int, size: float) -> Proved:
@@ -210,10 +208,8 @@ def precise_modes(anchors: Sequence[Any], vertices: Sequence[complex], lengths: 
             return abs(top) ** 2 + 2 * det * (top * mpmath.conj(w[0])).real - det * det * r0
 
         nodes = [2 * mpmath.pi * k / 8 for k in range(8)]
-        values = [condition(alpha) for alpha in nodes]
-        coefficients = [
-            sum(g * mpmath.expj(-m * alpha) for g, alpha in zip(values, nodes)) / 8 for m in range(3, -4, -1)
-        ]
+        values = [(condition(alpha) / 8, alpha) for alpha in nodes]
+        coefficients = [sum(g * mpmath.expj(-m * alpha) for g, alpha in values) for m in range(3, -4, -1)]
         scale = max(abs(c) for c in coefficients)
         while abs(coefficients[0]) < scale * mpmath.mpf(10) ** (-DIGITS):  # the degree drops
             coefficients = coefficients[1:-1]

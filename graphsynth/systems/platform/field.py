@@ -139,8 +139,8 @@ class SingularConic:
 
     * `coefficients`: ``(a, b, c, d, e, f)``; ``det JX`` in length^4 for x, y in the fixed frame.
     * `discriminant`: ``b^2 - 4 a c``.
-    * `kind`: "ellipse", "hyperbola", "parabola", "line", "nowhere" (constant, not zero) or "everywhere"; degenerate
-      conics keep the name that the discriminant gives.  Floating point: a parabola is recognised to 1e-12.
+    * `kind`: "ellipse", "hyperbola", "parabola" (to 1e-12), "line", "nowhere" (constant, not zero) or "everywhere";
+      degenerate conics keep the name that the discriminant gives.
     """
 
     coefficients: tuple[float, float, float, float, float, float]
@@ -177,10 +177,10 @@ def singular_conic(anchors: ArrayLike, vertices: ArrayLike, alpha: float) -> Sin
     P = P + P.T
     quadratic = np.array([0.5 * P[0, 0], P[0, 1], 0.5 * P[1, 1], P[0, 2], P[1, 2], 0.5 * P[2, 2]])
     quadratic[3:] += cross(u2, u3) * t1
-    c = tuple(float(8.0 * value) for value in quadratic)
+    c = tuple((8.0 * quadratic).tolist())
     discriminant = c[1] ** 2 - 4.0 * c[0] * c[2]
     size = float(max(np.abs(g - g[0]).max(), np.abs(arm).max(), 1e-300))
-    return SingularConic((c[0], c[1], c[2], c[3], c[4], c[5]), discriminant, _kind(c, discriminant, size))
+    return SingularConic(c, discriminant, _kind(c, discriminant, size))
 
 
 def _kind(c: tuple[float, ...], discriminant: float, size: float) -> str:

@@ -241,11 +241,8 @@ def assess_design(
 
 def _off_line(path: Array, wanted: Complex) -> float:
     """Largest distance of the path from the line along ``wanted``, if that is a line."""
-    largest = wanted[int(np.argmax(np.abs(wanted)))]
-    if largest == 0.0:
-        return math.nan
-    along = wanted * np.conj(largest)
-    if np.abs(along.imag).max() > 1e-12 * np.abs(along).max():
+    along = wanted * np.conj(wanted[int(np.argmax(np.abs(wanted)))])
+    if not along.any() or np.abs(along.imag).max() > 1e-12 * np.abs(along).max():
         return math.nan
     unit = along.real / np.linalg.norm(along.real)
     return float(np.linalg.norm(path - (path @ unit)[:, None] * unit, axis=1).max())

@@ -135,14 +135,10 @@ class Motion(_Followed):
     * `gap` (shape (n,)): scaled distance to the nearest other assembly mode; infinite if there is none.
     * `residual`: largest closure error over the turn relative to the square of the largest length.
     * `complete`: the whole asked range was reached on one branch.
-    * `closed`: after ``period`` turns the pose returns to the start.
+    * `closed`: after ``period`` turns the pose returns to the start; ``period`` is 0 if it does not.
     * `closure_error`: scaled distance of the end pose from the start pose after one turn; NaN if not complete.
-    * `period`: number of turns until closure; 0 if not closed.
-    * `events`: in order of psi.
     * `label`: of the start pose.
     * `Lc`: characteristic length of the scaled distances.
-    * `method`: how the branch was followed.
-    * `seconds`: run time.
     * `monodromy`: what all assembly modes become after the turn; None if the range is not one turn or the branch ends.
     """
 

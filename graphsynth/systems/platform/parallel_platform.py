@@ -158,8 +158,8 @@ class ParallelPlatform:
     def inverse(self, pose: ArrayLike, sigma: ArrayLike | None = None) -> InverseSolution:
         """Rocker angles for poses (..., 3): all eight working modes, or the mode ``sigma`` (theory/platform-inverse 4).
 
-        Angles are accurate to a few 1e-16 rad for the vertices as computed, also for extreme length ratios and beside
-        the boundary of the reach.  A leg out of reach gives NaN and a status, never a clipped angle.
+        Accurate to a few 1e-16 rad for the vertices as computed, also for extreme length ratios and beside the boundary
+        of the reach.  A leg out of reach gives NaN and a status, never a clipped angle.
 
         Raises
         ------

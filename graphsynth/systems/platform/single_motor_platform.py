@@ -173,12 +173,12 @@ class SingleMotorPlatform:
         return (first, second, third)
 
     def home_pose(self, psi: float = 0.0) -> Array:
-        """Pose of the home branch at wheel angle ``psi``: followed from zero crank length, shape (3,).
+        """Pose of the home branch at wheel angle ``psi``, shape (3,): followed from zero crank length.
 
         Raises
         ------
         GeometryError
-            If the drives cannot be assembled there, the home pose does not close, or the branch ends on the way.
+            If there is none, or the branch ends on the way.
         """
         tracked = self.follow(np.array([finite("psi", psi)]), None, None, accelerations=False)
         return np.asarray(tracked.pose[0, 0])

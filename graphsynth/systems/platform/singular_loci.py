@@ -122,15 +122,14 @@ def type_two_curves(
     for leg, lengths in enumerate(zip(platform.l1, platform.l2), start=1):
         if min(lengths) == 0.0:
             raise GeometryError(f"leg {leg} has a link of length zero, so its working modes coincide; give l1, l2 > 0")
-    unit = characteristic_length(platform)
-    equations = CurveEquations(platform, alpha, unit)
+    equations = CurveEquations(platform, alpha, characteristic_length(platform))
     curves: list[SingularCurve] = []
-    for state, leg in _boundary_seeds(platform, alpha, mode, equations, unit):
-        if not _known(curves, state, unit, ends_only=True):
+    for state, leg in _boundary_seeds(equations, mode):
+        if not _known(equations, curves, state, ends_only=True):
             gradient = mode[leg - 1] * equations.reach_gradient(state, leg - 1)
-            curves.append(_curve(mode, leg, [trace(equations, state, mode, gradient)], equations, unit))
-    for state in _grid_seeds(platform, alpha, mode, nodes, unit):
-        if _known(curves, state, unit):
+            curves.append(_curve(equations, mode, leg, [trace(equations, state, mode, gradient)]))
+    for state in _grid_seeds(equations, mode, nodes):
+        if _known(equations, curves, state):
             continue
         found = equations.correct(state, np.linalg.svd(equations.evaluate(state)[1])[2][-1])
         if found is None or (np.array(mode) * equations.reach(found[0]) <= 0.0).any():
@@ -139,20 +138,17 @@ def type_two_curves(
         parts = [trace(equations, found[0], mode, along)]
         if parts[0][1] != 0:
             parts.append(trace(equations, found[0], mode, -along))
-        curve = _curve(mode, 0, parts, equations, unit)
-        if not _repeated(curves, curve, unit):
+        curve = _curve(equations, mode, 0, parts)
+        path = equations.states(curve.points, curve.theta)
+        if curve.ends:  # an end belongs to one curve of a mode
+            known = any(_known(equations, curves, state, ends_only=True) for state in path[[0, -1]])
+        else:  # a loop is compared by its points
+            loops = [c for c in curves if c.closed and abs(len(c.points) - len(path)) < 0.2 * len(path) + 10]
+            sample = path[:: max(1, len(path) // 12)]
+            known = sum(_known(equations, loops, state) for state in sample) > 0.7 * len(sample)
+        if not known:
             curves.append(curve)
     return tuple(curves)
-
-
-def _repeated(curves: list[SingularCurve], new: SingularCurve, unit: float) -> bool:
-    """Whether a curve is already there: an end belongs to one curve of a mode, a loop is compared by its points."""
-    path = np.column_stack([new.points.real / unit, new.points.imag / unit, new.theta])
-    if new.ends:
-        return any(_known(curves, state, unit, ends_only=True) for state in path[[0, -1]])
-    loops = [curve for curve in curves if curve.closed and abs(len(curve.points) - len(path)) < 0.2 * len(path) + 10]
-    sample = path[:: max(1, len(path) // 12)]
-    return sum(_known(loops, state, unit) for state in sample) > 0.7 * len(sample)
 
 
 @checked
@@ -201,7 +197,7 @@ def isolated_singular_points(
 
 
 def _curve(
-    mode: tuple[int, int, int], leg: int, parts: list[tuple[Array, int]], equations: CurveEquations, unit: float
+    equations: CurveEquations, mode: tuple[int, int, int], leg: int, parts: list[tuple[Array, int]]
 ) -> SingularCurve:
     states, end = parts[0]
     if len(parts) == 2:
@@ -210,13 +206,14 @@ def _curve(
     else:
         ends = () if end == 0 else (leg, max(end, 0))
     residual = max(float(np.abs(equations.evaluate(state)[0]).max()) for state in states)
-    return SingularCurve(mode, np.asarray(unit * (states[:, 0] + 1j * states[:, 1])), states[:, 2:], ends, residual)
+    points = np.asarray(equations.unit * (states[:, 0] + 1j * states[:, 1]), dtype=np.complex128)
+    return SingularCurve(mode, points, states[:, 2:], ends, residual)
 
 
-def _known(curves: list[SingularCurve], state: Array, unit: float, *, ends_only: bool = False) -> bool:
+def _known(equations: CurveEquations, curves: list[SingularCurve], state: Array, *, ends_only: bool = False) -> bool:
     """Whether a state lies on a traced curve (or is one of its ends)."""
     for curve in curves:
-        path = np.column_stack([curve.points.real / unit, curve.points.imag / unit, curve.theta])
+        path = equations.states(curve.points, curve.theta)
         if ends_only:
             path = path[[0, -1]] if curve.ends else path[:0]
         d = path - state
@@ -234,47 +231,41 @@ def _known(curves: list[SingularCurve], state: Array, unit: float, *, ends_only:
     return False
 
 
-def _boundary_seeds(
-    platform: ParallelPlatform, alpha: float, mode: tuple[int, int, int], equations: CurveEquations, unit: float
-) -> list[tuple[Array, int]]:
+def _boundary_seeds(equations: CurveEquations, mode: tuple[int, int, int]) -> list[tuple[Array, int]]:
     """Find the ends of curves on the boundary of the workspace: states and legs."""
     seeds = []
-    for arc in constant_orientation_workspace(platform, alpha).arcs:
+    for arc in constant_orientation_workspace(equations.platform, equations.alpha).arcs:
         leg = arc.circle.leg
         t = arc.start + (arc.stop - arc.start) * (np.arange(_ARC_SAMPLES) + 0.5) / _ARC_SAMPLES
         t = np.concatenate([[arc.start + 1e-9 * (t[1] - t[0])], t, [arc.stop - 1e-9 * (t[1] - t[0])]])
-        values = _on_arc(platform, alpha, mode, arc, t)[0]
+        values = _on_arc(equations, mode, arc, t)[0]
         change = values[:-1] * values[1:] < 0.0
         a, b, first = t[:-1][change], t[1:][change], values[:-1][change]
         for _ in range(20 if change.any() else 0):
             middle = 0.5 * (a + b)
-            same = _on_arc(platform, alpha, mode, arc, middle)[0] * first > 0.0
+            same = _on_arc(equations, mode, arc, middle)[0] * first > 0.0
             a, b = np.where(same, middle, a), np.where(same, b, middle)
-        _, p, theta = _on_arc(platform, alpha, mode, arc, a)
-        for q, angles in zip(p, theta):
-            found = equations.end(np.array([q.real / unit, q.imag / unit, *angles]), leg - 1)
+        _, p, theta = _on_arc(equations, mode, arc, a)
+        for state in equations.states(p, theta):
+            found = equations.end(state, leg - 1)
             if found is not None:
                 seeds.append((found, leg))
     return seeds
 
 
-def _on_arc(
-    platform: ParallelPlatform, alpha: float, mode: tuple[int, int, int], arc: Arc, t: Array
-) -> tuple[Array, Complex, Array]:
+def _on_arc(equations: CurveEquations, mode: tuple[int, int, int], arc: Arc, t: Array) -> tuple[Array, Complex, Array]:
     """``det JX``, positions and rocker angles on an arc of the boundary, where the arc's own leg has one angle."""
-    k = arc.circle.leg - 1
-    p = arc.point(t)
-    X = poses_at(p, alpha)
+    platform, k, p = equations.platform, arc.circle.leg - 1, arc.point(t)
+    X = poses_at(p, equations.alpha)
     theta = platform.inverse(X, mode).theta.copy()
     back = arc.circle.side == "inner" and platform.l1[k] < platform.l2[k]
     theta[:, k] = t + (math.pi if back else 0.0)
     return determinant(platform.jacobians(X, theta)[0]), p, theta
 
 
-def _grid_seeds(
-    platform: ParallelPlatform, alpha: float, mode: tuple[int, int, int], nodes: int, unit: float
-) -> list[Array]:
-    """Zeros of ``det JX`` on the edges of the grid."""
+def _grid_seeds(equations: CurveEquations, mode: tuple[int, int, int], nodes: int) -> Array:
+    """Zeros of ``det JX`` on the edges of the grid, states (n, 5)."""
+    platform, alpha = equations.platform, equations.alpha
 
     def value(p: Complex) -> tuple[Array, Array]:
         X = poses_at(p, alpha)
@@ -293,7 +284,7 @@ def _grid_seeds(
         same = value(middle)[0] * low > 0.0
         a, b = np.where(same, middle, a), np.where(same, b, middle)
     g, theta = value(a)
-    return [np.array([q.real / unit, q.imag / unit, *t]) for q, t, v in zip(a, theta, g) if np.isfinite(v)]
+    return equations.states(a, theta)[np.isfinite(g)]
 
 
 _LARGEST = 0.05
@@ -305,10 +296,15 @@ class CurveEquations:
     """Closure of the legs and ``det JX`` at a fixed orientation, with their derivatives."""
 
     def __init__(self, platform: ParallelPlatform, alpha: float, unit: float) -> None:
+        self.platform, self.alpha, self.unit = platform, alpha, unit
         z = np.exp(1j * alpha)
         self.arm = [complex(z * b) / unit for b in platform.b]
         self.centre = [complex(D) / unit - a for D, a in zip(platform.D, self.arm)]
         self.l1, self.l2 = [l / unit for l in platform.l1], [l / unit for l in platform.l2]
+
+    def states(self, p: Complex, theta: Array) -> Array:
+        """States (n, 5) at positions and rocker angles."""
+        return np.column_stack([p.real / self.unit, p.imag / self.unit, theta])
 
     def legs(self, v: Array) -> tuple[list[complex], list[complex]]:
         """Rockers and links as vectors."""

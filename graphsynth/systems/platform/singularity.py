@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import checked, finite, finite_array, positive, triple, whole
+from graphsynth.core.checks import checked, finite, positive, triple, whole
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.platform.field import characteristic_length, determinant, scaled_rows, working_mode
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
@@ -68,9 +68,7 @@ def closed_pose(platform: ParallelPlatform, pose: ArrayLike, theta: ArrayLike) -
 
     Raises `GeometryError`: not three numbers each, or legs that do not close.
     """
-    X, t = finite_array("pose", pose).reshape(-1), finite_array("theta", theta).reshape(-1)
-    if X.shape != (3,) or t.shape != (3,):
-        raise GeometryError(f"pose and theta have {X.size} and {t.size} numbers; give three each")
+    X, t = triple("pose", pose), triple("theta", theta)
     size = max(*platform.l1, *platform.l2)
     opened = float(np.abs(platform.closure(X, t)).max())
     if opened > 1e-6 * size * size:
@@ -92,9 +90,8 @@ def singularity(
 ) -> Singularity:
     """Classify a pose and give the motions and forces that are not determined there.
 
-    `pose`, `theta` (shape (3,)): a closed pose. `Lc`: characteristic length; the largest distance of a vertex from the
-    reference point by default. Raises `GeometryError` if the legs are not closed. [Gosselin & Angeles 1990];
-    theory/platform-jacobians 3.
+    `pose`, `theta` (shape (3,)): a closed pose, or `GeometryError`. `Lc`: characteristic length, by default
+    `characteristic_length`. [Gosselin & Angeles 1990]; theory/platform-jacobians 3.
 
     >>> import numpy as np
     >>> mock = ParallelPlatform.mock()
@@ -145,9 +142,7 @@ class NearestSingularity(NamedTuple):
 class SingularityDistance:
     """Distances in the norm ``sqrt(dx^2 + dy^2 + Lc^2 dalpha^2)`` (theory/platform-workspace 3).
 
-    * `determinant`: ``det JX`` with its sign, length^4.
-    * `smallest`: smallest singular value of ``JX diag(1, 1, 1/Lc)``, length.
-    * `sines`: ``S_k / (2 l1_k l2_k)``.
+    * `determinant`, `smallest`, `sines`: as in `Singularity`, the sines without sign.
     * `other_mode`: distance to the nearest other assembly mode for the same rocker angles; infinite if there is none.
     * `type_one`: nearest pose at which a leg is stretched or folded: a minimum over one angle per circle, found on a
       grid and refined (estimated, error about 1e-9 Lc).
@@ -223,27 +218,26 @@ def _type_one(platform: ParallelPlatform, X: Array, Lc: float) -> NearestSingula
     from scipy.optimize import minimize_scalar
 
     p = complex(X[0], X[1])
-    best: NearestSingularity | None = None
+    found = []
     turn = np.linspace(-math.pi, math.pi, 721)
     for k in range(3):
         l1, l2 = platform.l1[k], platform.l2[k]
         for radius in {l1 + l2, abs(l1 - l2)}:
 
-            def square(a: Any, k: int = k, radius: float = radius) -> Any:
-                centre = platform.D[k] - np.exp(1j * (X[2] + a)) * platform.b[k]
-                return (np.abs(p - centre) - radius) ** 2 + (Lc * a) ** 2
+            def away(a: Any, k: int = k) -> Any:
+                return p - (platform.D[k] - np.exp(1j * (X[2] + a)) * platform.b[k])
+
+            def square(a: Any, radius: float = radius, away: Any = away) -> Any:
+                return (np.abs(away(a)) - radius) ** 2 + (Lc * a) ** 2
 
             i = int(np.argmin(square(turn)))
             low, high = turn[max(i - 1, 0)], turn[min(i + 1, 720)]
             a = float(minimize_scalar(square, bounds=(low, high), method="bounded", options={"xatol": 1e-13}).x)
-            distance = math.sqrt(float(square(a)))
-            if best is None or distance < best.distance:
-                centre = platform.D[k] - complex(np.exp(1j * (X[2] + a))) * platform.b[k]
-                away = p - centre
-                q = centre + radius * (away / abs(away) if away else 1.0)
-                best = NearestSingularity("I", k + 1, (q.real, q.imag, float(X[2] + a)), distance)
-    assert best is not None  # three legs were looked at
-    return best
+            gap = complex(away(a))
+            q = p - gap + radius * (gap / abs(gap) if gap else 1.0)
+            pose = (q.real, q.imag, float(X[2] + a))
+            found.append(NearestSingularity("I", k + 1, pose, math.sqrt(float(square(a)))))
+    return min(found, key=lambda place: place.distance)
 
 
 def _type_two(
@@ -363,9 +357,7 @@ def statics(
     [-25.0, -25.0, -25.0]
     """
     X, t = closed_pose(platform, pose, theta)
-    W = finite_array("wrench", wrench).reshape(-1)
-    if W.shape != (3,):
-        raise GeometryError(f"wrench has {W.size} components; give (W_x, W_y, W_alpha)")
+    W = triple("wrench", wrench)
     found = singularity(platform, X, t, Lc=Lc, tolerance=tolerance)
     JX, JT = platform.jacobians(X, t)
     scale = np.array([1.0, 1.0, 1.0 / found.Lc])
@@ -396,11 +388,9 @@ def crank_statics(
     >>> held.status, abs(held.motor_torque / held.crank_torque)
     ('balanced', 0.5)
     """
-    psi = finite("psi", psi)
-    state = mechanism.drive(psi)
-    for k in range(3):
-        if not np.isfinite(state.theta[k]):
-            raise GeometryError(f"drive {k + 1} cannot be assembled at psi = {psi}; choose an angle inside its reach")
+    state = mechanism.drive(finite("psi", psi))
+    for k in np.flatnonzero(~np.isfinite(state.theta))[:1]:
+        raise GeometryError(f"drive {k + 1} cannot be assembled at psi = {psi}; choose an angle inside its reach")
     held = statics(mechanism.platform, pose, state.theta, wrench, Lc=mechanism.Lc, tolerance=tolerance)
     moment = 0.5 * state.h_phi  # cross(C - D, C - B)
     sine = moment / (np.array(mechanism.rocker) * np.array(mechanism.coupler))

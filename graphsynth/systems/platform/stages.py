@@ -120,8 +120,8 @@ def assess(
 ) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
     """Give one record per candidate and the tables of the first one moved."""
     records = records_of(recognised, motions, _verdict)
-    moved: PlatformMotion | None = next((a.value for a in motions if not a.failed), None)
-    return records, () if moved is None else (_turn_table(moved), _pose_table(moved.motion), _event_table(moved.motion))
+    moved = _first(motions)
+    return records, () if moved is None else _tables(moved)
 
 
 def _verdict(moved: PlatformMotion) -> tuple[str, bool, tuple[Quantity, ...]]:
@@ -156,10 +156,10 @@ def _margins(motion: Motion) -> tuple[Quantity, ...]:
     )
 
 
-def _turn_table(moved: PlatformMotion) -> Table:
-    """State what the turn is, its method and what the drives allow."""
+def _tables(moved: PlatformMotion) -> tuple[Table, ...]:
+    """Tell what the rotation is and what the drives allow; list poses every 45 degrees, dead points and the like."""
     motion, label = moved.motion, moved.motion.label
-    drives = ", ".join(turn.kind for turn in moved.mechanism.drive_turns())
+    drives = ", ".join(turn.kind.replace("turn", "rotation") for turn in moved.mechanism.drive_turns())
     side = {1: "> 0", -1: "< 0"}.get(label.sign, "= 0")
     branch = f"tau = {_signs(label.tau)}, sigma = {_signs(label.sigma)}, det JX {side}"
     rows = [
@@ -169,19 +169,20 @@ def _turn_table(moved: PlatformMotion) -> Table:
         *((q.name, q, q.guarantee) for q in _margins(motion)),
         ("time of the turn", f"{motion.seconds:.3f} s", "measured once"),
     ]
-    return table("The full rotation", ("quantity", "value", "method"), rows, f"Method: {motion.method}.")
+    eighths = sorted({round(i * (len(motion.psi) - 1) / 8) for i in range(9)})
+    modes = ("/".join("1" if value > 0 else "-1" for value in motion.leg[i]) for i in eighths)
+    poses = [(motion.psi[i], *motion.pose[i], motion.determinant[i], mode) for i, mode in zip(eighths, modes)]
+    found = [(event.psi, event.kind, event.statement) for event in motion.events]
+    how = "Estimated: Newton iteration in double precision."
+    return (
+        table("The full rotation", ("quantity", "value", "method"), rows, f"Method: {motion.method}."),
+        table("Poses over the turn", _POSE_COLUMNS, poses, how),
+        table(f"Events of the turn: {len(found)}", ("wheel [°] | .6f", "event", "what it means"), found),
+    )
 
 
 def _signs(values: tuple[int, ...]) -> str:
     return "(" + ", ".join("+" if value > 0 else "-" for value in values) + ")"
-
-
-def _pose_table(motion: Motion) -> Table:
-    """Give the pose and the determinant every 45 degrees of the wheel, as far as the motion reached."""
-    eighths = sorted({round(i * (len(motion.psi) - 1) / 8) for i in range(9)})
-    modes = ("/".join("1" if value > 0 else "-1" for value in motion.leg[i]) for i in eighths)
-    rows = ((motion.psi[i], *motion.pose[i], motion.determinant[i], mode) for i, mode in zip(eighths, modes))
-    return table("Poses over the turn", _POSE_COLUMNS, rows, "Estimated: Newton iteration in double precision.")
 
 
 _POSE_COLUMNS = (
@@ -192,13 +193,6 @@ _POSE_COLUMNS = (
     "det JX [mm^4] | .12g",
     "sigma",
 )
-
-
-def _event_table(motion: Motion) -> Table:
-    """List dead points and everything else the module met on the way."""
-    rows = ((event.psi, event.kind, event.statement) for event in motion.events)
-    title = f"Events of the turn: {len(motion.events)}"
-    return table(title, ("wheel [°] | .6f", "event", "what it means"), rows)
 
 
 _SHOWN = 6  # wheel angles drawn one by one

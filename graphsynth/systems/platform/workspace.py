@@ -65,14 +65,12 @@ class Workspace:
 
     Exact but for rounding, unless ``contacts`` reports circles that touch: there the arcs depend on the last digits.
 
-    * `alpha`: orientation, radians.
     * `sigma`: working mode of the joint limits; None without limits (the workspace is then the same for all modes).
     * `limits`: range of each rocker angle, or None.
     * `arcs`: the boundary, with leg and side of every piece.
     * `area`, `perimeter`: length^2 and length.  A workspace that has shrunk to a curve has area 0 and its length as
       perimeter.
     * `loops`: arcs (indices) in order around each closed boundary.
-    * `components`, `holes`: connected parts and holes.
     * `isolated`: single points that belong to the workspace but to no arc.
     * `dimension`: 2, or 1 for a curve, 0 for single points, -1 if the workspace is empty.
     * `tolerance`: distance below which circles count as touching, length.
