@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.angles import angle
 from graphsynth.core.checks import checked, finite_array
 from graphsynth.core.errors import GeometryError
-from graphsynth.jamming.bearing.arcs import JamArcs, jam_arcs, strictly_inside
+from graphsynth.jamming.bearing.arcs import JamArcs, covers, jam_arcs
 from graphsynth.jamming.bearing.areas import CrescentAreas, lid_area, rim_area, surrogate_areas
 from graphsynth.jamming.bearing.bearing import Bearing, Condition
 from graphsynth.jamming.bearing.limits import Limit, largest_misalignment, smallest_clearance
@@ -100,12 +100,8 @@ class JammingReport(Assessment):
 
     Attributes
     ----------
-    verdict : Verdict
-        Over the full rotation: that of the certificate, or an estimate if none was asked for; see ``method``.
-    method : str
-        How the verdict is known.
-    condition : str
-        Contact condition used.
+    verdict, method : Verdict, str
+        Over the full rotation: that of the certificate, or an estimate if none was asked for; how it is known.
     arcs : JamArcs
         Closed-form jam arcs of the nominal dimensions, radians (estimated; proved bounds are in the certificate).
     worst_interference, worst_angle : float
@@ -113,16 +109,12 @@ class JammingReport(Assessment):
         which it is reached; NaN if there are none.
     largest_tilt, critical_tilt : float or None
         Radians; None if there is no critical tilt, with the sentence in ``arcs.reason``.
-    full_turn : FullTurn
-        Whether the crank makes a full rotation at all.
-    table : JammingTable
-        Values over the sampled crank angles.
+    full_turn, table : FullTurn, JammingTable
+        Whether the crank makes a full rotation at all; values over the sampled crank angles.
     smallest_clearance, largest_misalignment : Limit
         Inverse questions for conditions "A" and "B" (None for "general").
     notes : tuple of str
         What a reader must know: angles that cannot be assembled, special cases.
-    seconds : float
-        Run time.
     certificate : JamCertificate or None
         What is proved, with evidence: bounds of the interference, inner and outer arcs, witness.
     """
@@ -175,7 +167,7 @@ class JammingReport(Assessment):
         frame = self.table.to_pandas()
         for name, kind in (("certainly_jams", "inner"), ("certainly_free", "free")):
             spans = getattr(self.certificate.arcs, kind) if self.certificate else ()
-            frame[name] = [strictly_inside(spans, angle) for angle in self.table.f]
+            frame[name] = [covers(spans, angle, angle) for angle in self.table.f]
         if self.certificate and self.certificate.assembles != "always":
             from graphsynth.intervals import Interval
             from graphsynth.jamming.bearing.corners import pose
@@ -253,12 +245,11 @@ def assess_jamming(
         the verdict of L0 holds for the whole box; table and closed-form arcs are those of its middle.
     bearing : Bearing, optional
         L0: the bearing at B, by default that of the box, else of the source (17.5 mm, 10 mm, 0.03 mm).
-    condition : {"A", "B", "general"}
-        Contact condition; "A" (short bearing in a long hole) is what the source means.
+    condition, certify : {"A", "B", "general"}, bool
+        Contact condition; "A" (short bearing in a long hole) is what the source means.  With ``certify=False`` the
+        verdict is an estimate in double precision, and says so.
     samples : int or array_like, optional
         L0: number of crank angles of the table over [0, 2 pi] (361), or the angles themselves (radians).
-    certify : bool
-        If False the verdict is an estimate in double precision, and says so.
     **of_a_motion
         L1: ``tilt``, the misaligned axes (`Misalignment` or several), or the tilt of the first driver's axis in radians
         or as text, "0.5 deg".  ``joints``, what the joints allow: a `Bearing`, `JointLimits` or `SlideLimits` for all,
@@ -354,6 +345,13 @@ def assess_bearing(
         from graphsynth.jamming.bearing.certify import certify_jamming
 
         certificate = certify_jamming(ToleranceBox.of(linkage, bearing) if box is None else box, condition)
+    notes = [arcs.reason] if arcs.reason else []
+    if not turn.possible:
+        notes.append(f"{turn.statement}; the arcs hold for the assembled crank angles only")
+    if table.rim_by_quadrature.any():
+        notes.append("R S > h C at some angles: the area of the rim is a quadrature there")
+    if certificate and certificate.reason and certificate.reason not in notes:
+        notes.append(certificate.reason)
     inverse = condition != "general" and linkage.rod == "rigid" and linkage.pin_height <= linkage.l3
     return JammingReport(
         linkage=linkage,
@@ -370,21 +368,10 @@ def assess_bearing(
         table=table,
         smallest_clearance=smallest_clearance(linkage, bearing, condition) if inverse else None,
         largest_misalignment=largest_misalignment(linkage, bearing, condition) if inverse else None,
-        notes=_notes(arcs, turn, table, certificate),
+        notes=tuple(notes),
         seconds=perf_counter() - begin,
         certificate=certificate,
     )
-
-
-def _notes(arcs: JamArcs, turn: FullTurn, table: JammingTable, certificate: JamCertificate | None) -> tuple[str, ...]:
-    notes = [text for text in (arcs.reason,) if text]
-    if not turn.possible:
-        notes.append(f"{turn.statement}; the arcs hold for the assembled crank angles only")
-    if table.rim_by_quadrature.any():
-        notes.append("R S > h C at some angles: the area of the rim is a quadrature there")
-    if certificate and certificate.reason and certificate.reason not in notes:
-        notes.append(certificate.reason)
-    return tuple(notes)
 
 
 def _angles(samples: int | ArrayLike) -> Array:

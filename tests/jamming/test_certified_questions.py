@@ -35,7 +35,7 @@ from graphsynth.jamming import (
     wedging,
 )
 from graphsynth.jamming.bearing import branch_and_bound, fits
-from graphsynth.jamming.bearing.arcs import Span, complement, contains, merge_outer, strictly_inside, subtract
+from graphsynth.jamming.bearing.arcs import Span, complement, contains, covers, merge_outer, subtract
 from graphsynth.jamming.bearing.sweep import PieceInterference
 
 
@@ -315,7 +315,7 @@ def test_sweep_and_closed_form_check_each_other(condition):
         middle = 0.5 * (span.start + span.stop)
         assert contains(sweep.inner, middle)
     for span in sweep.free:
-        assert not any(strictly_inside(arcs.inner, f) for f in np.linspace(span.start, span.stop, 50))
+        assert not any(covers(arcs.inner, f, f) for f in np.linspace(span.start, span.stop, 50))
     total = sum(s.stop - s.start for kind in (sweep.free, sweep.inner, sweep.undecided) for s in kind)
     assert total == pytest.approx(math.tau, rel=1e-12)
 
@@ -397,5 +397,5 @@ def test_sets_of_angles():
     assert subtract((Span(0.0, 3.0),), (Span(1.0, 2.0),)) == (Span(0.0, 1.0), Span(2.0, 3.0))
     (left, right) = subtract((Span(5.0, 8.0),), (Span(0.5, 1.0),))  # a turn later
     assert left.stop >= 0.5 + math.tau and right.start <= 1.0 + math.tau
-    assert strictly_inside((Span(6.0, 6.5),), 0.1) and not strictly_inside((Span(6.0, 6.5),), 0.3)
-    assert not strictly_inside((Span(1.0, 2.0),), 1.0)
+    assert covers((Span(6.0, 6.5),), 0.1, 0.1) and not covers((Span(6.0, 6.5),), 0.3, 0.3)
+    assert not covers((Span(1.0, 2.0),), 1.0, 1.0)

@@ -121,13 +121,11 @@ def contains(spans: Iterable[Span], f: float) -> bool:
     return any((f - span.start) % math.tau <= span.stop - span.start for span in spans)
 
 
-def strictly_inside(spans: Iterable[Span], f: float) -> bool:
-    """Whether a crank angle (a double in [-2 pi, 4 pi]) certainly lies in one of the spans; never true by rounding."""
-    return covers(spans, f, f)
-
-
 def covers(spans: Iterable[Span], start: float, stop: float) -> bool:
-    """Whether one of the spans certainly holds the piece from ``start`` to ``stop`` in its inside."""
+    """Whether one of the spans certainly holds the piece from ``start`` to ``stop`` (in [-2 pi, 4 pi]) in its inside.
+
+    Never true by rounding; a piece may be a single angle.
+    """
     for span in spans:
         if _certainly_full(span):
             return True
@@ -168,6 +166,11 @@ class Enclosure(NamedTuple):
     lo: float
     hi: float
 
+    @classmethod
+    def of(cls, value: Interval) -> Enclosure:
+        """Return the bounds of one interval."""
+        return cls(float(value.lo), float(value.hi))
+
     @property
     def width(self) -> float:
         """Upper bound of the width."""
@@ -198,34 +201,31 @@ class CertifiedArcs:
     arcs : tuple of ArcEnclosure
         The two arcs (one per lid) with their ends enclosed over the whole box; empty unless they exist for every
         parameter vector.
-    inner : tuple of Span
-        Crank angles at which every parameter vector binds.
-    outer : tuple of Span
-        Crank angles outside of which no parameter vector binds.
-    undecided : tuple of Span
-        Outer without inner: some jam, some may not, or rounding does not decide.
-    free : tuple of Span
-        The complement of the outer arcs: free for every parameter vector.
-    kappa : Enclosure
-        Range over the box of the value that ``|sin(f - phase)|`` must exceed.
-    phase : Enclosure
-        psi1 modulo pi, radians.
+    inner, outer : tuple of Span
+        Crank angles at which every parameter vector binds, wherever the linkage can be assembled, and outside of which
+        none does.
+    kappa, phase : Enclosure
+        Range over the box of the value that ``|sin(f - phase)|`` must exceed; psi1 modulo pi, radians.
     reason : str
         What is special: no arcs and why, arcs that exist for some parameters only, touching.
-
-    Notes
-    -----
-    "Jams" holds wherever the linkage can be assembled; crank angles it cannot reach are not in question.
     """
 
     arcs: tuple[ArcEnclosure, ...]
     inner: tuple[Span, ...]
     outer: tuple[Span, ...]
-    undecided: tuple[Span, ...]
-    free: tuple[Span, ...]
     kappa: Enclosure
     phase: Enclosure
     reason: str = ""
+
+    @property
+    def undecided(self) -> tuple[Span, ...]:
+        """Outer without inner: some jam, some may not, or rounding does not decide."""
+        return subtract(self.outer, self.inner)
+
+    @property
+    def free(self) -> tuple[Span, ...]:
+        """The complement of the outer arcs: free for every parameter vector."""
+        return complement(self.outer)
 
     @property
     def jammed_part(self) -> Enclosure:
@@ -235,64 +235,37 @@ class CertifiedArcs:
         return Enclosure(max(0.0, low - 2e-15), min(1.0, high + 2e-15 if self.outer else 0.0))
 
 
-def no_arcs(kappa: Enclosure, phase: Enclosure, reason: str) -> CertifiedArcs:
-    """Return the result for a turn that is free for every parameter vector."""
-    return CertifiedArcs((), (), (), (), (FULL_TURN,), kappa, phase, reason)
-
-
-def whole_turn(kappa: Enclosure, phase: Enclosure, reason: str, proved: bool) -> CertifiedArcs:
-    """Return the result for a turn that binds everywhere, or that is undecided everywhere."""
-    inner, undecided = ((FULL_TURN,), ()) if proved else ((), (FULL_TURN,))
-    return CertifiedArcs((), inner, (FULL_TURN,), undecided, (), kappa, phase, reason)
-
-
 def arcs_from(kappa: Enclosure, phase: Interval) -> CertifiedArcs:
     """Build the arcs ``|sin(f - phase)| > kappa`` from enclosures over a box.
 
     The ends are ``phase + asin(kappa)`` and ``phase + pi - asin(kappa)`` and the same half a turn later; bounds of the
     outer arcs take the smallest kappa, those of the inner arcs the largest.
     """
-    shown = Enclosure(float(phase.lo), float(phase.hi))
-    if kappa.lo > 1.0:
-        return no_arcs(kappa, shown, "the largest tilt stays below the critical tilt")
-    known = float(phase.width) < 3.14
-    ends = _both_arcs(kappa, phase) if known else []
-    if not ends:
-        return whole_turn(kappa, shown, "the direction of the tilt is not known within half a turn", False)
-    outer = merge_outer(Span(arc.start.lo, arc.stop.hi) for arc in ends)
-    exists = kappa.hi < 1.0
-    inner = tuple(Span(a.start.hi, a.stop.lo) for a in ends if exists and a.start.hi < a.stop.lo)
-    reason = _about(kappa)
-    arcs = tuple(ends) if exists else ()
-    return CertifiedArcs(arcs, inner, outer, subtract(outer, inner), complement(outer), kappa, shown, reason)
-
-
-def _about(kappa: Enclosure) -> str:
-    """Say what is special about a range of kappa."""
-    if kappa.lo == 0.0:
-        if kappa.hi == 0.0:
-            return "no clearance: binds at every angle with a tilt, touches at the two angles without"
-        return "no clearance is left at the lower end of its range: every angle with a tilt may bind"
-    if kappa.hi >= 1.0:
-        return "kappa contains 1: whether there is an arc at all depends on the parameters, or on rounding"
-    return ""
-
-
-def _both_arcs(kappa: Enclosure, phase: Interval) -> list[ArcEnclosure]:
-    """Enclose both arcs over the box, the start of each brought into [0, 2 pi) as a whole."""
     from graphsynth.intervals import pi
     from graphsynth.jamming.bearing.corners import arcsine
 
+    shown = Enclosure.of(phase)
+    if kappa.lo > 1.0:
+        return CertifiedArcs((), (), (), kappa, shown, "the largest tilt stays below the critical tilt")
+    if not float(phase.width) < 3.14:
+        reason = "the direction of the tilt is not known within half a turn"
+        return CertifiedArcs((), (), (FULL_TURN,), kappa, shown, reason)
     half, edge = pi(), arcsine(min(kappa.lo, 1.0)).hull(arcsine(min(kappa.hi, 1.0)))
     arcs = []
-    for base in (phase, phase + half):
+    for base in (phase, phase + half):  # the start of each brought into [0, 2 pi) as a whole
         turns = math.floor(float((base + edge).mid) / math.tau)
         whole = base - half * (2 * turns) if turns else base
-        start, stop = whole + edge, whole + half - edge
-        arcs.append(
-            ArcEnclosure(Enclosure(float(start.lo), float(start.hi)), Enclosure(float(stop.lo), float(stop.hi)))
-        )
-    return arcs
+        arcs.append(ArcEnclosure(Enclosure.of(whole + edge), Enclosure.of(whole + half - edge)))
+    outer = merge_outer(Span(arc.start.lo, arc.stop.hi) for arc in arcs)
+    exists, reason = kappa.hi < 1.0, ""
+    inner = tuple(Span(a.start.hi, a.stop.lo) for a in arcs if exists and a.start.hi < a.stop.lo)
+    if kappa.hi == 0.0:
+        reason = "no clearance: binds at every angle with a tilt, touches at the two angles without"
+    elif kappa.lo == 0.0:
+        reason = "no clearance is left at the lower end of its range: every angle with a tilt may bind"
+    elif not exists:
+        reason = "kappa contains 1: whether there is an arc at all depends on the parameters, or on rounding"
+    return CertifiedArcs(tuple(arcs) if exists else (), inner, outer, kappa, shown, reason)
 
 
 _ROUNDING = 16 * 2.0**-52
@@ -327,10 +300,9 @@ class JamArcs:
         The two arcs, half a turn apart, one per lid; empty if there is none.
     touching : tuple of float
         Crank angles (radians) of contact without overlap: the two of ``kappa = 1``, or of zero clearance.
-    kappa : float
-        Sine of the critical tilt over the largest sine of tilt; infinite if there is no critical tilt or no tilt.
-    phase : float
-        psi1 with tilt proportional to ``sin(f - psi1)``, radians.
+    kappa, phase : float
+        Sine of the critical tilt over the largest sine of tilt, infinite if there is no critical tilt or no tilt; psi1
+        with tilt proportional to ``sin(f - psi1)``, radians.
     condition, method, reason : str
         Contact condition used, how the arcs are known, and why there are none or what is special.
     """
@@ -353,10 +325,8 @@ def jam_arcs(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A
 
     Parameters
     ----------
-    linkage, bearing : TiltedFourBar, Bearing
-        Dimensions of the bearing in millimetres.
-    condition : {"A", "B"}
-        Contact condition: short bearing in a long hole, or long shaft in a short hole.
+    linkage, bearing, condition : TiltedFourBar, Bearing, {"A", "B"}
+        Dimensions of the bearing in millimetres; short bearing in a long hole, or long shaft in a short hole.
 
     Returns
     -------
@@ -370,42 +340,35 @@ def jam_arcs(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A
     [27.05922, 207.05922]
     """
     critical = bearing.critical_tilt(condition)
-    phase = linkage.pin_phase
-    if critical.sine is None:
+    sine, reason, phase = critical.sine, critical.reason, linkage.pin_phase
+    arcs: list[JamArc] = []
+    touching: list[float] = []
+    if sine is None:
+        kappa = math.inf
         if bearing.clearance < 0.0:
-            return JamArcs((JamArc(0.0, math.tau),), (), 0.0, phase, condition, reason=critical.reason)
-        return JamArcs((), (), math.inf, phase, condition, reason=critical.reason)
-    if not linkage.tilted:
+            kappa, arcs = 0.0, [JamArc(0.0, math.tau)]
+    elif not linkage.tilted:
+        kappa, reason = math.inf, "the crank pin stays in the plane: no tilt"
         if bearing.clearance == 0.0:
-            text = "no tilt and no clearance: touching at every angle"
-            return JamArcs((), (0.0,), math.nan, phase, condition, reason=text)
-        return JamArcs((), (), math.inf, phase, condition, reason="the crank pin stays in the plane: no tilt")
-    kappa = _kappa(linkage, critical.sine)
-    quarter = 0.5 * math.pi
-    if abs(kappa - 1.0) <= _ROUNDING:
-        touch = ((phase + quarter) % math.tau, (phase - quarter) % math.tau)
-        return JamArcs((), touch, kappa, phase, condition, reason="the largest tilt equals the critical tilt")
-    if kappa > 1.0:
-        return JamArcs((), (), kappa, phase, condition, reason="the largest tilt is below the critical tilt")
-    if critical.reason:  # h^2 = c (2R + c): contact, never overlap
-        return JamArcs((), _ends(phase, kappa), kappa, phase, condition, reason=critical.reason)
-    arcs = tuple(
-        JamArc((phase + math.asin(kappa) + turn) % math.tau, 2.0 * math.acos(kappa)) for turn in (0.0, math.pi)
-    )
-    touching = (phase % math.tau, (phase + math.pi) % math.tau) if kappa == 0.0 else ()
-    reason = "no clearance: binds at every angle with a tilt" if kappa == 0.0 else ""
-    return JamArcs(tuple(sorted(arcs, key=lambda arc: arc.start)), touching, kappa, phase, condition, reason=reason)
-
-
-def _ends(phase: float, kappa: float) -> tuple[float, ...]:
-    edge = math.asin(kappa)
-    return tuple(sorted((phase + angle) % math.tau for angle in (edge, math.pi - edge, math.pi + edge, -edge)))
-
-
-def _kappa(linkage: TiltedFourBar, sine: float) -> float:
-    """Value of ``|sin(f - psi1)|`` at which the tilt becomes critical."""
-    if sine == 0.0 or linkage.pin_height == 0.0:  # tilts that underflow
-        return math.inf if sine > 0.0 else 0.0
-    if linkage.rod == "rigid":
-        return linkage.l3 * sine / linkage.pin_height
-    return linkage.l3 * sine / math.sqrt((1.0 - sine) * (1.0 + sine)) / linkage.pin_height  # tan theta = A_z / l3
+            kappa, touching, reason = math.nan, [0.0], "no tilt and no clearance: touching at every angle"
+    else:  # kappa is the value of |sin(f - psi1)| at which the tilt becomes critical
+        if sine == 0.0 or linkage.pin_height == 0.0:  # tilts that underflow
+            kappa = math.inf if sine > 0.0 else 0.0
+        else:
+            steep = 1.0 if linkage.rod == "rigid" else math.sqrt((1.0 - sine) * (1.0 + sine))  # tan theta = A_z / l3
+            kappa = linkage.l3 * sine / steep / linkage.pin_height
+        if abs(kappa - 1.0) <= _ROUNDING:
+            touching = [phase + 0.5 * math.pi, phase - 0.5 * math.pi]
+            reason = "the largest tilt equals the critical tilt"
+        elif kappa > 1.0:
+            reason = "the largest tilt is below the critical tilt"
+        elif reason:  # h^2 = c (2R + c): contact, never overlap
+            edge = math.asin(kappa)
+            touching = sorted((phase + angle) % math.tau for angle in (edge, math.pi - edge, math.pi + edge, -edge))
+        else:
+            edge, length = phase + math.asin(kappa), 2.0 * math.acos(kappa)
+            arcs = [JamArc(start, length) for start in sorted([edge % math.tau, (edge + math.pi) % math.tau])]
+            if kappa == 0.0:
+                touching, reason = [phase, phase + math.pi], "no clearance: binds at every angle with a tilt"
+    touching = [angle % math.tau for angle in touching]
+    return JamArcs(tuple(arcs), tuple(touching), kappa, phase, condition, reason=reason)

@@ -130,15 +130,9 @@ def _pi() -> Interval:
 def enclose_crescents(R1: Any, pa: Any, qb: Any) -> CrescentAreas:
     """Enclose the areas between a circle and a centred ellipse from ``pa = a - R1`` and ``qb = R1 - b`` (certified).
 
-    Exact up to rounding for a point R1; for a range of R1 an enclosure.
+    Exact up to rounding for a point R1; for a range of R1 an enclosure.  Raises `GeometryError` unless ``R1 > 0``,
+    ``qb < R1`` and ``pa + qb >= 0`` throughout.
 
-    Raises
-    ------
-    GeometryError
-        Unless ``R1 > 0``, ``qb < R1`` and ``pa + qb >= 0`` throughout.
-
-    Examples
-    --------
     >>> found = enclose_crescents(1, "1e-9", "1e-9")
     >>> found.ellipse_only.contains("1.999999998429203672788436714e-9"), bool(found.ellipse_only.width < 1e-22)
     (True, True)
@@ -197,7 +191,9 @@ def enclose_surrogate_areas(R: Any, clearance: Any, h: Any, sine: Any) -> Cresce
     """
     R, c, h, S = _bearing_ranges(R, clearance, h, sine)
     pairs = ((c.lo, c.hi), (h.hi, h.lo), (S.hi, S.lo))  # the tight corner, the free corner
-    areas, depth = _surrogate_at(_twice(R), *(_point(np.stack(pair)) for pair in pairs))
+    R2, c2, h2, S2 = _twice(R), *(_point(np.stack(pair)) for pair in pairs)
+    depth = h2 * S2 - c2 + (R2 + c2) * _tilt(S2).bend
+    areas = _crescents_at(R2, c2, _choose(depth.hi < R2.lo, depth, Interval(0)))
     never, maybe = depth.lo[1] >= R.hi, depth.hi[0] >= R.lo
     any_area = _bounds(0.0, np.inf)
     both = []
@@ -205,13 +201,6 @@ def enclose_surrogate_areas(R: Any, clearance: Any, h: Any, sine: Any) -> Cresce
         found = _bounds(np.minimum(area.lo[low], area.hi[high]), area.hi[high])
         both.append(_choose(never, Interval.empty(), _choose(maybe, any_area, found)))
     return CrescentAreas(*both)
-
-
-def _surrogate_at(R: Interval, c: Interval, h: Interval, S: Interval) -> tuple[CrescentAreas, Interval]:
-    tilt = _tilt(S)
-    depth = h * S - c + (R + c) * tilt.bend
-    defined = _choose(depth.hi < R.lo, depth, Interval(0))
-    return _crescents_at(R, c, defined), depth
 
 
 def enclose_lid_area(R: Any, clearance: Any, h: Any, sine: Any) -> Interval:
@@ -344,33 +333,21 @@ def enclose_tilt_sine(linkage: TiltedFourBar, f: ArrayLike | Interval) -> Interv
     """Enclose the sine of the tilt of the coupler, ``A_z / l3``, at crank angles (radians) or over intervals of them.
 
     The numbers of the linkage are taken as the doubles that they are; a pin that rises above l3 gives a sine beyond 1.
-    See theory/four-bar-and-tilt 5 to 8.
-
-    Raises
-    ------
-    GeometryError
-        For ``rod="deck"``, which is no rigid body.
+    See theory/four-bar-and-tilt 5 to 8.  Raises `GeometryError` for ``rod="deck"``, which is no rigid body.
     """
     from graphsynth.intervals import functions
 
     if linkage.rod != "rigid":
         raise GeometryError('enclose_tilt_sine holds for rod="rigid" only; the deck rod is not a rigid body')
     check_rounding()
-    angle = f if isinstance(f, Interval) else _points(f)
-    axis = [Interval.from_bounds(n, n) for n in linkage.axis]  # of length 1 up to rounding only
+    angle = f if isinstance(f, Interval) else _point(finite_array("f", f))
+    axis = [Interval(n) for n in linkage.axis]  # of length 1 up to rounding only
     length = (axis[0].sqr() + axis[1].sqr() + axis[2].sqr()).sqrt()
     n1, n2, n3 = (part / length for part in axis)
-    alpha = Interval.from_bounds(linkage._angle, linkage._angle)
+    alpha = Interval(linkage._angle)
     s, v = functions.sin(alpha), 2 * functions.sin(alpha / 2).sqr()
     height = (n1 * n3 * v - n2 * s) * functions.cos(angle) + (n2 * n3 * v + n1 * s) * functions.sin(angle)
-    ratio = Interval.from_bounds(linkage.l2, linkage.l2) / Interval.from_bounds(linkage.l3, linkage.l3)
-    sine: Interval = height * ratio
-    return sine
-
-
-def _points(f: ArrayLike) -> Interval:
-    angles = finite_array("f", f)
-    return Interval.from_bounds(angles, angles)
+    return height * (Interval(linkage.l2) / Interval(linkage.l3))
 
 
 @checked
@@ -379,15 +356,9 @@ def area_curve(
 ) -> AreaCurve:
     """Enclose all areas over crank angles (certified); without arguments those of the source in half degrees.
 
-    The dimensions of the bearing are read as the decimals they print as.
+    The dimensions of the bearing are read as the decimals they print as.  Raises `GeometryError` for an interference
+    fit, the non-rigid rod, and angles at which the crank pin rises above l3.
 
-    Raises
-    ------
-    GeometryError
-        For an interference fit, the non-rigid rod, and angles at which the crank pin rises above l3.
-
-    Examples
-    --------
     >>> curve = area_curve(f=np.radians([90.0, 180.0]))
     >>> np.round(curve.lid.mid, 9).tolist(), np.round(curve.source_ordinate, 9).tolist()
     ([0.966036031, 0.0], [0.974968365, 0.0])

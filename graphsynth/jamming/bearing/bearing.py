@@ -24,16 +24,9 @@ CONDITIONS = ("A", "B", "general")
 
 @dataclass(frozen=True)
 class CriticalTilt:
-    """Tilt at which the clearance is used up.
+    """Tilt at which the clearance is used up: its angle (radians) and sine, None if there is none.
 
-    Attributes
-    ----------
-    angle, sine : float or None
-        The critical tilt (radians) and its sine; None if there is none.
-    reason : str
-        Why there is no critical tilt, or a remark ("touches but never overlaps"); empty otherwise.
-    condition : str
-        The contact condition used.
+    ``reason`` says why there is none, or holds a remark ("touches but never overlaps"); empty otherwise.
     """
 
     angle: float | None
@@ -44,14 +37,15 @@ class CriticalTilt:
 
 @dataclass(frozen=True)
 class Bearing:
-    """A cylinder of radius Rb and height Hb in a hole of radius ``Rb + clearance``.
+    """A cylinder of radius Rb and height Hb in a hole of radius ``Rb + clearance`` (theory/bearing-contact).
+
+    Both parts are axially centred; their axes cross at the centre.
 
     Parameters
     ----------
-    Rb : float
-        Radius of the inner cylinder, millimetres.
-    Hb : float
-        Height of the bearing (condition A), or length of the hole (condition B), millimetres; zero is a thin plate.
+    Rb, Hb : float
+        Radius of the inner cylinder, millimetres; height of the bearing (condition A), or length of the hole (condition
+        B), millimetres; zero is a thin plate.
     clearance : float
         Radial clearance, millimetres; negative means an interference fit.
     hole_length : float, optional
@@ -63,9 +57,6 @@ class Bearing:
         A radius that is not positive, a negative height, a clearance of ``-Rb`` or less, a NaN, a size beyond 1e60 or
         between 0 and 1e-60.
 
-    Notes
-    -----
-    See theory/bearing-contact.  Both parts are axially centred; their axes cross at the centre.
 
     Examples
     --------
@@ -124,33 +115,24 @@ class Bearing:
         S, C = np.abs(finite_array("sine", sine, nan=True)), finite_array("cosine", cosine, nan=True)
         if condition == "B":
             return self._interference_b(S, C, self.h)
-        interference = np.where(self.Rb * S <= self.h * C, self._interference_a(S, C), self._saturated())
+        # sqrt(R^2 + h^2) - Rh without cancellation: the second branch of theory/bearing-contact 2
+        saturated = float(Fraction(self.h) ** 2 - self._slack) / (math.hypot(self.Rb, self.h) + self.Rh)
+        upright = self.h * S - self.clearance - self.Rb * S * S / (1.0 + C)
+        interference = np.where(self.Rb * S <= self.h * C, upright, saturated)
         if condition == "general":
             slanted = np.logical_and(self.h * C - self.Rb * S > half, C > 0.0)
             with np.errstate(divide="ignore", invalid="ignore"):
                 interference = np.where(slanted, self._interference_b(S, C, min(half, self.h)) / C, interference)
         return interference
 
-    def _interference_a(self, S: Array, C: Array) -> Array:
-        return np.asarray(self.h * S - self.clearance - self.Rb * S * S / (1.0 + C))
-
     def _interference_b(self, S: Array, C: Array, half: float) -> Array:
         return np.asarray(half * S - self.clearance + self.Rh * S * S / (1.0 + C))
-
-    def _saturated(self) -> float:
-        """``sqrt(R^2 + h^2) - Rh`` without cancellation (second branch of theory/bearing-contact 2)."""
-        return float(Fraction(self.h) ** 2 - self._slack) / (math.hypot(self.Rb, self.h) + self.Rh)
 
     def critical_tilt(self, condition: Condition = "A") -> CriticalTilt:
         """Smallest tilt at which the parts touch, or None with the reason (theory/bearing-contact 7).
 
         The existence test is exact for the given double-precision dimensions; the angle is a closed form in double
         precision.
-
-        Raises
-        ------
-        GeometryError
-            An unknown condition, or "general" without a hole length.
         """
         half = self._hole_half(condition)
         if self.clearance < 0.0:
@@ -162,9 +144,6 @@ class Bearing:
             S, C = math.sin(slanted.angle or 0.0), math.cos(slanted.angle or 0.0)
             if self.h * C - self.Rb * S > half:
                 return slanted
-        return self._critical_a(condition)
-
-    def _critical_a(self, condition: str) -> CriticalTilt:
         room = Fraction(self.h) ** 2 - self._slack
         if room < 0 or self.h == 0.0:  # a disc (h = 0) never leaves the hole, whatever the clearance
             text = "h^2 < c (2R + c): the bearing turns freely in the hole at any tilt"

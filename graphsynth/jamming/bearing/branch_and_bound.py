@@ -46,14 +46,10 @@ class Supremum:
         Certified bounds; an infinite end says that nothing is known there.
     point : ndarray, shape (n,)
         A point of the box whose value is at least ``lower``.
-    boxes : int
-        Boxes evaluated.
-    waiting : int
-        Boxes not settled when the search stopped.
-    finished : bool
-        True if the bounds are as close as asked, or their sign decides what was asked.
-    seconds : float
-        Run time.
+    boxes, waiting : int
+        Boxes evaluated; boxes not settled when the search stopped.
+    finished, seconds : bool, float
+        Whether the bounds are as close as asked, or their sign decides what was asked; run time.
     """
 
     lower: float
@@ -84,11 +80,8 @@ def maximise(
         Takes n `Dual` variables of shape (N,), returns a `Dual` of shape (N,); written with operators and the functions
         of `graphsynth.intervals`.
     box : Interval, shape (n,)
-        The box.
-    tolerance : float
-        Stop when the bounds are this close.
-    decide_sign : bool
-        Stop as soon as the largest value is proved negative or positive.
+    tolerance, decide_sign : float, bool
+        Stop when the bounds are this close; stop as soon as the largest value is proved negative or positive.
     max_boxes, max_seconds : budgets
         Exhausted: the bounds found so far, ``finished`` False.
     tried : Interval, shape (n,), optional
@@ -248,7 +241,7 @@ def interference_function(
 
     For `maximise`; the axis is fixed, the rod rigid.  It uses none of the monotonicity of `certify_jamming`.
     """
-    from graphsynth.intervals import Interval, minimum, sin, sqrt
+    from graphsynth.intervals import Dual, Interval, minimum, sin, sqrt
 
     n = [Interval(part) for part in axis]
     flat, steep = n[0].sqr() + n[1].sqr(), n[2].sqr()
@@ -262,29 +255,24 @@ def interference_function(
         h = height / 2
         bend = S.sqr() / (1 + C)
         if condition == "B":
-            below: Dual = h * S - c + (R + c) * bend
-            return below
-        a = _either(R * S - h * C, h * S - c - R * bend, sqrt(R.sqr() + h.sqr()) - (R + c))
+            shaft: Dual = h * S - c + (R + c) * bend
+            return shaft
+        # the second branch where R S > h C; the hull of both where that is not known
+        switch, low, high = R * S - h * C, h * S - c - R * bend, sqrt(R.sqr() + h.sqr()) - (R + c)
+        below, above = switch.value.hi <= 0.0, switch.value.lo > 0.0
+        parts = []
+        for first, second in ((low.value, high.value), (low.grad, high.grad)):
+            hull = first.hull(second)
+            lo = np.where(below, first.lo, np.where(above, second.lo, hull.lo))
+            hi = np.where(below, first.hi, np.where(above, second.hi, hull.hi))
+            parts.append(Interval.from_bounds(lo, hi))
+        a = Dual(*parts)
         if condition == "A":
             return a
         slanted: Dual = minimum(a, (v[6] / 2 * S - c + (R + c) * bend) / C)
         return slanted
 
     return interference
-
-
-def _either(switch: Dual, low: Dual, high: Dual) -> Dual:
-    """``low`` where the switch is certainly at or below 0, ``high`` where it is above, their hull elsewhere."""
-    from graphsynth.intervals import Dual, Interval
-
-    below, above = switch.value.hi <= 0.0, switch.value.lo > 0.0
-
-    def pick(a: Interval, b: Interval) -> Interval:
-        hull = a.hull(b)
-        lo = np.where(below, a.lo, np.where(above, b.lo, hull.lo))
-        return Interval.from_bounds(lo, np.where(below, a.hi, np.where(above, b.hi, hull.hi)))
-
-    return Dual(pick(low.value, high.value), pick(low.grad, high.grad))
 
 
 @checked
@@ -295,10 +283,8 @@ def largest_interference(box: ToleranceBox, condition: Condition = "A", **option
 
     Parameters
     ----------
-    box : ToleranceBox
-        With a fixed axis and a rigid rod.
-    condition : {"A", "B", "general"}
-        Contact condition.
+    box, condition : ToleranceBox, {"A", "B", "general"}
+        With a fixed axis and a rigid rod; contact condition.
     **options
         As for `maximise`.
 
@@ -341,27 +327,18 @@ class Samples:
 
     Attributes
     ----------
-    count : int
-        Parameter vectors with a crank angle, uniform in the box and over the turn.
-    largest_interference : float
-        Largest interference seen, mm (estimated).
+    count, corners : int
+        Parameter vectors with a crank angle, uniform in the box and over the turn; corners of the box tried.
+    largest_interference, corner_interference : float
+        Largest interference seen in the samples, and over the corners at the worst angle, mm (estimated).
     jamming_positions : float
         Part of the samples with a positive interference: the share of crank positions, over all parameter vectors.
-    jamming_mechanisms : float
+    jamming_mechanisms, jamming_mechanisms_range : float, (float, float)
         Part of the parameter vectors that have a positive interference somewhere in the turn: the probability that a
-        mechanism drawn from the box binds (estimated), whether that position can be assembled or not.
-    jamming_mechanisms_range : (float, float)
-        Confidence interval of that probability, 95 %, exact for the binomial distribution [Clopper & Pearson 1934].
-    corner_interference : float
-        Largest interference over all corners of the box at the worst angle, mm (estimated).
-    corners : int
-        Corners tried.
-    bound : float
-        Certified upper bound of the interference, mm.
-    outside : int
-        Samples above the bound; anything but 0 is a bug.
-    seconds : float
-        Run time.
+        mechanism drawn from the box binds (estimated), whether that position can be assembled or not; its confidence
+        interval, 95 %, exact for the binomial distribution [Clopper & Pearson 1934].
+    bound, outside : float, int
+        Certified upper bound of the interference, mm; samples above it: anything but 0 is a bug.
     """
 
     count: int
@@ -389,20 +366,15 @@ def sample_interference(
 
     Parameters
     ----------
-    box : ToleranceBox
-        The tolerance box; uniform and independent in every range.
-    condition : {"A", "B", "general"}
-        Contact condition.
-    count : int
-        Number of samples.
-    seed : int
-        Seed of the generator.
+    box, condition : ToleranceBox, {"A", "B", "general"}
+        The tolerance box, uniform and independent in every range; contact condition.
+    count, seed : int
+        Number of samples; seed of the generator.
 
     Returns
     -------
     Samples
-        Largest interference met, mm, whether it respects the certified bound, and how often positions and mechanisms
-        jam.
+        What was met, and whether it respects the certified bound.
 
     Raises
     ------
@@ -426,38 +398,22 @@ def sample_interference(
     best, jams, ever, outside = -math.inf, 0, 0, 0
     for start in range(0, count, _BATCH):
         size = min(_BATCH, count - start)
-        values = {name: _uniform(generator, box, name, size) for name in box.ranges}
+        values = {}
+        for name in box.ranges:
+            (_, low), (high, _) = box[name].ends
+            values[name] = np.full(size, low) if low >= high else generator.uniform(low, high, size)
         interference = _interferences(box, condition, values, np.sin(generator.uniform(0.0, math.tau, size)))
         best = max(best, float(interference.max()))
         jams += int((interference > 0.0).sum())
         ever += int((_interferences(box, condition, values, np.ones(size)) > 0.0).sum())  # the tilt is largest there
         outside += int((interference > bound).sum())
+    from scipy.special import betaincinv  # Clopper and Pearson
+
+    low = 0.0 if ever == 0 else float(betaincinv(ever, count - ever + 1, 0.025))
+    high = 1.0 if ever == count else float(betaincinv(ever + 1, count - ever, 0.975))
     corner, tried = _corners(box, condition)
-    return Samples(
-        count,
-        best,
-        jams / count,
-        ever / count,
-        _binomial_range(ever, count),
-        corner,
-        tried,
-        bound,
-        outside,
-        perf_counter() - begin,
-    )
-
-
-def _binomial_range(hits: int, count: int) -> tuple[float, float]:
-    """Clopper and Pearson's interval of a probability, 95 %."""
-    from scipy.special import betaincinv
-
-    low = 0.0 if hits == 0 else float(betaincinv(hits, count - hits + 1, 0.025))
-    return low, 1.0 if hits == count else float(betaincinv(hits + 1, count - hits, 0.975))
-
-
-def _uniform(generator: np.random.Generator, box: ToleranceBox, name: str, size: int) -> Array:
-    (_, low), (high, _) = box[name].ends
-    return np.full(size, low) if low >= high else generator.uniform(low, high, size)
+    seen = best, jams / count, ever / count, (low, high), corner, tried
+    return Samples(count, *seen, bound, outside, perf_counter() - begin)
 
 
 def _interferences(box: ToleranceBox, condition: str, v: dict[str, Array], wave: Array) -> Array:

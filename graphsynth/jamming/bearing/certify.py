@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from graphsynth.core.checks import checked
+from graphsynth.intervals import Interval, check_rounding, pi, sin
 from graphsynth.intervals.reading import shortened
-from graphsynth.jamming.bearing.arcs import CertifiedArcs, Enclosure, arcs_from, covers, meets, no_arcs, whole_turn
+from graphsynth.jamming.bearing import corners
+from graphsynth.jamming.bearing.arcs import FULL_TURN, CertifiedArcs, Enclosure, arcs_from, covers, meets
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.bearing.parameters import Range, ToleranceBox, exact_text
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from graphsynth.intervals import Interval
 
 
 #: What the verdict is about, and what that neglects.
@@ -45,14 +47,10 @@ class JamCertificate:
 
     Attributes
     ----------
-    verdict : Verdict
-        See the table there.
-    reason : str
-        Why nothing is proved, or what is special; empty for a plain verdict.
-    condition : str
-        Contact condition used.
-    box : ToleranceBox
-        The parameters.
+    verdict, reason : Verdict, str
+        See the table there; why nothing is proved, or what is special, empty for a plain verdict.
+    condition, box : str, ToleranceBox
+        Contact condition and parameters.
     largest_interference : Enclosure
         Of the largest interference over the turn and the box, mm, whether the linkage can be assembled there or not;
         a negative upper end proves that all is free.
@@ -69,10 +67,8 @@ class JamCertificate:
         Evidence of a jam for ``CERTIFIED_JAMMED`` and ``CERTIFIED_JAMMED_FOR_SOME``.
     exact_input : bool
         False if a plain float came in; the statement then holds for that double.
-    boxes : int
-        Boxes evaluated.
-    seconds : float
-        Run time.
+    boxes, seconds : int, float
+        Boxes evaluated, run time.
     """
 
     verdict: Verdict
@@ -105,8 +101,24 @@ class JamCertificate:
 
     @property
     def statement(self) -> str:
-        """The sentence that is proved, or what is missing."""
-        return statement(self)
+        """The sentence that is proved, or what is missing; lengths rounded so that it stays true."""
+        who = "the bearing" if self.box.is_point else "every bearing of the tolerance box"
+        given = "" if self.exact_input else " (for the doubles given: floats came in, decimals are not guaranteed)"
+        # of a position that can be assembled: the largest interference of all may lie beyond a dead centre
+        missing = shortened(self.witness.interference.lo, -1) if self.witness else "0"
+        match self.verdict:
+            case Verdict.CERTIFIED_FREE:
+                left = shortened(-self.largest_interference.hi, -1)
+                text = f"proved: {who} stays free at every crank angle, with at least {left} mm of clearance left"
+            case Verdict.CERTIFIED_JAMMED:
+                text = f"proved: {who} binds during the rotation, with at least {missing} mm of interference"
+            case Verdict.CERTIFIED_JAMMED_FOR_SOME:
+                text = f"proved: one bearing of the tolerance box binds, with at least {missing} mm of interference"
+            case Verdict.CANNOT_ASSEMBLE:
+                text = f"the parts cannot be assembled: {self.reason}"
+            case _:
+                text = f"undecided: {self.reason}"
+        return f"{text} (contact condition {self.condition}, exact tilt, taken by this bearing alone){given}"
 
     @checked
     def over(self, start: float, stop: float) -> Verdict:
@@ -174,28 +186,6 @@ class JamCertificate:
         return frame.sort_values("start", ignore_index=True)
 
 
-def statement(found: JamCertificate) -> str:
-    """Say what is proved, or why nothing is; lengths rounded so that the sentence stays true."""
-    who = "the bearing" if found.box.is_point else "every bearing of the tolerance box"
-    given = "" if found.exact_input else " (for the doubles given: floats came in, decimals are not guaranteed)"
-    interference = found.largest_interference
-    left = shortened(-interference.hi, -1)
-    # of a position that can be assembled: the largest interference of all may lie beyond a dead centre
-    missing = shortened(found.witness.interference.lo, -1) if found.witness else "0"
-    match found.verdict:
-        case Verdict.CERTIFIED_FREE:
-            text = f"proved: {who} stays free at every crank angle, with at least {left} mm of clearance left"
-        case Verdict.CERTIFIED_JAMMED:
-            text = f"proved: {who} binds during the rotation, with at least {missing} mm of interference"
-        case Verdict.CERTIFIED_JAMMED_FOR_SOME:
-            text = f"proved: one bearing of the tolerance box binds, with at least {missing} mm of interference"
-        case Verdict.CANNOT_ASSEMBLE:
-            text = f"the parts cannot be assembled: {found.reason}"
-        case _:
-            text = f"undecided: {found.reason}"
-    return f"{text} (contact condition {found.condition}, exact tilt, taken by this bearing alone){given}"
-
-
 _ANGLES = 64  # angles of the turn tried as positions of a jam
 _PIECES = 256  # pieces of the turn on which assembly is proved
 
@@ -203,6 +193,9 @@ _PIECES = 256  # pieces of the turn on which assembly is proved
 @checked
 def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertificate:
     """Prove whether the bearing at B binds while the crank makes a turn, for all parameters of a box.
+
+    The interference is monotone in every parameter, so that its extremes over the box are values at two exact corners
+    (theory/jam-arcs 6); a jam also needs a position that can be assembled, which interval kinematics proves.
 
     Parameters
     ----------
@@ -223,10 +216,6 @@ def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertifi
     GraphsynthError
         If another library has changed the rounding mode of the processor.
 
-    Notes
-    -----
-    The interference is monotone in every parameter, so that its extremes over the box are values at two exact corners
-    (theory/jam-arcs 6); a jam also needs a position that can be assembled, which interval kinematics proves.
 
     Examples
     --------
@@ -234,26 +223,50 @@ def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertifi
     >>> found.verdict.name, found.largest_interference.hi < 0
     ('CERTIFIED_FREE', True)
     """
-    from graphsynth.intervals import check_rounding
-    from graphsynth.jamming.bearing.corners import check_condition
-
     begin = perf_counter()
     check_rounding()
-    check_condition(box, condition)
-    clearance = box["clearance"]
-    if clearance.upper < 0:
-        return _interference(box, condition, begin)
-    if clearance.lower < 0:
-        return _partly_interference(box, condition, begin)
-    return _Proof(box, condition, begin).result()
+    corners.check_condition(box, condition)
+    c = box["clearance"]
+    if c.lower >= 0:
+        return _Proof(box, condition, begin).result()
+    # of all clearances, the negative ones included
+    tilt = corners.sines(box)
+    depths = corners.interference_corners(box, tilt.sine, condition)
+    low, high = Enclosure.of(depths[0]), Enclosure.of(depths[1])
+    bounds: Any = {"largest_interference": high, "smallest_worst_interference": low}
+    if c.upper < 0:
+        nothing = Enclosure(0.0, 0.0)
+        reason = "interference fit: the clearance is negative, the parts overlap at every tilt"
+        return JamCertificate(
+            verdict=Verdict.CANNOT_ASSEMBLE,
+            reason=reason,
+            condition=condition,
+            box=box,
+            **bounds,
+            largest_tilt=_angles(tilt.sine),
+            critical_tilt=nothing,
+            arcs=CertifiedArcs((), (FULL_TURN,), (FULL_TURN,), nothing, Enclosure(-math.pi, math.pi), reason),
+            assembles="never",
+            witness=None,
+            exact_input=box.exact_input,
+            boxes=2,
+            seconds=perf_counter() - begin,
+        )
+    # jams of the sound part of the clearances count, freedom does not
+    found = _Proof(box.replace(clearance=Range(Fraction(0), c.upper, c.exact)), condition, begin).result()
+    verdict, reason = found.verdict, found.reason
+    text = "part of the range of the clearance is an interference fit, which cannot be assembled"
+    if verdict is Verdict.CERTIFIED_JAMMED:
+        verdict, reason = Verdict.CERTIFIED_JAMMED_FOR_SOME, text
+    elif verdict is not Verdict.CERTIFIED_JAMMED_FOR_SOME:
+        verdict, reason = Verdict.UNDECIDED, text
+    return replace(found, verdict=verdict, reason=reason, box=box, **bounds, seconds=perf_counter() - begin)
 
 
 class _Proof:
     """One run: the corner values, then the weakest work that settles the verdict."""
 
     def __init__(self, box: ToleranceBox, condition: Condition, begin: float) -> None:
-        from graphsynth.jamming.bearing import corners
-
         self.box, self.condition, self.begin = box, condition, begin
         self.tilt = corners.sines(box)
         self.depths = corners.interference_corners(box, self.tilt.sine, condition)
@@ -264,19 +277,18 @@ class _Proof:
         self.assembles = self._assembly(box)
 
     def result(self) -> JamCertificate:
-
-        low, high = _pair(self.depths, 0), _pair(self.depths, 1)
+        low, high = Enclosure.of(self.depths[0]), Enclosure.of(self.depths[1])
         verdict, reason, witness = Verdict.UNDECIDED, "", None
         if self.assembles == "never":
             verdict, reason = Verdict.CANNOT_ASSEMBLE, "no crank angle can be assembled, for any parameters"
         elif high.hi < 0.0:
             verdict = Verdict.CERTIFIED_FREE
         else:
-            witness = self._jam_of_all(low) if low.lo > 0.0 else None
+            witness = self._jam(self.box, low) if low.lo > 0.0 else None
             if witness:
                 verdict = Verdict.CERTIFIED_JAMMED
             elif high.lo > 0.0:
-                witness = self._jam_of_worst()
+                witness = self._jam(corners.worst_corner(self.box, self.condition))
                 verdict = Verdict.CERTIFIED_JAMMED_FOR_SOME if witness else Verdict.UNDECIDED
         if verdict is Verdict.UNDECIDED:
             reason = self._why(high)
@@ -290,21 +302,20 @@ class _Proof:
             if self.kappa.lo > 0.0 or float(self.tilt.sine.hi[1]) == 0.0:
                 return "touching: no clearance and no tilt, the parts touch at every angle"
             return "touching: no clearance is left at the lower end of its range"
-        if self.condition == "A" and _touches_only(self.box):
+        h, least, R = self.box["Hb"].upper / 2, c.lower, self.box["Rb"].lower
+        if self.condition == "A" and h * h == least * (2 * R + least):
             return "touching: h^2 = c (2R + c) exactly, the parts can touch but never overlap"
-        from graphsynth.intervals.reading import shortened
-
         width = f"[{shortened(high.lo, -1, 3)}, {shortened(high.hi, 1, 3)}] mm"
         touching = "which contains 0: touching at this resolution; change a tolerance"
         return f"the largest interference lies in {width}, {touching}"
 
     def _assembly(self, box: ToleranceBox) -> str:
         """Say at how much of the turn the linkage is proved to be assembled, for every parameter vector."""
-        from graphsynth.jamming.bearing.corners import pose, turn_pieces, turns_freely
-
-        if turns_freely(box, float(self.tilt.amplitude.hi[1])):
+        if corners.turns_freely(box, float(self.tilt.amplitude.hi[1])):
             return "always"
-        found = pose(box, turn_pieces(_PIECES))
+        # pieces that overlap by rounding only and cover the turn
+        edges = np.linspace(0.0, float(np.nextafter(2.0 * np.pi, 7.0)), _PIECES + 1)
+        found = corners.pose(box, Interval.from_bounds(edges[:-1], edges[1:]))
         self.boxes += _PIECES
         if found.assembled.all():
             return "always"
@@ -312,55 +323,46 @@ class _Proof:
             return "never"
         return "at some angles" if found.assembled.any() else "not decided"
 
-    def _jam_of_all(self, interference: Enclosure) -> Witness | None:
-        """Find a position in which every parameter vector binds; ``interference`` is the least at the worst angle."""
-        if self.assembles == "always":
-            return _at_worst_angle(self.box, interference)
-        return self._jam_on_grid(self.box)
+    def _jam(self, box: ToleranceBox, interference: Enclosure | None = None) -> Witness | None:
+        """Find an angle at which every parameter vector of ``box`` is proved assembled and jammed.
 
-    def _jam_of_worst(self) -> Witness | None:
-        """Find a position in which the worst parameter vector binds."""
-        from graphsynth.jamming.bearing import corners
-
-        worst = corners.worst_corner(self.box, self.condition)
-        if self.assembles != "always":
-            return self._jam_on_grid(worst)
-        self.boxes += 1
-        interference = _pair(corners.interference_corners(worst, corners.sines(worst).sine, self.condition), 0)
-        return _at_worst_angle(worst, interference) if interference.lo > 0.0 else None
-
-    def _jam_on_grid(self, box: ToleranceBox) -> Witness | None:
-        """Look for an angle at which every parameter vector of ``box`` is proved assembled and jammed."""
-        import numpy as np
-
-        from graphsynth.intervals import Interval, sin
-        from graphsynth.jamming.bearing import corners
-
+        ``interference`` is the least of the box at the worst angle, if it is known.
+        """
+        # exact numbers; where every value of a range binds, both ends
+        parameters = {}
+        for name, value in box.ranges.items():
+            low, high = exact_text(value.lower), exact_text(value.upper)
+            parameters[name] = low if value.is_point else f"[{low}, {high}]"
+        if self.assembles == "always":  # a quarter turn after its phase the tilt of every parameter vector is largest
+            if interference is None:
+                self.boxes += 1
+                depths = corners.interference_corners(box, corners.sines(box).sine, self.condition)
+                interference = Enclosure.of(depths[0])
+            angle = Enclosure.of(corners.phase(box) + pi() / 2)
+            return Witness(parameters, angle, interference) if interference.lo > 0.0 else None
         turn = corners.grid(_ANGLES)  # angles after the phase
         tilt = corners.sines(box) if box is not self.box else self.tilt
         amplitude = Interval.from_bounds(tilt.amplitude.lo[0], tilt.amplitude.hi[0])
         sine = corners.sine_of(amplitude * abs(sin(turn)), box.rod)
-        interference = corners.corner_interference(box, sine, self.condition, 0)
+        depths = corners.corner_interference(box, sine, self.condition, 0)
         f = corners.phase(box) + turn
         found = corners.pose(box, f)
         self.boxes += _ANGLES
-        proved = np.flatnonzero((interference.lo > 0.0) & found.assembled)
+        proved = np.flatnonzero((depths.lo > 0.0) & found.assembled)
         if proved.size == 0:
             return None
-        best = int(proved[np.argmax(interference.lo[proved])])
-        angle = Enclosure(float(f.lo[best]), float(f.hi[best]))
-        return _witness(box, angle, Enclosure(float(interference.lo[best]), float(interference.hi[best])))
+        best = int(proved[np.argmax(depths.lo[proved])])
+        return Witness(parameters, Enclosure.of(f[best]), Enclosure.of(depths[best]))
 
     def _finish(self, verdict: Verdict, reason: str, witness: Witness | None) -> JamCertificate:
-        shown = Enclosure(float(self.phase.lo), float(self.phase.hi))
+        shown, still = Enclosure.of(self.phase), float(self.tilt.amplitude.hi[1]) == 0.0
         if verdict is Verdict.CERTIFIED_FREE:
             why = "the parts stay clear of each other"
             if self.kappa.lo == math.inf:
-                still = float(self.tilt.amplitude.hi[1]) == 0.0
                 why = "the crank pin stays in the plane: no tilt" if still else "there is no critical tilt"
-            arcs = no_arcs(self.kappa, shown, why)
-        elif self.kappa.lo == 0.0 and float(self.tilt.amplitude.hi[1]) == 0.0:
-            arcs = whole_turn(self.kappa, shown, reason, False)
+            arcs = CertifiedArcs((), (), (), self.kappa, shown, why)
+        elif self.kappa.lo == 0.0 and still:
+            arcs = CertifiedArcs((), (), (FULL_TURN,), self.kappa, shown, reason)
         else:
             arcs = arcs_from(self.kappa, self.phase)
         return JamCertificate(
@@ -368,8 +370,8 @@ class _Proof:
             reason=reason,
             condition=self.condition,
             box=self.box,
-            largest_interference=_pair(self.depths, 1),
-            smallest_worst_interference=_pair(self.depths, 0),
+            largest_interference=Enclosure.of(self.depths[1]),
+            smallest_worst_interference=Enclosure.of(self.depths[0]),
             largest_tilt=_angles(self.tilt.sine),
             critical_tilt=_angles(self.critical),
             arcs=arcs,
@@ -381,94 +383,8 @@ class _Proof:
         )
 
 
-def _at_worst_angle(box: ToleranceBox, interference: Enclosure) -> Witness:
-    """Return the position a quarter turn after the phase, where the tilt of every parameter vector is largest."""
-    from graphsynth.intervals import pi
-    from graphsynth.jamming.bearing.corners import phase
-
-    f = phase(box) + pi() / 2
-    return _witness(box, Enclosure(float(f.lo), float(f.hi)), interference)
-
-
-def _witness(box: ToleranceBox, angle: Enclosure, interference: Enclosure) -> Witness:
-    return Witness({name: _text(value) for name, value in box.ranges.items()}, angle, interference)
-
-
-def _text(value: Range) -> str:
-    """Write a parameter exactly; a range, where every value of it binds, by both ends."""
-    if value.is_point:
-        return exact_text(value.lower)
-    return f"[{exact_text(value.lower)}, {exact_text(value.upper)}]"
-
-
-def _pair(values: Interval, corner: int) -> Enclosure:
-    return Enclosure(float(values.lo[corner]), float(values.hi[corner]))
-
-
 def _angles(sine: Interval) -> Enclosure:
     """Range of the angles of a pair of sines; an infinite sine stands for "none"."""
-    from graphsynth.jamming.bearing.corners import arcsine
-
     low, high = float(sine.lo[0]), float(sine.hi[1])
-    first = float(arcsine(low).lo) if low <= 1.0 else math.inf
-    return Enclosure(first, float(arcsine(high).hi) if high <= 1.0 else math.inf)
-
-
-def _touches_only(box: ToleranceBox) -> bool:
-    h, c, R = box["Hb"].upper / 2, box["clearance"].lower, box["Rb"].lower
-    return h * h == c * (2 * R + c)
-
-
-def _interference(box: ToleranceBox, condition: Condition, begin: float) -> JamCertificate:
-    """Answer for a clearance that is negative throughout."""
-    from graphsynth.jamming.bearing import corners
-
-    tilt = corners.sines(box)
-    depths = corners.interference_corners(box, tilt.sine, condition)
-    nothing = Enclosure(0.0, 0.0)
-    reason = "interference fit: the clearance is negative, the parts overlap at every tilt"
-    arcs = whole_turn(nothing, Enclosure(-math.pi, math.pi), reason, True)
-    return JamCertificate(
-        Verdict.CANNOT_ASSEMBLE,
-        reason,
-        condition,
-        box,
-        _pair(depths, 1),
-        _pair(depths, 0),
-        _angles(tilt.sine),
-        nothing,
-        arcs,
-        "never",
-        None,
-        box.exact_input,
-        2,
-        perf_counter() - begin,
-    )
-
-
-def _partly_interference(box: ToleranceBox, condition: Condition, begin: float) -> JamCertificate:
-    """Answer for a range of clearances from negative to positive: jams of the sound part count, freedom does not."""
-    from dataclasses import replace
-
-    from graphsynth.jamming.bearing import corners
-
-    c = box["clearance"]
-    sound = box.replace(clearance=Range(Fraction(0), c.upper, c.exact))
-    found = _Proof(sound, condition, begin).result()
-    verdict, reason = found.verdict, found.reason
-    text = "part of the range of the clearance is an interference fit, which cannot be assembled"
-    if found.verdict is Verdict.CERTIFIED_JAMMED:
-        verdict, reason = Verdict.CERTIFIED_JAMMED_FOR_SOME, text
-    elif found.verdict is not Verdict.CERTIFIED_JAMMED_FOR_SOME:
-        verdict, reason = Verdict.UNDECIDED, text
-    # of all clearances, the negative ones included
-    depths = corners.interference_corners(box, corners.sines(box).sine, condition)
-    return replace(
-        found,
-        verdict=verdict,
-        reason=reason,
-        box=box,
-        largest_interference=_pair(depths, 1),
-        smallest_worst_interference=_pair(depths, 0),
-        seconds=perf_counter() - begin,
-    )
+    first = float(corners.arcsine(low).lo) if low <= 1.0 else math.inf
+    return Enclosure(first, float(corners.arcsine(high).hi) if high <= 1.0 else math.inf)

@@ -23,7 +23,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval, asin, atan2, cos, hypot, pi, sin
 from graphsynth.intervals.reading import enclose
 from graphsynth.jamming.bearing.bearing import CONDITIONS, Condition
-from graphsynth.jamming.bearing.parameters import Range, ToleranceBox
+from graphsynth.jamming.bearing.parameters import ToleranceBox
 
 
 def ends(box: ToleranceBox, name: str, falling: bool = False) -> Interval:
@@ -66,16 +66,13 @@ def sine_of(amplitude: Interval, rod: str) -> Interval:
 
 def _inclination(box: ToleranceBox) -> Interval:
     """Pair of ``1 - n3^2`` for the normalised axis: grows with n1^2 + n2^2, falls with n3^2; rational, so exact."""
-    squares = [_squares(box[f"n{i}"]) for i in (1, 2, 3)]
+    squares = []  # the smallest and the largest of every component
+    for value in (box[f"n{i}"] for i in (1, 2, 3)):
+        low, high = sorted((value.lower**2, value.upper**2))
+        squares.append((Fraction(0) if value.lower <= 0 <= value.upper else low, high))
     flat = [squares[0][k] + squares[1][k] for k in (0, 1)]
     pairs = [enclose(flat[k] / (flat[k] + squares[2][1 - k])) for k in (0, 1)]
     return Interval.from_bounds([low for low, _ in pairs], [high for _, high in pairs])
-
-
-def _squares(value: Range) -> tuple[Fraction, Fraction]:
-    """Return the smallest and the largest square of a range."""
-    low, high = value.lower**2, value.upper**2
-    return (Fraction(0) if value.lower <= 0 <= value.upper else min(low, high)), max(low, high)
 
 
 def _height(box: ToleranceBox) -> Interval:
@@ -237,28 +234,21 @@ def _critical(box: ToleranceBox, height: str, condition: str) -> Interval:
     with np.errstate(all="ignore"):
         s = 2 * q / (1 + q.sqr())
     lo, hi = np.where(s.is_empty, 0.0, np.clip(s.lo, 0.0, 1.0)), np.where(s.is_empty, 1.0, np.clip(s.hi, 0.0, 1.0))
-    for corner in (0, 1):
-        exists = _exists(box, height, corner, condition)
+    given = box["clearance"], box["Rb"], box[height]
+    tight, loose = zip(*((value.lower, value.upper) for value in given))
+    for corner, (least, radius, half) in enumerate(((*tight[:2], loose[2] / 2), (*loose[:2], tight[2] / 2))):
+        # in rational arithmetic; with no room the parts touch but never overlap: no jam for the last bearing to jam
+        exists, space = least >= 0, half * half - least * (2 * radius + least)
+        if condition == "A":
+            exists = exists and (space > 0 if corner else space >= 0)
         if not exists:
             lo[corner] = hi[corner] = math.inf
-        if c.lo[corner] <= 0.0 <= c.hi[corner] and exists:  # no clearance, no tilt
+        elif c.lo[corner] <= 0.0 <= c.hi[corner]:  # no clearance, no tilt
             lo[corner] = 0.0
             hi[corner] = 0.0 if c.hi[corner] == 0.0 else hi[corner]
     big = float(np.finfo(np.float64).max)
     lo = np.where(np.isinf(lo), big, lo)  # an interval needs a finite lower bound
     return Interval.from_bounds(lo, hi)
-
-
-def _exists(box: ToleranceBox, height: str, corner: int, condition: str) -> bool:
-    """Decide in rational arithmetic whether there is a critical tilt at a corner."""
-    c, R, h = box["clearance"], box["Rb"], box[height]
-    clearance, radius = (c.lower, R.lower) if corner == 0 else (c.upper, R.upper)
-    half = (h.upper if corner == 0 else h.lower) / 2
-    if condition == "B":
-        return clearance >= 0
-    room = half * half - clearance * (2 * radius + clearance)
-    # with no room the parts touch but never overlap: no jam for the bearing that is to jam last
-    return clearance >= 0 and (room > 0 if corner else room >= 0)
 
 
 def onset(box: ToleranceBox, critical: Interval, tilt: Tilt) -> tuple[float, float]:
@@ -267,24 +257,20 @@ def onset(box: ToleranceBox, critical: Interval, tilt: Tilt) -> tuple[float, flo
     Infinite where there is no critical tilt or no tilt.
     """
     big = float(np.finfo(np.float64).max)
-    s = Interval.from_bounds(np.minimum(critical.lo, 1.0), np.minimum(critical.hi, 1.0))
+    s = sine_of(critical, "rigid")
     if box.rod == "deck":  # tan theta = A_z / l3
         s = s / cosine(s)
         s = Interval.from_bounds(np.where(s.is_empty, big, s.lo), np.where(s.is_empty, np.inf, s.hi))
     low, high = float(s.lo[0]), float(s.hi[1])
     a, b = float(tilt.amplitude.lo[0]), float(tilt.amplitude.hi[1])
-    if low == 0.0:
-        first = 0.0
-    elif b == 0.0 or critical.lo[0] == big:
-        first = math.inf
-    else:
-        first = float((Interval.from_bounds(low, low) / Interval.from_bounds(b, b)).lo)
+    first, last = 0.0, math.inf
+    if low != 0.0:
+        known = b != 0.0 and critical.lo[0] != big
+        first = float((Interval(low) / Interval(b)).lo) if known else math.inf
     if high == 0.0 and a > 0.0:
         last = 0.0
-    elif a == 0.0 or not math.isfinite(high) or not math.isfinite(float(critical.hi[1])):
-        last = math.inf
-    else:
-        last = float((Interval.from_bounds(high, high) / Interval.from_bounds(a, a)).hi)
+    elif a != 0.0 and math.isfinite(high) and math.isfinite(float(critical.hi[1])):
+        last = float((Interval(high) / Interval(a)).hi)
     return first, max(first, last)
 
 
@@ -298,38 +284,21 @@ def worst_corner(box: ToleranceBox, condition: Condition) -> ToleranceBox:
 
     For condition "general" with a range of radii the radius is a candidate only: the value there is evaluated anew.
     """
-    ends: dict[str, Fraction] = {name: (r.lower + r.upper) / 2 for name, r in box.ranges.items()}
+    worst: dict[str, Fraction] = {name: (r.lower + r.upper) / 2 for name, r in box.ranges.items()}
     for name in ("l2", "Hb", "hole_length"):
         if name in box:
-            ends[name] = box[name].upper
-    ends["l3"], ends["clearance"] = box["l3"].lower, max(box["clearance"].lower, Fraction(0))
-    far = max(box["alpha"].lower, box["alpha"].upper, key=abs)
-    ends["alpha"] = far
-    for name in ("n1", "n2"):
-        ends[name] = max(box[name].lower, box[name].upper, key=abs)
+            worst[name] = box[name].upper
+    worst["l3"], worst["clearance"] = box["l3"].lower, max(box["clearance"].lower, Fraction(0))
+    for name in ("alpha", "n1", "n2"):
+        worst[name] = max(box[name].lower, box[name].upper, key=abs)
     low, high = box["n3"].lower, box["n3"].upper
-    ends["n3"] = Fraction(0) if low <= 0 <= high else min(low, high, key=abs)
-    if condition == "A":
-        ends["Rb"] = box["Rb"].lower
-    elif condition == "B":
-        ends["Rb"] = box["Rb"].upper
-    else:
-        ends["Rb"] = _balanced_radius(box, ends)
-    axis = (ends.pop("n1"), ends.pop("n2"), ends.pop("n3"))
-    return ToleranceBox(**ends, axis=axis, sgn=box.sgn, rod=box.rod, convention=box.convention)
-
-
-def _balanced_radius(box: ToleranceBox, ends: dict[str, Fraction]) -> Fraction:
-    """Radius at which both readings of the general pin are about equal: ``R S = hp C - hh``.
-
-    See theory/bearing-contact 4.
-    """
-    linkage, _ = box.nominal()
-    sine = linkage.largest_tilt[1]
-    if sine == 0.0:
-        return box["Rb"].upper
-    wanted = float(ends["Hb"]) / 2 * math.sqrt(1.0 - sine * sine) - float(ends["hole_length"]) / 2
-    return min(max(Fraction(wanted / sine), box["Rb"].lower), box["Rb"].upper)
+    worst["n3"] = Fraction(0) if low <= 0 <= high else min(low, high, key=abs)
+    worst["Rb"] = box["Rb"].lower if condition == "A" else box["Rb"].upper
+    sine = box.nominal()[0].largest_tilt[1] if condition == "general" else 0.0
+    if sine != 0.0:  # both readings of the general pin are about equal: R S = hp C - hh (theory/bearing-contact 4)
+        wanted = float(worst["Hb"]) / 2 * math.sqrt(1.0 - sine * sine) - float(worst["hole_length"]) / 2
+        worst["Rb"] = min(max(Fraction(wanted / sine), box["Rb"].lower), box["Rb"].upper)
+    return box.replace(axis=[worst.pop(name) for name in ("n1", "n2", "n3")], **worst)
 
 
 Mask = NDArray[np.bool_]
@@ -345,12 +314,6 @@ class Pose(NamedTuple):
     assembled: Mask
     missing: Mask
     sine: Interval
-
-
-def turn_pieces(count: int) -> Interval:
-    """Cut [0, 2 pi] into pieces that overlap by rounding only and cover the turn."""
-    edges = np.linspace(0.0, float(np.nextafter(2.0 * np.pi, 7.0)), count + 1)
-    return Interval.from_bounds(edges[:-1], edges[1:])
 
 
 def turns_freely(box: ToleranceBox, amplitude: float) -> bool:
@@ -416,10 +379,7 @@ def _direction(box: ToleranceBox) -> tuple[Interval, Interval, Interval, Interva
 
 
 def pose_interference(box: ToleranceBox, f: Interval, condition: Condition) -> tuple[Interval, Pose]:
-    """Enclose the interference g (mm) over pieces of the turn for all parameters of the box, with the poses.
-
-    The lower bound holds for every parameter vector and angle of a piece, and so does the upper bound.
-    """
+    """Enclose the interference g (mm) over pieces of the turn for all parameters of the box, with the poses."""
     check_condition(box, condition)
     found = pose(box, f)
     low, high = found.sine.lo, found.sine.hi

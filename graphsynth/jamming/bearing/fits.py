@@ -56,16 +56,9 @@ STANDARD_FITS = tuple(_COMMON.split())
 @checked
 @dataclass(frozen=True)
 class Fit:
-    """Limits of one fit at one nominal diameter, exact, in millimetres.
+    """Limits of one fit such as ``"H7/g6"`` at one nominal diameter, exact, in millimetres.
 
-    Attributes
-    ----------
-    name : str
-        For example ``"H7/g6"``.
-    nominal : Fraction
-        Nominal diameter.
-    hole, shaft : Range
-        Deviations of the diameters from the nominal one.
+    ``hole`` and ``shaft`` are the deviations of the diameters from the nominal one.
 
     Examples
     --------
@@ -133,15 +126,9 @@ class Fit:
 class FitVerdict:
     """One fit and what is proved about it.
 
-    Attributes
-    ----------
-    fit : Fit
-        The fit.
-    verdict : Verdict
-        ``CERTIFIED_FREE``: every pair of parts is free; ``CERTIFIED_JAMMED``: every pair binds;
-        ``CERTIFIED_JAMMED_FOR_SOME``: the tightest pair binds, others may not; else ``UNDECIDED``.
-    clearance_left : float
-        Lower bound of the clearance left for the worst pair (mm); negative if something is missing.
+    ``verdict``: ``CERTIFIED_FREE``, every pair of parts is free; ``CERTIFIED_JAMMED``, every pair binds;
+    ``CERTIFIED_JAMMED_FOR_SOME``, the tightest pair binds, others may not; else ``UNDECIDED``.  ``clearance_left`` is a
+    lower bound for the worst pair (mm), negative if something is missing.
     """
 
     fit: Fit
@@ -177,10 +164,8 @@ def assess_fits(
 
     Parameters
     ----------
-    box : ToleranceBox
-        Its ranges of ``Rb`` and ``clearance`` are replaced by those of each fit.
-    condition : {"A", "B", "general"}
-        Contact condition.
+    box, condition : ToleranceBox, {"A", "B", "general"}
+        Its ranges of ``Rb`` and ``clearance`` are replaced by those of each fit; contact condition.
     fits : tuple of str
         Names, see `STANDARD_FITS`.
     diameter : Given, optional
@@ -203,19 +188,17 @@ def assess_fits(
     """
     if diameter is None:
         diameter = box["Rb"].lower + box["Rb"].upper
-    return [_assess(box, condition, Fit.read(name, diameter)) for name in fits]
-
-
-def _assess(box: ToleranceBox, condition: Condition, fit: Fit) -> FitVerdict:
-    """Radius and clearance taken as independent: more pairs than there are, so freedom holds a fortiori."""
-    every = certify_jamming(box.replace(Rb=fit.radius, clearance=fit.clearance), condition)
-    left = -every.largest_interference.hi
-    if every.verdict in (Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED):
-        return FitVerdict(fit, every.verdict, left)
-    radius, clearance = fit.pair(loosest=False)  # parts that exist: the largest shaft in the smallest hole
-    tightest = certify_jamming(box.replace(Rb=radius, clearance=clearance), condition)
-    jams = tightest.verdict in (Verdict.CERTIFIED_JAMMED, Verdict.CERTIFIED_JAMMED_FOR_SOME)
-    return FitVerdict(fit, Verdict.CERTIFIED_JAMMED_FOR_SOME if jams else Verdict.UNDECIDED, left)
+    found = []
+    for fit in (Fit.read(name, diameter) for name in fits):
+        # radius and clearance taken as independent: more pairs than there are, so freedom holds a fortiori
+        every = certify_jamming(box.replace(Rb=fit.radius, clearance=fit.clearance), condition)
+        verdict = every.verdict
+        if verdict not in (Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED):
+            radius, clearance = fit.pair(loosest=False)  # parts that exist: the largest shaft in the smallest hole
+            tightest = certify_jamming(box.replace(Rb=radius, clearance=clearance), condition).verdict
+            verdict = Verdict.CERTIFIED_JAMMED_FOR_SOME if tightest.is_jammed else Verdict.UNDECIDED
+        found.append(FitVerdict(fit, verdict, -every.largest_interference.hi))
+    return found
 
 
 @checked
@@ -226,12 +209,8 @@ def tightest_free_fit(
 
     Parameters
     ----------
-    box, condition : ToleranceBox, {"A", "B", "general"}
-        Ranges of all parameters, for each combination of which the statement holds; contact condition.
-    fits : tuple of str, optional
-        Names, see `STANDARD_FITS`.
-    diameter : Given, optional
-        Nominal diameter, mm; by default twice the middle of ``Rb``.
+    box, condition, fits, diameter
+        As for `assess_fits`.
 
     Returns
     -------

@@ -35,22 +35,12 @@ class Wedging(Enum):
 
 @dataclass(frozen=True)
 class WedgingReport:
-    """Wedging of one bearing.
+    """Wedging of one bearing; ``reason`` says what is special.
 
-    Attributes
-    ----------
-    verdict : Wedging
-        What is proved.
-    limit : Enclosure
-        Range over the box of the least friction coefficient that wedges (``mu_A`` or ``mu_B``); infinite if the parts
-        cannot touch in this condition.
-    amplification : Enclosure
-        Range of ``mu / limit``: friction torque about the axis per tilting moment
-        (theory/friction-of-a-tilted-bearing 2).
-    lever : Enclosure
-        Range of half the distance w of the contacts along the axis, mm; the normal forces are ``M_t / (2 w)``.
-    condition, reason : str
-        Contact condition; what is special.
+    ``limit`` is the range over the box of the least friction coefficient that wedges (``mu_A`` or ``mu_B``), infinite
+    if the parts cannot touch in this condition; ``amplification`` that of ``mu / limit``, the friction torque about the
+    axis per tilting moment (theory/friction-of-a-tilted-bearing 2); ``lever`` that of half the distance w of the
+    contacts along the axis, mm: the normal forces are ``M_t / (2 w)``.
     """
 
     verdict: Wedging
@@ -65,19 +55,16 @@ class WedgingReport:
 def wedging(box: ToleranceBox, friction: Given, condition: Condition = "A") -> WedgingReport:
     """Decide whether two-point contact can wedge for an interval of friction coefficients.
 
-    See theory/friction-of-a-tilted-bearing 1, 2.
-
     The line through both contacts lies inside both friction cones if ``mu >= wA / Rh`` (condition A) or ``wB / R``
-    (condition B).  Both limits are monotone in h, c and R, so that two exact corners enclose them.
+    (condition B).  Both limits are monotone in h, c and R, so that two exact corners enclose them
+    (theory/friction-of-a-tilted-bearing 1, 2).
 
     Parameters
     ----------
-    box : ToleranceBox
-        Only the bearing counts.
+    box, condition : ToleranceBox, {"A", "B"}
+        Only the bearing counts; contact condition.
     friction : Given
         Friction coefficient, for example ``"[0.1, 0.2]"``; zero or more.
-    condition : {"A", "B"}
-        Contact condition.
 
     Returns
     -------
@@ -94,6 +81,8 @@ def wedging(box: ToleranceBox, friction: Given, condition: Condition = "A") -> W
     >>> wedging(ToleranceBox(), "[0.3, 0.6]").verdict.name, wedging(ToleranceBox(), "[0.05, 0.1]").verdict.name
     ('POSSIBLE', 'NOT_POSSIBLE')
     """
+    from graphsynth.intervals import Interval
+
     mu = Range.read("friction", friction)
     if mu.lower < 0:
         raise GeometryError(f"friction = {mu} is negative; give a coefficient of zero or more")
@@ -108,37 +97,25 @@ def wedging(box: ToleranceBox, friction: Given, condition: Condition = "A") -> W
         none = Enclosure(np.inf, np.inf)
         text = "h^2 < c (2R + c): the parts never touch under tilt"
         return WedgingReport(Wedging.NOT_POSSIBLE, none, Enclosure(0.0, 0.0), Enclosure(0.0, 0.0), condition, text)
-    given = mu.outer
-    low, high = Enclosure(float(limit.lo[0]), float(limit.hi[0])), Enclosure(float(limit.lo[1]), float(limit.hi[1]))
+    least, reason = Enclosure.of(limit[0]), ""
+    whole = Interval.from_bounds(limit.lo[0], limit.hi[1])
     if touches == "some":
-        verdict = Wedging.UNDECIDED if float(given.hi) > 0.0 else Wedging.NOT_POSSIBLE
+        verdict = Wedging.UNDECIDED if mu.upper > 0 else Wedging.NOT_POSSIBLE
         reason = "h^2 >= c (2R + c) for some bearings only: others never touch under tilt"
+    elif mu.lower >= Fraction(float(whole.hi)):
+        verdict = Wedging.POSSIBLE
+    elif mu.upper < Fraction(least.lo):
+        verdict = Wedging.NOT_POSSIBLE
     else:
-        verdict, reason = _verdict(mu, low, high), ""
-    factor = given / _between(low.lo, high.hi) if low.lo > 0.0 else None
-    amplification = Enclosure(float(factor.lo), float(factor.hi)) if factor is not None else Enclosure(0.0, np.inf)
+        verdict = Wedging.POSSIBLE_FOR_SOME if mu.upper >= Fraction(least.hi) else Wedging.UNDECIDED
+    amplification = Enclosure.of(mu.outer / whole) if least.lo > 0.0 else Enclosure(0.0, np.inf)
     arm = Enclosure(float(lever.lo[0]), float(lever.hi[1]))
-    return WedgingReport(verdict, Enclosure(low.lo, high.hi), amplification, arm, condition, reason)
-
-
-def _verdict(mu: Range, low: Enclosure, high: Enclosure) -> Wedging:
-    """Compare mu with the smallest and the largest limit over the box, each between two bounds."""
-    if mu.lower >= Fraction(high.hi):
-        return Wedging.POSSIBLE
-    if mu.upper < Fraction(low.lo):
-        return Wedging.NOT_POSSIBLE
-    return Wedging.POSSIBLE_FOR_SOME if mu.upper >= Fraction(low.hi) else Wedging.UNDECIDED
-
-
-def _between(low: float, high: float) -> Interval:
-    """Return the interval between two bounds."""
-    from graphsynth.intervals import Interval
-
-    return Interval.from_bounds(low, high)
+    return WedgingReport(verdict, Enclosure.of(whole), amplification, arm, condition, reason)
 
 
 def _limits(box: ToleranceBox, condition: str) -> tuple[Interval, Interval, str]:
     """Return pairs of lever w and of the limit, and whether all, some or none of the bearings touch."""
+    from graphsynth.intervals import Interval
     from graphsynth.jamming.bearing.corners import ends
 
     grows = condition == "B"
@@ -154,7 +131,7 @@ def _limits(box: ToleranceBox, condition: str) -> tuple[Interval, Interval, str]
         touches = "some" if _room(b["Hb"].upper, b["clearance"].lower, b["Rb"].lower) >= 0 else "none"
     lever = (h.sqr() - slack).sqrt()
     if lever.is_empty.any():
-        lever = _between(0.0, 0.0).hull(lever)
+        lever = Interval(0).hull(lever)
     return lever, lever / (R + c), touches
 
 
@@ -176,10 +153,7 @@ class Region(Enum):
 class InsertionDiagram:
     """Whitney's jamming diagram of a peg in a hole: a parallelogram in the plane of ``Fx / Fz`` and ``M / (r Fz)``.
 
-    Attributes
-    ----------
-    friction, depth_ratio : Range
-        mu, and ``lambda = l / (2 r mu)``.
+    ``friction`` is mu, ``depth_ratio`` lambda, ``l / (2 r mu)``.
     """
 
     friction: Range
@@ -198,24 +172,22 @@ class InsertionDiagram:
 
         Parameters
         ----------
-        lateral, axial, moment : Given
-            Fx, Fz (positive for insertion) and the moment at the centre of the tip.
-        radius : Given
-            Radius of the peg.
+        lateral, axial, moment, radius : Given
+            Fx, Fz (positive for insertion), the moment at the centre of the tip, and the radius of the peg.
 
         Raises
         ------
         GeometryError
             If the axial force or the radius is not positive.
         """
-        load = {"axial": Range.read("axial", axial), "radius": Range.read("radius", radius)}
-        for name, value in load.items():
-            if value.lower <= 0:
-                raise GeometryError(f"{name} = {value} must be positive; the diagram is for a peg pushed in")
-        Fx, M = Range.read("lateral", lateral).outer, Range.read("moment", moment).outer
+        load = {"axial": axial, "radius": radius, "lateral": lateral, "moment": moment}
+        ranges = {name: Range.read(name, value) for name, value in load.items()}
+        for name in ("axial", "radius"):
+            if ranges[name].lower <= 0:
+                raise GeometryError(f"{name} = {ranges[name]} must be positive; the diagram is for a peg pushed in")
+        Fz, r, Fx, M = (value.outer for value in ranges.values())
         mu, lam = self.friction.outer, self.depth_ratio.outer
-        x = Fx / load["axial"].outer
-        y = M / (load["radius"].outer * load["axial"].outer)
+        x, y = Fx / Fz, M / (r * Fz)
         first = 1 / mu - abs(x)
         second = lam - abs(y + mu * (1 + lam) * x)
         if float(first.lo) > 0.0 and float(second.lo) > 0.0:
@@ -226,18 +198,12 @@ class InsertionDiagram:
 def insertion_diagram(friction: Given, depth: Given, radius: Given) -> InsertionDiagram:
     """Return Whitney's diagram of a peg of given radius at a given depth of insertion.
 
-    See theory/friction-of-a-tilted-bearing 3.
-
-    Source: [Whitney 1982], Quasi-static assembly of compliantly supported rigid parts.
+    See theory/friction-of-a-tilted-bearing 3 and [Whitney 1982].
 
     Parameters
     ----------
-    friction : Given
-        Friction coefficient, a number or a range as text; positive.
-    depth : Given
-        Insertion depth, in the unit of the radius; positive.
-    radius : Given
-        Radius of the peg; positive.
+    friction, depth, radius : Given
+        Friction coefficient; insertion depth and radius of the peg, in one unit.  Numbers or ranges, positive.
 
     Returns
     -------

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from time import perf_counter
@@ -17,7 +18,7 @@ from time import perf_counter
 from graphsynth.core.checks import checked
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.bearing import Bearing, Condition
-from graphsynth.jamming.bearing.certify import JamCertificate, certify_jamming
+from graphsynth.jamming.bearing.certify import certify_jamming
 from graphsynth.jamming.bearing.corners import check_condition, worst_corner
 from graphsynth.jamming.bearing.parameters import Range, ToleranceBox
 from graphsynth.jamming.verdict import METHOD_CLOSED_FORM, Verdict
@@ -39,10 +40,8 @@ def largest_misalignment(linkage: TiltedFourBar, bearing: Bearing, condition: Co
 
     Parameters
     ----------
-    linkage, bearing : TiltedFourBar, Bearing
-        Dimensions of the bearing in millimetres.
-    condition : {"A", "B"}
-        Contact condition: short bearing in a long hole, or long shaft in a short hole.
+    linkage, bearing, condition : TiltedFourBar, Bearing, {"A", "B"}
+        Dimensions of the bearing in millimetres; short bearing in a long hole, or long shaft in a short hole.
 
     Returns
     -------
@@ -92,10 +91,8 @@ def smallest_clearance(linkage: TiltedFourBar, bearing: Bearing, condition: Cond
 
     Parameters
     ----------
-    linkage, bearing : TiltedFourBar, Bearing
-        Dimensions of the bearing in millimetres.
-    condition : {"A", "B"}
-        Contact condition: short bearing in a long hole, or long shaft in a short hole.
+    linkage, bearing, condition
+        As for `largest_misalignment`.
 
     Returns
     -------
@@ -131,10 +128,8 @@ def largest_height(linkage: TiltedFourBar, bearing: Bearing, condition: Conditio
 
     Parameters
     ----------
-    linkage, bearing : TiltedFourBar, Bearing
-        Dimensions of the bearing in millimetres.
-    condition : {"A", "B"}
-        Contact condition: short bearing in a long hole, or long shaft in a short hole.
+    linkage, bearing, condition
+        As for `largest_misalignment`.
 
     Returns
     -------
@@ -165,8 +160,7 @@ def largest_height(linkage: TiltedFourBar, bearing: Bearing, condition: Conditio
     return Limit(2.0 * half)
 
 
-_FIRST = 2.0**-50  # first relative distance from the proposed edge; doubled until both sides are proved
-_STEPS = 46
+_FIRST, _LAST = 2.0**-50, 2.0**-5  # relative distances from the proposed edge; doubled until both sides are proved
 
 
 @dataclass(frozen=True)
@@ -175,20 +169,12 @@ class CertifiedLimit:
 
     Attributes
     ----------
-    works : float or None
-        Certified free over the full rotation and the whole box (and for every milder value, see ``covers``).
-    fails : float or None
-        Certified to jam for at least one parameter vector of the box.
-    unit : str
-        Radians or millimetres.
-    reason : str
-        Why an end is missing; empty otherwise.
-    covers : str
-        The range of values for which freedom is proved in one go.
-    trials : int
-        Certificates computed.
-    seconds : float
-        Run time.
+    works, fails : float or None
+        Certified free over the full rotation and the whole box; certified to jam for at least one parameter vector.
+    unit, reason, covers : str
+        "rad" or "mm"; why an end is missing; the range of values for which freedom is proved in one go.
+    trials, seconds : int, float
+        Certificates computed, run time.
     """
 
     works: float | None
@@ -234,18 +220,8 @@ def certified_largest_misalignment(box: ToleranceBox, condition: Condition = "A"
     >>> limit.works < 0.0151614793250201376610981403839 < limit.fails, limit.relative_gap < 1e-13
     (True, True)
     """
-
-    def milder(value: float) -> ToleranceBox:
-        return box.replace(alpha=Range(-Fraction(value), Fraction(value)))
-
-    def at(value: float) -> ToleranceBox:
-        return box.replace(alpha=Fraction(value))
-
-    def propose(worst: ToleranceBox) -> float | None:
-        return largest_misalignment(*worst.nominal(), _reading(condition)).value
-
-    search = _LimitSearch(condition, at, milder, 1, "rad", "-works to works")
-    return _bracket(search, box.replace(alpha="1/100"), propose, (0.0, 1.5))
+    search = _LimitSearch(box.replace(alpha="1/100"), condition, "alpha", "rad", "-works to works")
+    return search.bracket(largest_misalignment, 0.0, 1.5)
 
 
 @checked
@@ -271,16 +247,8 @@ def certified_smallest_clearance(box: ToleranceBox, condition: Condition = "A") 
     >>> limit.fails < 0.0650992730735457585284715885170 < limit.works, limit.relative_gap < 1e-13
     (True, True)
     """
-
-    def at(value: float) -> ToleranceBox:
-        return box.replace(clearance=Fraction(value))
-
-    def propose(worst: ToleranceBox) -> float | None:
-        return smallest_clearance(*worst.nominal(), _reading(condition)).value
-
-    top = float(box["Rb"].upper + box["Hb"].upper)
-    search = _LimitSearch(condition, at, at, -1, "mm", "works and more")
-    return _bracket(search, box.replace(clearance=0), propose, (0.0, top))
+    search = _LimitSearch(box.replace(clearance=0), condition, "clearance", "mm", "works and more")
+    return search.bracket(smallest_clearance, float(box["Rb"].upper + box["Hb"].upper), 0.0)
 
 
 @checked
@@ -305,87 +273,64 @@ def certified_largest_height(box: ToleranceBox, condition: Condition = "A") -> C
     >>> limit.works < limit.fails, limit.relative_gap < 1e-13
     (True, True)
     """
-
-    def at(value: float) -> ToleranceBox:
-        return box.replace(Hb=Fraction(value))
-
-    def milder(value: float) -> ToleranceBox:
-        return box.replace(Hb=Range(Fraction(0), Fraction(value)))
-
-    def propose(worst: ToleranceBox) -> float | None:
-        return largest_height(*worst.nominal(), _reading(condition)).value
-
-    top = 1000.0 * float(box["Rb"].upper)
-    return _bracket(_LimitSearch(condition, at, milder, 1, "mm", "0 to works"), box, propose, (0.0, top))
+    search = _LimitSearch(box, condition, "Hb", "mm", "0 to works")
+    return search.bracket(largest_height, 0.0, 1000.0 * float(box["Rb"].upper))
 
 
-def _reading(condition: Condition) -> Condition:
-    if condition == "general":
-        raise GeometryError("no closed form")  # caught: the edge is then searched by halving
-    return condition
-
-
-def _bracket(
-    search: _LimitSearch, box: ToleranceBox, propose: Callable[[ToleranceBox], float | None], span: tuple[float, float]
-) -> CertifiedLimit:
-    """Prove both sides of the edge that is proposed, or else found by halving ``span``."""
-    check_condition(box, search.condition)
-    direction = search.direction
-    try:
-        edge = propose(worst_corner(box, search.condition))
-    except GeometryError:
-        edge = None
-    mild, harsh = span if direction > 0 else span[::-1]
-    if edge is None or not math.isfinite(edge) or edge <= 0.0:
-        edge = search.halve(mild, harsh)
-    if edge is None:
-        return search.one_sided(mild, harsh)
-    works = fails = None
-    distance = _FIRST
-    for _ in range(_STEPS):
-        if works is None and search.free(edge * (1.0 - direction * distance)):
-            works = edge * (1.0 - direction * distance)
-        if fails is None and search.jams(edge * (1.0 + direction * distance)):
-            fails = edge * (1.0 + direction * distance)
-        if works is not None and fails is not None:
-            break
-        distance *= 2.0
-        if distance >= 0.5:
-            break
-    reason = "" if works is not None and fails is not None else search.why or "no proof within half of the edge"
-    return search.answer(works, fails, reason)
+#: Other end of the range that is free with a value, in units of the value.
+_MILDER = {"-works to works": -1, "works and more": 1, "0 to works": 0}
 
 
 @dataclass
 class _LimitSearch:
-    """Certificates of one question, counted; ``direction`` +1 if larger values are worse, -1 if smaller ones are."""
+    """Certificates of one question about one parameter of a box, counted."""
 
+    box: ToleranceBox
     condition: Condition
-    at: Callable[[float], ToleranceBox]
-    milder: Callable[[float], ToleranceBox]
-    direction: int
+    name: str
     unit: str
     covers: str
     trials: int = 0
     why: str = ""
     begin: float = field(default_factory=perf_counter)
 
-    def answer(self, works: float | None, fails: float | None, reason: str) -> CertifiedLimit:
-        seconds = perf_counter() - self.begin
-        return CertifiedLimit(works, fails, self.unit, reason, self.covers, self.trials, seconds)
-
-    def _certificate(self, box: ToleranceBox) -> JamCertificate:
+    def verdict(self, low: Fraction, high: Fraction) -> Verdict:
         self.trials += 1
-        found = certify_jamming(box, self.condition)
+        found = certify_jamming(self.box.replace(**{self.name: Range(low, high)}), self.condition)
         self.why = found.reason or self.why
-        return found
+        return found.verdict
 
     def free(self, value: float) -> bool:
-        return self._certificate(self.milder(value)).verdict is Verdict.CERTIFIED_FREE
+        exact = Fraction(value)
+        return self.verdict(_MILDER[self.covers] * exact, exact) is Verdict.CERTIFIED_FREE
 
     def jams(self, value: float) -> bool:
-        found = self._certificate(self.at(value))
-        return found.verdict in (Verdict.CERTIFIED_JAMMED, Verdict.CERTIFIED_JAMMED_FOR_SOME)
+        return self.verdict(Fraction(value), Fraction(value)).is_jammed
+
+    def bracket(
+        self, closed: Callable[[TiltedFourBar, Bearing, Condition], Limit], mild: float, harsh: float
+    ) -> CertifiedLimit:
+        """Prove both sides of the edge that the closed form proposes, or else found by halving."""
+        check_condition(self.box, self.condition)
+        edge = None
+        with suppress(GeometryError):
+            if self.condition != "general":
+                edge = closed(*worst_corner(self.box, self.condition).nominal(), self.condition).value
+        if edge is None or not math.isfinite(edge) or edge <= 0.0:
+            edge = self.halve(mild, harsh)
+        works = fails = None
+        if edge is None:
+            works, fails, reason = self.one_sided(mild, harsh)
+        else:
+            distance, worse = _FIRST, math.copysign(1.0, harsh - mild)
+            while distance <= _LAST and (works is None or fails is None):
+                milder, harsher = edge * (1.0 - worse * distance), edge * (1.0 + worse * distance)
+                works = milder if works is None and self.free(milder) else works
+                fails = harsher if fails is None and self.jams(harsher) else fails
+                distance *= 2.0
+            reason = self.why or "no proof within half of the edge" if works is None or fails is None else ""
+        seconds = perf_counter() - self.begin
+        return CertifiedLimit(works, fails, self.unit, reason, self.covers, self.trials, seconds)
 
     def halve(self, mild: float, harsh: float) -> float | None:
         """Search the edge between a free and a jamming value by halving; None if one of them is not there."""
@@ -403,19 +348,14 @@ class _LimitSearch:
                 return middle
         return 0.5 * (mild + harsh)
 
-    def one_sided(self, mild: float, harsh: float) -> CertifiedLimit:
-        """Answer when no edge was found in the span searched."""
+    def one_sided(self, mild: float, harsh: float) -> tuple[float | None, float | None, str]:
+        """Return what works, what fails and why an end is missing, when no edge was found in the span searched."""
         if self.free(harsh):
-            reason = f"no limit: free up to the end of the search, {harsh!r} {self.unit}"
-            return self.answer(harsh, None, reason)
+            return harsh, None, f"no limit: free up to the end of the search, {harsh!r} {self.unit}"
         speck = harsh + 2.0**-60 * abs(mild - harsh)
-        if self.direction < 0 and self.free(speck):
-            reason = f"no limit above {harsh!r} {self.unit}: {self.why or 'every larger value is free'}"
-            return self.answer(speck, None, reason)
+        if harsh < mild and self.free(speck):
+            return speck, None, f"no limit above {harsh!r} {self.unit}: {self.why or 'every larger value is free'}"
         works = mild if self.free(mild) else None
-        fails = mild if works is None and self.jams(mild) else None
-        if fails is not None:
-            reason = f"no value works: even {mild!r} {self.unit} is certified to bind"
-        else:
-            reason = self.why or "neither side is proved"
-        return self.answer(works, fails, reason)
+        if works is None and self.jams(mild):
+            return None, mild, f"no value works: even {mild!r} {self.unit} is certified to bind"
+        return works, None, self.why or "neither side is proved"

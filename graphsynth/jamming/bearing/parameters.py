@@ -27,14 +27,9 @@ if TYPE_CHECKING:
 @checked
 @dataclass(frozen=True)
 class Range:
-    """All values from ``lower`` to ``upper``, both exact.
+    """All values from ``lower`` to ``upper``, both exact numbers.
 
-    Attributes
-    ----------
-    lower, upper : Fraction
-        The ends.
-    exact : bool
-        False if a plain float came in: whatever rounding made that float is not included in any statement.
+    ``exact`` is False if a plain float came in: whatever rounding made that float is not included in any statement.
 
     Examples
     --------
@@ -60,7 +55,13 @@ class Range:
         if isinstance(value, Range):
             return value
         if isinstance(value, str):
-            return cls._text(name, value)
+            first, last, is_spread = text_ends(value)
+            low, high = _number(name, first), _number(name, last)
+            if not is_spread:
+                return cls._ordered(name, low, high, True)
+            if high < 0:
+                raise GeometryError(f"{name} = {value.strip()!r} has a negative tolerance; give 0 or more")
+            return cls(low - high, low + high)
         if isinstance(value, tuple | list):
             if len(value) != 2:
                 raise GeometryError(f"{name} = {value!r} has {len(value)} bounds; give two, or one number")
@@ -73,16 +74,6 @@ class Range:
             return cls._ordered(name, low, high, bool(value.exact_input))
         number = _number(name, value)
         return cls(number, number, isinstance(value, int | Fraction | Decimal | np.integer))
-
-    @classmethod
-    def _text(cls, name: str, text: str) -> Range:
-        first, last, is_spread = text_ends(text)
-        low, high = _number(name, first), _number(name, last)
-        if not is_spread:
-            return cls._ordered(name, low, high, True)
-        if high < 0:
-            raise GeometryError(f"{name} = {text.strip()!r} has a negative tolerance; give 0 or more")
-        return cls(low - high, low + high)
 
     @classmethod
     def _ordered(cls, name: str, lower: Fraction, upper: Fraction, exact: bool) -> Range:
@@ -136,12 +127,8 @@ def spread(nominal: Given, absolute: Given = 0, relative: Given = 0) -> Range:
 
     Parameters
     ----------
-    nominal : Given
-        A number, text or range.
-    absolute : Given, optional
-        Plus or minus, in the same unit.
-    relative : Given, optional
-        Plus or minus, as a fraction of the value: 1/100 for one per cent.
+    nominal, absolute, relative : Given
+        A number, text or range; plus or minus, in the same unit; plus or minus, as a fraction of the value.
 
     Returns
     -------
@@ -298,10 +285,7 @@ class ToleranceBox:
     def of(cls, linkage: TiltedFourBar, bearing: Bearing | None = None) -> ToleranceBox:
         """Return the box of one linkage and one bearing: their doubles as they are, marked as float input.
 
-        Raises
-        ------
-        GeometryError
-            Something else than a linkage or a bearing.
+        Anything else raises `GeometryError`.
         """
         if not isinstance(linkage, TiltedFourBar):
             raise GeometryError(f"linkage = {linkage!r} is no TiltedFourBar; give one")
@@ -329,15 +313,8 @@ class ToleranceBox:
         return f"ToleranceBox({', '.join(f'{name}={value}' for name, value in self._ranges.items())})"
 
     def replace(self, **changes: Given) -> ToleranceBox:
-        """Return the box with some parameters changed.
+        """Return the box with some parameters changed; a name that is none raises `GeometryError`.
 
-        Raises
-        ------
-        GeometryError
-            For a name that is no parameter.
-
-        Examples
-        --------
         >>> str(ToleranceBox().replace(alpha="0.013")["alpha"])
         '0.013'
         """
@@ -381,17 +358,9 @@ class ToleranceBox:
         n1 = m["n1"] * math.cos(turn) - m["n2"] * math.sin(turn)
         n2 = m["n1"] * math.sin(turn) + m["n2"] * math.cos(turn)
         axis = (m["n1"], m["n2"], m["n3"]) if turn == 0.0 else (n1, n2, m["n3"])
-        linkage = TiltedFourBar(
-            m["l1"],
-            m["l2"],
-            m["l3"],
-            m["l4"],
-            self.sgn,
-            alpha=m["alpha"],
-            axis=axis,
-            rod=self.rod,
-            convention=self.convention,
-        )
+        lengths: Any = (m[name] for name in ("l1", "l2", "l3", "l4"))
+        options: Any = {"rod": self.rod, "convention": self.convention}
+        linkage = TiltedFourBar(*lengths, self.sgn, alpha=m["alpha"], axis=axis, **options)
         return linkage, Bearing(m["Rb"], m["Hb"], m["clearance"], m.get("hole_length"))
 
     def describe(self) -> dict[str, str]:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 Mask = NDArray[np.bool_]
-_FREE, _JAMS, _OPEN, _OUT = 0, 1, 2, 3
+_FREE, _JAMS, _OPEN, _OUT = 0, 1, 2, 3  # in the order of the fields of `TurnPartition`
 _ENOUGH = 64
 
 
@@ -49,20 +49,11 @@ class TurnPartition:
 
     Attributes
     ----------
-    free : tuple of Span
-        Certified: no parameter vector binds.
-    inner : tuple of Span
-        Certified: assembled and jammed for every parameter vector.
-    undecided : tuple of Span
-        Neither is proved at this resolution.
-    missing : tuple of Span
-        Certified: no parameter vector can be assembled.
-    pieces : int
-        Pieces evaluated.
-    finished : bool
-        False if the budget ended the search above the resolution asked for.
-    seconds : float
-        Run time.
+    free, inner, missing, undecided : tuple of Span
+        Certified: no parameter vector binds; every one is assembled and jammed; none can be assembled.  And the rest,
+        where neither is proved at this resolution.
+    pieces, finished, seconds : int, bool, float
+        Pieces evaluated; False if the budget ended the search above the resolution asked for; run time.
     """
 
     free: tuple[Span, ...]
@@ -94,10 +85,8 @@ def sweep_turn(
     ----------
     interference : callable
         Takes pieces of the turn, an `Interval` of shape (m,), and returns a `PieceInterference`.
-    resolution : float
-        Undecided pieces no longer than this (radians) are left; at least 1e-15.
-    first : int
-        Pieces to begin with.
+    resolution, first : float, int
+        Undecided pieces no longer than this (radians, at least 1e-15) are left; pieces to begin with.
     max_pieces, max_seconds : budgets
         Exhausted: what is not settled is undecided, ``finished`` is False.
 
@@ -136,15 +125,26 @@ def sweep_turn(
             finished = False
             done.append((lo, hi, np.full(lo.size, _OPEN, dtype=np.int8)))
             break
-        kind = _classify(interference(Interval.from_bounds(lo, hi)), lo.size)
+        found = interference(Interval.from_bounds(lo, hi))
+        value, kind = found.interference, np.full(lo.size, _OPEN, dtype=np.int8)
+        sound = value.guaranteed & ~value.is_empty
+        kind[np.broadcast_to(sound & (value.hi < 0.0), kind.shape)] = _FREE
+        kind[np.broadcast_to(sound & (value.lo > 0.0) & found.assembled, kind.shape)] = _JAMS
+        kind[found.missing] = _OUT
         pieces += lo.size
         split = (kind == _OPEN) & (hi - lo > resolution)
         done.append((lo[~split], hi[~split], kind[~split]))
         lo, hi = _split(lo[split], hi[split])
-    spans = _joined(done)
-    return TurnPartition(
-        spans[_FREE], spans[_JAMS], spans[_OPEN], spans[_OUT], pieces, finished, perf_counter() - begin
-    )
+    # sorted, and neighbours of one kind joined: their borders are the same doubles
+    lo, hi, kind = (np.concatenate([part[i] for part in done]) for i in range(3))
+    order = np.argsort(lo, kind="stable")
+    lo, hi, kind = lo[order], hi[order], kind[order]
+    starts = np.flatnonzero(np.r_[True, kind[1:] != kind[:-1]])
+    stops = np.r_[starts[1:] - 1, len(kind) - 1]
+    spans: list[list[Span]] = [[], [], [], []]
+    for a, b in zip(starts, stops):
+        spans[int(kind[a])].append(Span(float(lo[a]), float(hi[b])))
+    return TurnPartition(*(tuple(part) for part in spans), pieces, finished, perf_counter() - begin)
 
 
 def _split(lo: NDArray[np.float64], hi: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -155,29 +155,6 @@ def _split(lo: NDArray[np.float64], hi: NDArray[np.float64]) -> tuple[NDArray[np
     starts, stops = np.column_stack([lo, inner]), np.column_stack([inner, hi])
     filled = (starts < stops) | (lo == hi)[:, None]
     return starts[filled], stops[filled]
-
-
-def _classify(found: PieceInterference, size: int) -> NDArray[np.int8]:
-    lo, hi = np.broadcast_to(found.interference.lo, (size,)), np.broadcast_to(found.interference.hi, (size,))
-    sound = np.broadcast_to(found.interference.guaranteed & ~found.interference.is_empty, (size,))
-    kind = np.full(size, _OPEN, dtype=np.int8)
-    kind[sound & (hi < 0.0)] = _FREE
-    kind[sound & (lo > 0.0) & found.assembled] = _JAMS
-    kind[found.missing] = _OUT
-    return kind
-
-
-def _joined(done: list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int8]]]) -> list[tuple[Span, ...]]:
-    """Sort the pieces and join neighbours of one kind; their borders are the same doubles."""
-    lo, hi, kind = (np.concatenate([part[i] for part in done]) for i in range(3))
-    order = np.argsort(lo, kind="stable")
-    lo, hi, kind = lo[order], hi[order], kind[order]
-    starts = np.flatnonzero(np.r_[True, kind[1:] != kind[:-1]])
-    stops = np.r_[starts[1:] - 1, len(kind) - 1]
-    spans: list[list[Span]] = [[], [], [], []]
-    for a, b in zip(starts, stops):
-        spans[int(kind[a])].append(Span(float(lo[a]), float(hi[b])))
-    return [tuple(part) for part in spans]
 
 
 @checked
@@ -197,10 +174,8 @@ def sweep_linkage(
     ----------
     box, condition : ToleranceBox, {"A", "B", "general"}
         Ranges of all parameters, for each combination of which the statement holds; contact condition.
-    resolution : float, optional
-        Undecided pieces no longer than this (radians) are left.
-    max_pieces, max_seconds : optional
-        Budgets; when exhausted, what is not settled is undecided.
+    resolution, max_pieces, max_seconds
+        As for `sweep_turn`.
 
     Returns
     -------

@@ -51,10 +51,8 @@ class IntersectionBoxes:
     reasons : tuple of Reason
     rows : four ndarrays, shape (K, 4)
         ``proved``, ``domains``, ``inner``, ``boundary`` as bounds x lo, x hi, y lo, y hi.
-    finished : bool
-        False if a limit ended the search; all boxes together hold every solution all the same.
-    tested, seconds : int, float
-        Work done.
+    finished, tested, seconds : bool, int, float
+        False if a limit ended the search; all boxes together hold every solution all the same.  Work done.
     """
 
     problem: CircleEllipse
@@ -93,7 +91,7 @@ class IntersectionBoxes:
     @property
     def boxes(self) -> Interval:
         """All boxes, shape (K, 2): every solution lies in one of them."""
-        return _joined(self.proved, self.inner, self.boundary)
+        return _intervals(np.concatenate([self.rows[0], self.rows[2], self.rows[3]]))
 
     @property
     def outer(self) -> Interval:
@@ -109,10 +107,6 @@ class IntersectionBoxes:
     def four(self) -> Interval:
         """Hulls of the intersections in all quadrants, copies on an axis merged; see `mirrored`."""
         return mirrored(self.outer)
-
-
-def _joined(*parts: Interval) -> Interval:
-    return Interval.from_bounds(np.concatenate([p.lo for p in parts]), np.concatenate([p.hi for p in parts]))
 
 
 def _hull_of(boxes: Interval) -> Interval:
@@ -172,10 +166,8 @@ def krawczyk_boxes(
     problem : CircleEllipse
     tolerance : float
         Boxes with both sides below ``tolerance`` times the side of the start box are not cut further.
-    max_boxes : int
-        Limit on the boxes tested; waiting boxes are then reported as boundary.
-    max_seconds : float
-        Limit on the run time, looked at every few thousand boxes.
+    max_boxes, max_seconds : int, float
+        Limits on the boxes tested and on the run time; waiting boxes are then reported as boundary.
 
     Returns
     -------
@@ -186,8 +178,6 @@ def krawczyk_boxes(
     ------
     IntervalError
         For limits that are not positive, and more than 20 million boxes.
-    GraphsynthError
-        If the processor's rounding has been changed.
 
     Examples
     --------
@@ -207,7 +197,14 @@ def krawczyk_boxes(
     from graphsynth.jamming.intersection import kernels
 
     begin = perf_counter()
-    side, power = _start_side(problem)
+    # side of the start box in units of 2**power, about 1: the same boxes for every unit of length
+    top, bottom = _squared_radii(problem)[1]
+    power = (top.bit_length() - bottom.bit_length()) // 2
+    if abs(power) > _MOST_POWER:
+        raise IntervalError(
+            f"R1 = {float(problem.R1.hi)} is beyond the range for boxes; choose a unit of length nearer to it"
+        )
+    side = math.nextafter(math.sqrt(_bounds(*_scaled(top, bottom, -2 * power))[1]), math.inf)
     queue, state = np.empty((2 * max_boxes + 2, 4)), np.zeros(5, dtype=np.int64)
     queue[0], state[kernels.TAIL] = (0.0, side, 0.0, side), 1
     kept, inner = np.empty((max_boxes + 1, 4)), np.zeros(max_boxes + 1, dtype=np.bool_)
@@ -224,18 +221,6 @@ def krawczyk_boxes(
         within, layer = within[solved], np.concatenate([within[~solved], layer])
     parts = [_carried(part, power) for part in (proved[:found, 4:], proved[:found, :4], within, layer)]
     return _outcome(problem, parts, head == tail, tested, seconds, tested >= max_boxes)
-
-
-def _start_side(problem: CircleEllipse) -> tuple[float, int]:
-    """Side of the start box in units of ``2**power``, about 1: the same boxes for every unit of length."""
-    top, bottom = _squared_radii(problem)[1]
-    power = (top.bit_length() - bottom.bit_length()) // 2
-    if abs(power) > _MOST_POWER:
-        raise IntervalError(
-            f"R1 = {float(problem.R1.hi)} is beyond the range for boxes; choose a unit of length nearer to it"
-        )
-    square = _bounds(*_scaled(top, bottom, -2 * power))[1]
-    return math.nextafter(math.sqrt(square), math.inf), power
 
 
 def _carried(rows: Array, power: int) -> Array:
@@ -279,16 +264,9 @@ def _outcome(
 class CrossCheck:
     """Both solutions of one problem, and whether they can be true together.
 
-    Attributes
-    ----------
-    hull : IntersectionHull
-    boxes : IntersectionBoxes
-    hull_in_boxes : bool
-        The exact hull lies in the hull of all boxes; implied if both are right and the hull is tight.
-    inner_in_hull : bool
-        The inner boxes, which are solutions, lie in the exact hull.
-    statuses_agree : bool
-        Neither has proved what the other has disproved.
+    ``hull_in_boxes``: the exact hull lies in the hull of all boxes, as it does if both are right and the hull is tight.
+    ``inner_in_hull``: the inner boxes, which are solutions, lie in the exact hull.  ``statuses_agree``: neither has
+    proved what the other has disproved.
     """
 
     hull: IntersectionHull
@@ -309,8 +287,7 @@ def cross_check(problem: CircleEllipse, **limits: Any) -> CrossCheck:
 
     Parameters
     ----------
-    problem : CircleEllipse
-    **limits
+    problem, **limits
         As for `krawczyk_boxes`.
 
     Returns

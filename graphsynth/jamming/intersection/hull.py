@@ -74,14 +74,13 @@ def root_bounds(value: Fraction, bits: int = 64) -> Exact:
     up, down = max(2 * shift, 0), max(-2 * shift, 0)
     whole, rest = divmod(value.numerator << up, value.denominator << down)
     root = math.isqrt(whole)
-    exact = rest == 0 and root * root == whole
     unit = Fraction(1, 1 << shift) if shift >= 0 else Fraction(1 << -shift)
-    if exact:
-        return Exact(root * unit, root * unit)
-    perfect = math.isqrt(value.numerator), math.isqrt(value.denominator)
-    if perfect[0] ** 2 == value.numerator and perfect[1] ** 2 == value.denominator:
-        return Exact(Fraction(*perfect), Fraction(*perfect))
-    return Exact(root * unit, (root + 1) * unit)
+    exact = root * unit
+    if rest != 0 or root * root != whole:
+        exact = Fraction(math.isqrt(value.numerator), math.isqrt(value.denominator))
+        if exact * exact != value:
+            return Exact(root * unit, (root + 1) * unit)
+    return Exact(exact, exact)
 
 
 class Reason(Enum):
@@ -106,14 +105,8 @@ class Reason(Enum):
 class CircleEllipse:
     """A circle and a centred ellipse, each with a tolerance; made by `circle_ellipse`.
 
-    Attributes
-    ----------
-    R1, a, b : Exact
-        Radius of the circle, semi-axes along x and y; of one length unit.
-    e1 : Exact
-        Tolerance of ``x^2 + y^2``, in the square of that unit.
-    e2 : Exact
-        Tolerance of ``x^2/a^2 + y^2/b^2``, a number.
+    Radius R1 of the circle and semi-axes a, b along x and y in one length unit; tolerances e1 of ``x^2 + y^2``, in the
+    square of that unit, and e2 of ``x^2/a^2 + y^2/b^2``, a number.
     """
 
     R1: Exact
@@ -145,10 +138,8 @@ def circle_ellipse(R1: Any, a: Any, b: Any, e1: Any = 0, e2: Any = 0, *, eps: An
     ----------
     R1, a, b : number, text, Interval or pair of bounds
         Text, integers, fractions and decimals are taken exactly; a float is the binary number it is.
-    e1, e2 : the same
-        Tolerances; the upper bound of a range counts.
-    eps : the same, optional
-        The one number that the source uses for both, although their units differ.
+    e1, e2, eps : the same, optional
+        Tolerances, of which the upper bound counts; the one number that the source uses for both.
 
     Returns
     -------
@@ -197,10 +188,8 @@ def surrogate_problem(
 
     Parameters
     ----------
-    bearing : Bearing
-        Its dimensions are read as the decimals they print as: 0.03 is 3/100.
-    sine : number, text or Interval
-        Sine of the tilt; its sign does not matter.
+    bearing, sine : Bearing, number, text or Interval
+        The dimensions are read as the decimals they print as: 0.03 is 3/100; the sign of the tilt does not matter.
     e1, e2, eps : as for `circle_ellipse`
     bits : int
         Digits to which the cosine is enclosed.
@@ -208,7 +197,7 @@ def surrogate_problem(
     Returns
     -------
     CircleEllipse
-        The problem, its numbers exact.
+        Its numbers are exact.
 
     Raises
     ------
@@ -272,15 +261,11 @@ class IntersectionHull:
 
     Attributes
     ----------
-    status : Status
+    status, reasons : Status, tuple of Reason
         ``UNIQUE``: one intersection inside the quadrant for every choice of the parameters; ``EMPTY``: none for any;
-        ``UNDECIDED``: neither holds, or it depends on the parameters: see ``reasons``.
-    reasons : tuple of Reason
-        Why, one or two.
-    hull : Interval, shape (2,)
-        Of all solutions (x, y) with x, y >= 0: certified, exact up to outward rounding if ``tight``.
-    squares : Interval, shape (2,)
-        Hull of (x^2, y^2).
+        ``UNDECIDED``: neither holds, or it depends on the parameters: see the one or two reasons.
+    hull, squares : Interval, shape (2,)
+        Of all solutions (x, y) with x, y >= 0: certified, exact up to outward rounding if ``tight``; of (x^2, y^2).
     tight : bool
         False only where the ranges of a and b overlap, so that the hull is an enclosure and not exact.
     """
@@ -315,6 +300,9 @@ class IntersectionHull:
 def exact_hull(problem: CircleEllipse) -> IntersectionHull:
     """Solve the problem exactly.
 
+    See theory/circle-and-ellipse 7; for ranges of the radii the same two corners of the parameters are extreme (6.3,
+    with eps too: ``u = A (Q - B)/(A - B)`` grows with Q and falls with A and B while B <= Q <= A).
+
     Parameters
     ----------
     problem : CircleEllipse
@@ -323,16 +311,6 @@ def exact_hull(problem: CircleEllipse) -> IntersectionHull:
     -------
     IntersectionHull
         Certified; the hull is exact up to one rounding of each bound.
-
-    Raises
-    ------
-    GraphsynthError
-        If the processor's rounding has been changed.
-
-    Notes
-    -----
-    See theory/circle-and-ellipse 7; for ranges of the radii the same two corners of the parameters are extreme (6.3,
-    with eps too: ``u = A (Q - B)/(A - B)`` grows with Q and falls with A and B while B <= Q <= A).
 
     Examples
     --------
@@ -353,26 +331,21 @@ def exact_hull(problem: CircleEllipse) -> IntersectionHull:
     least = _corner(problem.a.hi, problem.b.hi, circle.lo, level.hi)
     u_max, v_min = most if most[1] >= 0 else (min(circle.hi, long.hi), Fraction(0))
     u_min, v_max = least if least[0] >= 0 else (Fraction(0), min(circle.hi, short.hi))
-    reasons = _touches(problem, least[0], most[1])
+    # why not every choice of the parameters has an intersection inside the quadrant
+    sharp, reasons = problem.R1.is_point and problem.e1.hi == 0 == problem.e2.hi, []
+    if least[0] <= 0:
+        reasons.append(Reason.TANGENT_SHORT if sharp and problem.b == problem.R1 else Reason.TOUCHES_X)
+    if most[1] <= 0:
+        reasons.append(Reason.TANGENT_LONG if sharp and problem.a == problem.R1 else Reason.TOUCHES_Y)
     status = Status.UNDECIDED if reasons else Status.UNIQUE
-    return _result(problem, status, reasons or (Reason.INTERSECTION,), Exact(u_min, u_max), Exact(v_min, v_max))
+    u, v = Exact(u_min, u_max), Exact(v_min, v_max)
+    return _result(problem, status, tuple(reasons) or (Reason.INTERSECTION,), u, v)
 
 
 def _corner(a: Fraction, b: Fraction, Q: Fraction, E: Fraction) -> tuple[Fraction, Fraction]:
     """Solution (u, v) of ``u + v = Q``, ``u/a^2 + v/b^2 = E``."""
     span = (a - b) * (a + b)
     return a * a * (Q - b * b * E) / span, b * b * (a * a * E - Q) / span
-
-
-def _touches(problem: CircleEllipse, u: Fraction, v: Fraction) -> tuple[Reason, ...]:
-    """Reasons why not every choice of the parameters has a intersection inside the quadrant."""
-    sharp = problem.R1.is_point and problem.e1.hi == 0 == problem.e2.hi
-    reasons = []
-    if u <= 0:
-        reasons.append(Reason.TANGENT_SHORT if sharp and problem.b == problem.R1 else Reason.TOUCHES_X)
-    if v <= 0:
-        reasons.append(Reason.TANGENT_LONG if sharp and problem.a == problem.R1 else Reason.TOUCHES_Y)
-    return tuple(reasons)
 
 
 def _near_circular(problem: CircleEllipse, circle: Exact, long: Exact, short: Exact) -> IntersectionHull:

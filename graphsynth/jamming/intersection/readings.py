@@ -106,21 +106,17 @@ def reading_areas(
     """
     S, C = _tilt(sine, cosine)
     R, Rh, c = bearing.Rb, bearing.Rh, bearing.clearance
-    bend = S * S / (1.0 + C)
+    bend, defined = S * S / (1.0 + C), C > 0.0
     if reading is Reading.SURROGATE:
         return surrogate_areas(bearing, S, C)
+    if reading is Reading.LID:
+        jam = lid_area(bearing, S, C)
+        return CrescentAreas(jam + np.pi * (c * (2.0 * R + c) - Rh * Rh * bend), jam)
     if reading is Reading.IMAGE:
-        defined = C > 0.0
-        return _masked(ellipse_circle_stable(R, c, np.where(defined, Rh * bend - c, 0.0)), defined)
-    if reading is Reading.SECTION:
-        defined = C > 0.0
+        areas = ellipse_circle_stable(R, c, np.where(defined, Rh * bend - c, 0.0))
+    else:
         longer = (R * bend - c * C) / np.where(defined, C, 1.0)
-        return _masked(ellipse_circle_stable(Rh, np.where(defined, longer, 0.0), c), defined)
-    jam = lid_area(bearing, S, C)
-    return CrescentAreas(jam + np.pi * (c * (2.0 * R + c) - Rh * Rh * bend), jam)
-
-
-def _masked(areas: CrescentAreas, defined: NDArray[np.bool_]) -> CrescentAreas:
+        areas = ellipse_circle_stable(Rh, np.where(defined, longer, 0.0), c)
     return CrescentAreas(*(np.where(defined, area, np.nan) for area in areas))
 
 
@@ -131,11 +127,7 @@ def reading_problem(
     """Pose the intersection problem for a centred reading (E1, E2 or E4), with x along the long axis.
 
     The dimensions of the bearing are read as the decimals they print as; e1, e2 and eps are those of `circle_ellipse`.
-
-    Raises
-    ------
-    GeometryError
-        For E3, whose ellipse is not centred; for a tilt at which the ellipse does not exist.
+    Raises `GeometryError` for E3, whose ellipse is not centred, and a tilt at which the ellipse does not exist.
     """
     if reading is Reading.LID:
         raise GeometryError("the ellipse of reading E3 (LID) is not centred; use lid_area, or E4 (SURROGATE)")

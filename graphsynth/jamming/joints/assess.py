@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import checked
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.limits import Misalignment
-from graphsynth.jamming.joints.program import Bearings, JointProblem, PoseSolution, check_motion, problem
+from graphsynth.jamming.joints.program import Bearings, JointProblem, check_motion, problem
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, Assessment, Verdict
 
 if TYPE_CHECKING:
@@ -46,41 +46,26 @@ class CoupledReport(Assessment):
 
     Attributes
     ----------
-    verdict : Verdict
-    reason : str
-        One sentence.
-    inputs : ndarray, shape (n,)
     factor : ndarray, shape (n,)
         T*: the least factor on all tilt limits with which the pose can be assembled, axial clearances as they are;
-        above 1 it binds, infinite if no factor helps.
+        above 1 it binds, infinite if no factor helps.  Largest at ``worst_input``: ``worst_factor``.
     duality_gap : ndarray, shape (n,)
         Primal minus dual value of T*, relative: the factor is known to this (estimated: rounding only).
     allowed_scale : ndarray, shape (n,)
         Factor by which all misalignments may grow before the pose binds; below 1 where it binds, infinite if never.
-    consumption : ndarray, shape (n, blocks)
-        ``|tau| / (T* t)`` of every limit on tilt: 1 where it is used up.  One optimal sharing; joints that are not
-        binding may have others.
-    axial_clearance_used : ndarray, shape (n, joints)
-        ``|zeta| / s`` of every joint with finite axial clearance.
-    shadow_price : ndarray, shape (n, blocks)
+        Smallest at ``smallest_scale_input``: ``smallest_scale``.
+    consumption, axial_clearance_used : ndarray, shapes (n, blocks) and (n, joints)
+        ``|tau| / (T* t)`` of every limit on tilt: 1 where it is used up; ``|zeta| / s`` of every joint with finite
+        axial clearance.  One optimal sharing; joints that are not binding may have others.
+    shadow_price, axial_shadow_price : ndarray, shapes (n, blocks) and (n, joints)
         Shadow price (dual multiplier): relative fall of T* per relative growth of the limit; positive where the limit
-        is binding; the sum is 1.
-    axial_shadow_price : ndarray, shape (n, joints)
-        Fall of T* per relative growth of the axial clearance.
+        is binding; the sum is 1.  The same for the axial clearances.
     names, joints : tuple
         ``((a, b), "tilt" | "roll" | "pitch")`` of the blocks; pairs ``(a, b)`` of the joints.
-    worst_input, worst_factor : float
-        Where T* is largest among the samples, and its value there.
-    smallest_scale : float
-        Smallest of ``allowed_scale``, and ``smallest_scale_input`` where.
     sensitivities : tuple of Sensitivity
         Limits in the order of their shadow prices at ``smallest_scale_input``.
-    limits, misalignments : tuple
-        As used.
     certificate : TurnCertificate or None
-        The proof, if it was asked for.
-    notes : tuple of str
-    seconds : float
+        The proof, if it was asked for; verdict, reason and model are then those of the proof.
     """
 
     verdict: Verdict
@@ -109,12 +94,10 @@ class CoupledReport(Assessment):
     small_tilts: str = "L1 with small tilts (first order): neglects terms of relative order alpha squared"
 
     def _figures(self) -> list[tuple[str, str]]:
+        growth = f"may be {self.smallest_scale:.6g} times as large, by input {self.smallest_scale_input:.6g}"
         rows = [
             ("limits", f"used to {100.0 * self.worst_factor:.4g} % at most, at input {self.worst_input:.6g}"),
-            (
-                "misalignments",
-                f"may be {self.smallest_scale:.6g} times as large, by input {self.smallest_scale_input:.6g}",
-            ),
+            ("misalignments", growth),
         ]
         for (a, b), what, gain in self.sensitivities[:3]:
             rows.append((f"joint {a}-{b}", f"1 % more {what} allows at most {gain:.3f} % more misalignment"))
@@ -163,12 +146,8 @@ class CoupledReport(Assessment):
         """Return a table over the inputs: factor, gap, allowed scale, consumption and shadow price of every limit."""
         import pandas as pd
 
-        columns: dict[str, Array] = {
-            "input": self.inputs,
-            "factor": self.factor,
-            "gap": self.duality_gap,
-            "allowed_scale": self.allowed_scale,
-        }
+        columns = {"input": self.inputs, "factor": self.factor}
+        columns |= {"gap": self.duality_gap, "allowed_scale": self.allowed_scale}
         for k, ((a, b), what) in enumerate(self.names):
             columns[f"consumption_{a}_{b}_{what}"] = self.consumption[:, k]
             columns[f"price_{a}_{b}_{what}"] = self.shadow_price[:, k]
@@ -192,6 +171,8 @@ def assess_coupled(
 ) -> CoupledReport:
     """Assess whether all joints together can take up misaligned axes at every pose of a motion (model L1).
 
+    See theory/joints-that-share-a-tilt.
+
     Parameters
     ----------
     motion : Motion
@@ -200,10 +181,9 @@ def assess_coupled(
         Limits of every joint.  Gear, cam and slot contacts that are not named guide nothing out of the plane.
     tilts : Misalignment or several
         Which axes are tilted; a rigid one (a motor shaft) takes no clearance of its own.
-    condition : {"A", "B", "general"}
-        Contact condition of every `Bearing`.
-    certify : bool
-        Prove the verdict between the samples too (`certify_coupled`), over the tolerance boxes.
+    condition, certify : {"A", "B", "general"}, bool
+        Contact condition of every `Bearing`; whether to prove the verdict between the samples too (`certify_coupled`),
+        over the tolerance boxes.
     length_tolerance, seconds : float
         For the proof: relative tolerance of lengths, and its time.
 
@@ -218,10 +198,6 @@ def assess_coupled(
     GeometryError
         For limits or misalignments that do not fit the mechanism.
 
-    Notes
-    -----
-    See theory/joints-that-share-a-tilt.
-
     Examples
     --------
     >>> from graphsynth import Mechanism
@@ -233,48 +209,34 @@ def assess_coupled(
     """
     begin = perf_counter()
     check_motion(motion)
-    given = problem(motion.mechanism, bearings, tilts, condition)
-    report = replace(_report(given, motion, begin), condition=condition)
+    report = _report(problem(motion.mechanism, bearings, tilts, condition), motion, condition, begin)
     if not certify or not motion.assembled.any():
         return report
-    return _with_proof(report, motion, bearings, condition, length_tolerance, seconds)
-
-
-def _with_proof(
-    report: CoupledReport, motion: Motion, bearings: Bearings, condition: Condition, tolerance: float, seconds: float
-) -> CoupledReport:
-    """Replace the verdict at the samples by what is proved between them."""
-    from graphsynth.jamming.joints.certify import certify_coupled
-
-    begin = perf_counter()
     if int(motion.assembled.sum()) == 1:
         reason = "a proof needs a range of inputs; the motion has one assembled sample"
         return replace(report, verdict=Verdict.UNDECIDED, reason=reason, notes=(*report.notes, report.reason))
-    proof = certify_coupled(
-        motion, bearings, report.misalignments, condition=condition, length_tolerance=tolerance, seconds=seconds
-    )
+    from graphsynth.jamming.joints.certify import certify_coupled
+
+    options: Any = {"condition": condition, "length_tolerance": length_tolerance, "seconds": seconds}
+    proof = certify_coupled(motion, bearings, report.misalignments, **options)
     # where nothing is proved, what the samples say is still worth reading
     notes = (*report.notes, f"at the samples: {report.reason}") if proof.verdict is Verdict.UNDECIDED else report.notes
-    return replace(
-        report,
-        verdict=proof.verdict,
-        reason=proof.reason,
-        certificate=proof,
-        notes=notes,
-        seconds=report.seconds + perf_counter() - begin,
-    )
+    changes: Any = {"verdict": proof.verdict, "reason": proof.reason, "notes": notes, "certificate": proof}
+    return replace(report, **changes, seconds=perf_counter() - begin)
 
 
-def _spread(values: Array, keep: NDArray[np.intp], count: int) -> Array:
-    full = np.full((count, *values.shape[1:]), np.nan)
-    full[keep] = values
-    return full
-
-
-def _report(given: JointProblem, motion: Motion, begin: float) -> CoupledReport:
+def _report(given: JointProblem, motion: Motion, condition: Condition, begin: float) -> CoupledReport:
+    """Assess at the samples."""
     keep = np.flatnonzero(motion.assembled)
     tilt, scale = given.solve(motion.poses[keep]), given.solve(motion.poses[keep], "scale")
-    layout, count = given.layout, len(motion.inputs)
+    layout = given.layout
+
+    def spread(values: Array) -> Array:
+        """Repeat for all inputs; NaN where the mechanism is not assembled."""
+        full = np.full((len(motion.inputs), *values.shape[1:]), np.nan)
+        full[keep] = values
+        return full
+
     with np.errstate(all="ignore"):
         gap = np.where(tilt.upper > tilt.lower, (tilt.upper - tilt.lower) / tilt.upper, 0.0)
         allowed = np.where(scale.lower > 0.0, 1.0 / scale.lower, math.inf)
@@ -285,30 +247,40 @@ def _report(given: JointProblem, motion: Motion, begin: float) -> CoupledReport:
         )
     used = np.where(tilt.lower[:, None] > 0.0, used, 0.0)
     verdict, reason = _verdict(scale.lower, motion, keep)
-    worst = int(np.argmax(tilt.lower)) if keep.size else -1
-    tight = int(np.argmin(allowed)) if keep.size else -1
-    inputs = motion.inputs[keep]
+    inputs, rows, notes = motion.inputs[keep], [], []
+    worst_input = worst_factor = smallest_scale = smallest_scale_input = math.nan
+    if keep.size:
+        worst, tight = int(np.argmax(tilt.lower)), int(np.argmin(allowed))
+        worst_input, worst_factor = float(inputs[worst]), float(tilt.lower[worst])
+        smallest_scale_input, smallest_scale = float(inputs[tight]), float(allowed[tight])
+        rows = [Sensitivity(*name, float(scale.moment[tight, k])) for k, name in enumerate(given.names)]
+        rows += [Sensitivity(pair, "play", float(scale.force[tight, k])) for k, pair in enumerate(given.pairs)]
+    if layout.loops == 0:
+        notes.append("no closed loop of guided joints: nothing can bind")
+    if keep.size < len(motion.inputs):
+        notes.append(f"{len(motion.inputs) - keep.size} samples are not assembled: {motion.reason}")
     return CoupledReport(
         verdict=verdict,
         reason=reason,
         inputs=motion.inputs,
-        factor=_spread(tilt.lower, keep, count),
-        duality_gap=_spread(gap, keep, count),
-        allowed_scale=_spread(allowed, keep, count),
-        consumption=_spread(used, keep, count),
-        axial_clearance_used=_spread(slip, keep, count),
-        shadow_price=_spread(tilt.moment, keep, count),
-        axial_shadow_price=_spread(tilt.force, keep, count),
+        factor=spread(tilt.lower),
+        duality_gap=spread(gap),
+        allowed_scale=spread(allowed),
+        consumption=spread(used),
+        axial_clearance_used=spread(slip),
+        shadow_price=spread(tilt.moment),
+        axial_shadow_price=spread(tilt.force),
         names=given.names,
         joints=given.pairs,
-        worst_input=float(inputs[worst]) if keep.size else math.nan,
-        worst_factor=float(tilt.lower[worst]) if keep.size else math.nan,
-        smallest_scale=float(allowed[tight]) if keep.size else math.nan,
-        smallest_scale_input=float(inputs[tight]) if keep.size else math.nan,
-        sensitivities=_sensitivities(given, scale, tight) if keep.size else (),
+        worst_input=worst_input,
+        worst_factor=worst_factor,
+        smallest_scale=smallest_scale,
+        smallest_scale_input=smallest_scale_input,
+        sensitivities=tuple(sorted((row for row in rows if row.gain > 1e-9), key=lambda row: -row.gain)),
         limits=given.limits,
         misalignments=given.misalignments,
-        notes=_notes(given, motion, keep),
+        condition=condition,
+        notes=tuple(notes),
         seconds=perf_counter() - begin,
     )
 
@@ -324,18 +296,3 @@ def _verdict(value: Array, motion: Motion, keep: NDArray[np.intp]) -> tuple[Verd
     if not motion.completed:
         return Verdict.FREE_ESTIMATED, f"free at {keep.size} samples; the motion ends: {motion.reason}"
     return Verdict.FREE_ESTIMATED, f"free at all {keep.size} samples (estimated)"
-
-
-def _sensitivities(given: JointProblem, scale: PoseSolution, at: int) -> tuple[Sensitivity, ...]:
-    rows = [Sensitivity(pair, what, float(scale.moment[at, k])) for k, (pair, what) in enumerate(given.names)]
-    rows += [Sensitivity(pair, "play", float(scale.force[at, k])) for k, pair in enumerate(given.pairs)]
-    return tuple(sorted((row for row in rows if row.gain > 1e-9), key=lambda row: -row.gain))
-
-
-def _notes(given: JointProblem, motion: Motion, keep: NDArray[np.intp]) -> tuple[str, ...]:
-    notes = []
-    if given.layout.loops == 0:
-        notes.append("no closed loop of guided joints: nothing can bind")
-    if keep.size < len(motion.inputs):
-        notes.append(f"{len(motion.inputs) - keep.size} samples are not assembled: {motion.reason}")
-    return tuple(notes)

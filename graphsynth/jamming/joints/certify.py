@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
 
+Array = NDArray[np.float64]
 States = NDArray[np.int8]
-Mask = NDArray[np.bool_]
 #: What the verdict is about, for certificates and reports.
 MODEL = (
     "L1 with exact tilts: the small-tilt closure (first order) with bounds of the terms of second order that it "
@@ -48,21 +48,21 @@ def verdict_of(
 ) -> tuple[Verdict, str]:
     """Return the strongest verdict that the pieces in these states prove, and one sentence on it."""
     width = pieces.hi - pieces.lo
-    share = [float(width[state == s].sum() / width.sum()) for s in (-1, 0, 1)]
+    binding, undecided = (float(width[state == s].sum() / width.sum()) for s in (-1, 0))
     open_text = _why_open(pieces, state, stopped)
-    if share[0] == 0.0 and (state == -1).any():
+    if binding == 0.0 and (state == -1).any():
         u = float(pieces.lo[state == -1][0])
         return Verdict.CERTIFIED_JAMMED, f"binds at the input {u!r}, proved; around it undecided: {open_text}"
-    if share[0] > 0.0:
-        rest = f"; undecided over {share[1]:.3g}: {open_text}" if share[1] > 0.0 else ""
-        part = "the whole range" if (state == -1).all() else f"{shortened(100.0 * share[0], -1, 3)} % of the range"
+    if binding > 0.0:
+        rest = f"; undecided over {undecided:.3g}: {open_text}" if undecided > 0.0 else ""
+        part = "the whole range" if (state == -1).all() else f"{shortened(100.0 * binding, -1, 3)} % of the range"
         return Verdict.CERTIFIED_JAMMED, f"binds over {part}, proved{rest}"
     if witness is not None:
         return Verdict.CERTIFIED_JAMMED_FOR_SOME, witness.sentence
-    if share[1] > 0.0:
-        if share[1] == 1.0:
-            return Verdict.UNDECIDED, f"nothing is proved: {open_text}"
-        return Verdict.UNDECIDED, f"{open_text} over {share[1]:.3g} of the range, the rest is proved free"
+    if undecided == 1.0:
+        return Verdict.UNDECIDED, f"nothing is proved: {open_text}"
+    if undecided > 0.0:
+        return Verdict.UNDECIDED, f"{open_text} over {undecided:.3g} of the range, the rest is proved free"
     if not work.motion.completed:
         return Verdict.UNDECIDED, f"free as far as the motion goes, proved; it ends: {work.motion.reason}"
     if not branch:
@@ -74,34 +74,29 @@ def _why_open(pieces: Found, state: States, stopped: str) -> str:
     left = state == 0
     if not left.any():
         return ""
-    lost = left & ~pieces.proved
-    near = left & (states(pieces) != 0)
     if stopped:
         return stopped
+    lost = left & ~pieces.proved
     if lost.any():
         u = float(pieces.lo[lost][0])
         return f"the positions are not proved near the input {u:.9g} (a singularity, or two modes that nearly meet)"
+    near, texts = left & (states(pieces) != 0), []
     if near.any():
         at = int(np.flatnonzero(near)[np.argmin(np.maximum(pieces.lower[near] - 1.0, 1.0 - pieces.upper[near]))])
         side = "binds" if pieces.lower[at] > 1.0 else "is free"
-        text = (
+        texts.append(
             f"near the input {pieces.lo[at]:.9g} it {side} with small tilts (first order), but the terms of second "
             "order that they neglect may change that"
         )
-        return text if (near == left).all() else f"{text}; {_widest(pieces, left & ~near)}"
-    return _widest(pieces, left)
-
-
-def _widest(pieces: Found, left: Mask) -> str:
-    worst = int(np.flatnonzero(left)[np.argmax(pieces.upper[left] - pieces.lower[left])])
-    below, above = shortened(float(pieces.lower[worst]), -1, 9), shortened(float(pieces.upper[worst]), 1, 9)
-    return (
-        f"the factor lies between {below} and {above} near the input "
-        f"{pieces.lo[worst]:.9g}: it passes 1, touches 1, or some members of the tolerance boxes bind and some do not"
-    )
-
-
-Array = NDArray[np.float64]
+    rest = np.flatnonzero(left & ~near)
+    if rest.size:
+        worst = int(rest[np.argmax(pieces.upper[rest] - pieces.lower[rest])])
+        below, above = shortened(float(pieces.lower[worst]), -1, 9), shortened(float(pieces.upper[worst]), 1, 9)
+        texts.append(
+            f"the factor lies between {below} and {above} near the input {pieces.lo[worst]:.9g}: "
+            "it passes 1, touches 1, or some members of the tolerance boxes bind and some do not"
+        )
+    return "; ".join(texts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,28 +105,20 @@ class TurnCertificate:
 
     Attributes
     ----------
-    verdict : Verdict
+    verdict, reason : Verdict, str
         CERTIFIED_FREE: no jam at any input of the range (between the samples too), for any value in the tolerance
         boxes.  CERTIFIED_JAMMED: at every input of the pieces marked so it binds, for every value in the boxes.
         CERTIFIED_JAMMED_FOR_SOME: the member ``witness`` of the boxes binds.  UNDECIDED otherwise, also where small
         tilts would decide but the terms of second order that they neglect may change it.
-    reason : str
-    low, high : ndarray, shape (pieces,)
-        Pieces of the input, ascending.
-    state : ndarray of int8, shape (pieces,)
-        +1 free, -1 jammed, 0 undecided; with exact tilts.
+    low, high, state : ndarray, shape (pieces,)
+        Pieces of the input, ascending; +1 free, -1 jammed, 0 undecided, with exact tilts.
     lower, upper : ndarray, shape (pieces,)
         Proved bounds of the factor on limits and plays together (the inverse of the allowed scale), in the small-tilt
-        model (first order).
-    small_tilts : Verdict
-        What is proved in the small-tilt model alone, which neglects terms of second order in the tilts.
+        model (first order), which neglects terms of second order; ``small_tilts`` is the verdict in that model.
     one_branch : bool
         All pieces are proved to belong to one continuous branch.
-    witness : MemberWitness or None
-        The member that binds, for CERTIFIED_JAMMED_FOR_SOME.
-    evaluated : int
-        Pieces evaluated.
-    seconds : float
+    evaluated, seconds : int, float
+        Pieces evaluated, run time.
     """
 
     verdict: Verdict
@@ -205,6 +192,8 @@ def certify_coupled(
 ) -> TurnCertificate:
     """Prove where a mechanism is free and where it binds, between the first and the last input of a motion.
 
+    See theory/joints-that-share-a-tilt 4, 5 and theory/jam-arcs 5.
+
     Parameters
     ----------
     motion : Motion
@@ -212,10 +201,9 @@ def certify_coupled(
     bearings, tilts, condition
         As for `graphsynth.jamming.joints.assess_coupled`; the ranges they carry are tolerance boxes, and the verdict
         holds for every value in them.
-    length_tolerance : float
-        Relative half width of every coordinate of a joint on its links.
-    resolution : float
-        Width of a piece, over the range, below which it is left undecided.
+    length_tolerance, resolution : float
+        Relative half width of every coordinate of a joint on its links; width of a piece, over the range, below which
+        it is left undecided.
     max_pieces, seconds : optional
         Limits of the work; what is not decided within them stays undecided.  A binding member is sought after it.
 
@@ -229,9 +217,6 @@ def certify_coupled(
     GeometryError
         Limits or misalignments that do not fit the mechanism, fewer than two assembled samples.
 
-    Notes
-    -----
-    See theory/joints-that-share-a-tilt 4, 5 and theory/jam-arcs 5.
 
     Examples
     --------
@@ -249,7 +234,10 @@ def certify_coupled(
         budget = Budget(resolution * (work.high - work.low), max_pieces, seconds, begin)
         return _proved(work, budget, *search(work, budget))
     except Unsupported as error:
-        return _nothing(motion, str(error), perf_counter() - begin)
+        ends, zero = motion.inputs[motion.assembled], np.zeros(1)
+        columns = ends.min(keepdims=True), ends.max(keepdims=True), zero.astype(np.int8), zero, zero + np.inf
+        seconds = perf_counter() - begin
+        return TurnCertificate(Verdict.UNDECIDED, str(error), *columns, False, None, 0, seconds)
 
 
 def _proved(work: Work, budget: Budget, pieces: Found, stopped: str) -> TurnCertificate:
@@ -275,26 +263,5 @@ def _proved(work: Work, budget: Budget, pieces: Found, stopped: str) -> TurnCert
     small, first_order = verdict_of(work, pieces, states(pieces), stopped, branch, witness)
     if small.is_certified and small is not verdict:
         reason = f"{reason}; with small tilts (first order): {first_order}"
-    return TurnCertificate(
-        verdict,
-        reason,
-        pieces.lo,
-        pieces.hi,
-        state,
-        pieces.lower,
-        pieces.upper,
-        branch,
-        witness,
-        work.evaluated,
-        perf_counter() - budget.begin,
-        small,
-    )
-
-
-def _nothing(motion: Motion, reason: str, seconds: float) -> TurnCertificate:
-    ends = motion.inputs[motion.assembled]
-    low, high = np.array([ends.min()]), np.array([ends.max()])
-    zero = np.zeros(1)
-    return TurnCertificate(
-        Verdict.UNDECIDED, reason, low, high, np.zeros(1, dtype=np.int8), zero, zero + np.inf, False, None, 0, seconds
-    )
+    columns, seconds = (pieces.lo, pieces.hi, state, pieces.lower, pieces.upper), perf_counter() - budget.begin
+    return TurnCertificate(verdict, reason, *columns, branch, witness, work.evaluated, seconds, small)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.jamming.joints.limits import JointLimits, Limits, Misalignment
+from graphsynth.jamming.joints.limits import Limits, Misalignment, bounds
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+#: Which tilt a limit is on: that of a round joint in all directions, or one of a straight guide.
+KINDS = ("tilt", "roll", "pitch")
 ROUND, ROLL, PITCH = 0, 1, 2
 
 
@@ -39,7 +41,7 @@ class Layout:
     ``joints``: joints with any limit, by their number in the mechanism; the others are no part of the program.
     ``pairs`` (joints, 2): bodies a and b.  ``incidence`` (loops, joints): +1 where the loop passes the joint from a to
     b, -1 from b to a.  ``block_joint``, ``block_axis`` (blocks,): of every limit on tilt its joint (position in
-    ``joints``) and whether it is round, on roll, or on pitch.  ``limit`` (blocks,), ``end_float`` (joints,): nominal
+    ``joints``) and its place in `KINDS`.  ``limit`` (blocks,), ``end_float`` (joints,): nominal
     limits; 0 is rigid, infinite is none; their ``_range`` (2, ...) are tolerance boxes.  ``misalignments``: position in
     ``joints``, sign that makes it one of b against a, and the misalignment.
     """
@@ -63,24 +65,20 @@ class Layout:
 
 def lay_out(mechanism: Mechanism, limits: tuple[Limits, ...], tilts: tuple[Misalignment, ...]) -> Layout:
     """Loops, blocks and limits of a mechanism."""
-    by_pair = {(min(t.base, t.link), max(t.base, t.link)): t for t in tilts}
-    kept = [k for k, own in enumerate(limits) if _holds(own) or mechanism.joints[k].pair in by_pair]
-    pairs = np.array([(mechanism.joints[k].a, mechanism.joints[k].b) for k in kept], dtype=np.intp).reshape(-1, 2)
-    blocks: list[tuple[int, int, float, float, float]] = []
-    for place, k in enumerate(kept):
-        own = limits[k]
-        if isinstance(own, JointLimits):
-            blocks.append((place, ROUND, own.tilt, *_of(own.tilt_range)))
-        else:
-            blocks.append((place, ROLL, own.roll, *_of(own.roll_range)))
-            blocks.append((place, PITCH, own.pitch, *_of(own.pitch_range)))
-    table = np.array(blocks, dtype=np.float64).reshape(-1, 5)
-    turned = []
-    for place, k in enumerate(kept):
-        joint = mechanism.joints[k]
-        if joint.pair in by_pair:
-            tilt = by_pair[joint.pair]
+    by_pair = {tilt.pair: tilt for tilt in tilts}
+    kept: list[int] = []
+    blocks, turned = [], []
+    for k, (joint, own) in enumerate(zip(mechanism.joints, limits)):
+        tilt = by_pair.get(joint.pair)
+        if tilt is None and min(own.axial_clearance, *(getattr(own, name) for name in own.tilts)) == math.inf:
+            continue
+        place = len(kept)
+        kept.append(k)
+        blocks += [(place, KINDS.index(name), getattr(own, name), *bounds(own, name)) for name in own.tilts]
+        if tilt is not None:
             turned.append((place, 1.0 if tilt.base == joint.a else -1.0, tilt))
+    pairs = np.array([(mechanism.joints[k].a, mechanism.joints[k].b) for k in kept], dtype=np.intp).reshape(-1, 2)
+    table = np.array(blocks, dtype=np.float64).reshape(-1, 5)
     return Layout(
         joints=tuple(kept),
         pairs=pairs,
@@ -90,20 +88,8 @@ def lay_out(mechanism: Mechanism, limits: tuple[Limits, ...], tilts: tuple[Misal
         limit=table[:, 2],
         end_float=np.array([limits[k].axial_clearance for k in kept]),
         limit_range=table[:, 3:].T.copy(),
-        end_float_range=np.array([_of(limits[k].axial_clearance_range) for k in kept]).reshape(-1, 2).T.copy(),
+        end_float_range=np.array([bounds(limits[k], "axial_clearance") for k in kept]).reshape(-1, 2).T.copy(),
         misalignments=tuple(turned),
-    )
-
-
-def _of(bounds: tuple[float, float] | None) -> tuple[float, float]:
-    assert bounds is not None  # filled when made
-    return bounds
-
-
-def _holds(own: Limits) -> bool:
-    tilts = (own.tilt,) if isinstance(own, JointLimits) else (own.roll, own.pitch)
-    return (
-        min(*tilts, own.axial_clearance) < math.inf if len(tilts) > 1 else min(tilts[0], own.axial_clearance) < math.inf
     )
 
 

@@ -21,12 +21,14 @@ Source: [Nesterov & Todd 1997]; Vandenberghe, "The CVXOPT linear and quadratic c
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 _ROUNDS = 60
 _TARGET = 1e-12
 
@@ -114,6 +116,7 @@ class _Program:
         count, cones, _, n = G.shape
         scale, inverse = _scaling(s, z)
         lam = _apply(scale, z)
+        det = _determinant(lam)
         Gs = (inverse @ G).reshape(count, 3 * cones, n)
         H = Gs.transpose(0, 2, 1) @ Gs
         solve = _inverse(H)
@@ -124,7 +127,10 @@ class _Program:
 
         def direction(target: Array) -> tuple[Array, Array, Array]:
             """Solve for ``lam o (W dz + W^-1 ds) = target``."""
-            t = _divide(lam, target)
+            # t with lam o t = target
+            t0 = (lam[..., 0] * target[..., 0] - (lam[..., 1:] * target[..., 1:]).sum(axis=-1)) / det
+            rest = (target[..., 1:] - t0[..., None] * lam[..., 1:]) / lam[..., :1]
+            t = np.concatenate([t0[..., None], rest], axis=-1)
             right = -rx[:, :, None] - Gs.transpose(0, 2, 1) @ (_apply(inverse, rz) + t).reshape(count, -1, 1)
             dx = solve(right)
             dz = _apply(inverse, _apply(inverse, rz + (G @ dx[:, None])[..., 0]) + t)
@@ -169,12 +175,8 @@ def _apply(matrices: Array, vectors: Array) -> Array:
     return np.asarray((matrices @ vectors[..., None])[..., 0])
 
 
-def _norm(v: Array) -> Array:
-    return np.hypot(v[..., 1], v[..., 2])
-
-
 def _determinant(v: Array) -> Array:
-    r = _norm(v)
+    r = np.hypot(v[..., 1], v[..., 2])
     return np.asarray(np.maximum((v[..., 0] - r) * (v[..., 0] + r), 1e-300))
 
 
@@ -202,14 +204,6 @@ def _product(a: Array, b: Array) -> Array:
     return np.concatenate([first, a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:]], axis=-1)
 
 
-def _divide(lam: Array, t: Array) -> Array:
-    """Solve ``lam o x = t``."""
-    det = _determinant(lam)
-    x0 = (lam[..., 0] * t[..., 0] - (lam[..., 1:] * t[..., 1:]).sum(axis=-1)) / det
-    rest = (t[..., 1:] - x0[..., None] * lam[..., 1:]) / lam[..., :1]
-    return np.concatenate([x0[..., None], rest], axis=-1)
-
-
 def _reach(v: Array, d: Array) -> Array:
     """Largest step that keeps every cone of a row, at most 1e6."""
     a = d[..., 0] ** 2 - (d[..., 1:] ** 2).sum(axis=-1)
@@ -235,41 +229,39 @@ def polish(M: Array, F: Array, W: Array, found: ConeSolution, *, robust: bool = 
     q, tau, zeta = found.q.copy(), found.tau.copy(), found.zeta.copy()
     count, blocks, _, k = M.shape
     forces = F.shape[1]
-    m, f = _moments(M, q), (F @ q[:, :, None])[..., 0]
+    m, f = loads(M, F, q)
     size, lean = _length(m), _length(tau)
     T = lean.max(axis=1)
     with np.errstate(all="ignore"):
         loaded = size > 1.0 - lean / T[:, None]
         pushed = np.abs(f) > 1.0 - np.abs(zeta)
         for _ in range(steps):
-            m, f = _moments(M, q), (F @ q[:, :, None])[..., 0]
+            m, f = loads(M, F, q)
             size = np.where(loaded, _length(m), 1.0)
             unit = np.where(loaded[..., None], m / size[..., None], 0.0)
             tau = np.where(loaded[..., None], -T[:, None, None] * unit, tau)
             zeta = np.where(pushed, -np.sign(f), zeta)
             matrix, right = _system(M, F, W, (m, f, size, unit, tau, zeta, T), loaded, pushed)
-            step = _least(matrix, right, k) if robust else _solve(matrix, right, k)
+            step = None
+            if not robust:
+                with suppress(np.linalg.LinAlgError):
+                    step = np.asarray(np.linalg.solve(matrix, right[:, :, None])[..., 0])
+            step = _least(matrix, right, k) if step is None else step
             q = q + step[:, :k]
             T = T + step[:, k]
             end = k + 1 + 2 * blocks
             tau = tau + np.where(loaded[..., None], 0.0, step[:, k + 1 : end].reshape(count, blocks, 2))
             zeta = zeta + np.where(pushed, 0.0, step[:, end : end + forces])
-    return ConeSolution(q, *_shared(M, F, W, q, tau, zeta, loaded, pushed), found.rounds)
+    return ConeSolution(q, *_shared((M, F, W), q, tau, zeta, loaded, pushed), found.rounds)
 
 
 def _shared(
-    M: Array,
-    F: Array,
-    W: Array,
-    q: Array,
-    tau: Array,
-    zeta: Array,
-    loaded: NDArray[np.bool_],
-    pushed: NDArray[np.bool_],
+    program: tuple[Array, Array, Array], q: Array, tau: Array, zeta: Array, loaded: Mask, pushed: Mask
 ) -> tuple[Array, Array]:
     """Put loaded joints at their limit for the T of q; let the idle ones close the loops with the least change."""
+    M, F, W = program
     count, blocks, _, k = M.shape
-    m, f = _moments(M, q), (F @ q[:, :, None])[..., 0]
+    m, f = loads(M, F, q)
     with np.errstate(all="ignore"):
         size = _length(m)
         T = ((W * q).sum(axis=1) - np.abs(f).sum(axis=1)) / size.sum(axis=1)
@@ -285,17 +277,16 @@ def _shared(
     return values[:, : 2 * blocks].reshape(count, blocks, 2), values[:, 2 * blocks :]
 
 
-def _moments(M: Array, q: Array) -> Array:
-    return np.asarray((M @ q[:, None, :, None])[..., 0])
+def loads(M: Array, F: Array, q: Array) -> tuple[Array, Array]:
+    """Moments of the blocks and axial forces."""
+    return (M @ q[:, None, :, None])[..., 0], (F @ q[:, :, None])[..., 0]
 
 
 def _length(v: Array) -> Array:
     return np.asarray(np.hypot(v[..., 0], v[..., 1]))
 
 
-def _system(
-    M: Array, F: Array, W: Array, at: tuple[Array, ...], loaded: NDArray[np.bool_], pushed: NDArray[np.bool_]
-) -> tuple[Array, Array]:
+def _system(M: Array, F: Array, W: Array, at: tuple[Array, ...], loaded: Mask, pushed: Mask) -> tuple[Array, Array]:
     """Newton matrix and right side: closure, normalisation, idle blocks, idle forces (identity rows for the others)."""
     m, f, size, unit, tau, zeta, T = at
     count, blocks, _, k = M.shape
@@ -320,13 +311,6 @@ def _system(
     values = np.concatenate([m.reshape(count, -1), f], axis=1)
     right[:, k + 1 :] = np.where(rest, -values, 0.0)
     return matrix, right
-
-
-def _solve(matrix: Array, right: Array, k: int) -> Array:
-    try:
-        return np.asarray(np.linalg.solve(matrix, right[:, :, None])[..., 0])
-    except np.linalg.LinAlgError:
-        return _least(matrix, right, k)
 
 
 def _least(matrix: Array, right: Array, k: int) -> Array:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals import Dual, Interval, cos, sin
 from graphsynth.jamming.joints.closure import PITCH, ROLL, ROUND, Layout, moment_rows
+from graphsynth.jamming.joints.limits import bounds
 from graphsynth.jamming.joints.positions import enclosed_solve, points
 from graphsynth.jamming.joints.program import PoseSolution, Units
 
@@ -61,9 +62,8 @@ def shifts_enclosed(layout: Layout, base: Interval) -> Interval:
     zero = Interval.zeros((count,))
     columns = [Interval.zeros((count, 2)) for _ in range(joints)]
     for place, sign, tilt in layout.misalignments:
-        assert tilt.alpha_range is not None and tilt.direction_range is not None  # filled when made
-        alpha = Interval.from_bounds(*tilt.alpha_range) * sign
-        direction = Interval.from_bounds(*tilt.direction_range)
+        alpha = Interval.from_bounds(*bounds(tilt, "alpha")) * sign
+        direction = Interval.from_bounds(*bounds(tilt, "direction"))
         c, s = cos(direction) * alpha, sin(direction) * alpha
         turn = base[:, place, 0 if sign > 0 else 1]
         x, y = turn[:, 0], turn[:, 1]
@@ -80,6 +80,12 @@ def factor_bounds(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Arra
     return lower_bounds(layout, at, found), upper_bounds(layout, at, found)
 
 
+def _around(values: Interval, radius: Array) -> Interval:
+    """Widen pairs (N, joints, 2) by (N, joints)."""
+    return values + Interval.from_bounds(-radius, radius).reshape(*radius.shape, 1)
+
+
+@np.errstate(all="ignore")
 def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglected | None = None) -> Array:
     """Bounds from equilibrium; see `factor_bounds`.  With ``exact`` above 1 only where exact tilts bind too."""
     if layout.loops == 0:
@@ -87,31 +93,18 @@ def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglect
     length = found.units.length
     if exact is not None:
         at = Pieces(_around(at.r, exact.r), _around(at.e, exact.e), _around(at.d, exact.d))
-    with np.errstate(all="ignore"):
-        value = _lower(layout, (at.r - Interval(found.units.centre)) / length, at, found, length, exact)
-    return value if exact is None else np.where(exact.sound, value, 0.0)
-
-
-def upper_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglected | None = None) -> Array:
-    """Bounds from closure; see `factor_bounds`.  With ``exact`` below 1 only where exact tilts are free too."""
-    if layout.loops == 0:
-        return np.zeros(len(at.r))
-    length = found.units.length
-    with np.errstate(all="ignore"):
-        value = _upper(layout, (at.r - Interval(found.units.centre)) / length, at, found, length, exact)
-    return value if exact is None else np.where(exact.sound, value, np.inf)
-
-
-def _around(values: Interval, radius: Array) -> Interval:
-    """Widen pairs (N, joints, 2) by (N, joints)."""
-    return values + Interval.from_bounds(-radius, radius).reshape(*radius.shape, 1)
-
-
-def _lower(
-    layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length: float, exact: Neglected | None
-) -> Array:
+    r = (at.r - Interval(found.units.centre)) / length
     y, fine = _without_forbidden(layout, r, at.e, found.y)
-    wrench = _by_joint(layout, y)
+    # sum of the loop wrenches through every joint, (N, joints, 3)
+    columns = []
+    for place in range(len(layout.joints)):
+        total = Interval.zeros((len(y), 3))
+        for loop, sign in enumerate(layout.incidence[:, place].tolist()):
+            if sign != 0.0:
+                part = y[:, 3 * loop : 3 * loop + 3]
+                total = total + part if sign > 0.0 else total - part
+        columns.append(total)
+    wrench = Interval.stack(columns, axis=1)
     m = (wrench[:, :, 0] - wrench[:, :, 2] * r[:, :, 1], wrench[:, :, 1] + wrench[:, :, 2] * r[:, :, 0])
     work = Interval.zeros((len(found.y),))
     for place, _, _ in layout.misalignments:
@@ -122,7 +115,14 @@ def _lower(
         limit = limits[:, block]
         if not limit.any() or np.isinf(layout.limit[block]):  # rigid costs nothing; without limit the moment is zero
             continue
-        size = _size(layout.block_axis[block], (m[0][:, place], m[1][:, place]), at.e[:, place])
+        # length of the moment, or its component along or across the guide, as the limit takes it
+        mx, my, e = m[0][:, place], m[1][:, place], at.e[:, place]
+        if layout.block_axis[block] == ROUND:
+            size = (mx.sqr() + my.sqr()).sqrt()
+        elif layout.block_axis[block] == ROLL:
+            size = abs(mx * e[:, 0] + my * e[:, 1])
+        else:
+            size = abs(my * e[:, 0] - mx * e[:, 1])
         cost = cost + size * Interval.from_bounds(np.zeros(len(y)), limit)
     for place, play in enumerate(layout.end_float_range[1].tolist()):
         if play > 0.0 and np.isfinite(layout.end_float[place]):
@@ -134,30 +134,9 @@ def _lower(
     quotient = (Interval.from_bounds(least, least) / Interval.from_bounds(cost.hi, cost.hi)).lo
     quotient = np.where((cost.hi == 0.0) & (least > 0.0), np.inf, quotient)
     sound = fine & np.isfinite(least) & (least > 0.0) & ~np.isnan(quotient)
+    if exact is not None:
+        sound &= exact.sound
     return np.where(sound, np.maximum(quotient, 0.0), 0.0)
-
-
-def _size(axis: float, v: tuple[Interval, Interval], e: Interval) -> Interval:
-    """Length of a vector, or its component along or across the guide, as the limit takes it."""
-    if axis == ROUND:
-        return (v[0].sqr() + v[1].sqr()).sqrt()
-    if axis == ROLL:
-        return abs(v[0] * e[:, 0] + v[1] * e[:, 1])
-    assert axis == PITCH
-    return abs(v[1] * e[:, 0] - v[0] * e[:, 1])
-
-
-def _by_joint(layout: Layout, y: Interval) -> Interval:
-    """Sum of the loop wrenches (N, 3 loops) through every joint, (N, joints, 3)."""
-    columns = []
-    for place in range(len(layout.joints)):
-        total = Interval.zeros((len(y), 3))
-        for loop, sign in enumerate(layout.incidence[:, place].tolist()):
-            if sign != 0.0:
-                part = y[:, 3 * loop : 3 * loop + 3]
-                total = total + part if sign > 0.0 else total - part
-        columns.append(total)
-    return Interval.stack(columns, axis=1)
 
 
 def _without_forbidden(layout: Layout, r: Interval, e: Interval, y: Array) -> tuple[Interval, Mask]:
@@ -177,41 +156,28 @@ def _without_forbidden(layout: Layout, r: Interval, e: Interval, y: Array) -> tu
 
 def _forbidden(layout: Layout, r: Interval, e: Interval) -> Interval | None:
     """Rows (N, rows, 3 loops) of moments and forces that must vanish; equal rows once."""
-    blocks = np.flatnonzero(np.isinf(layout.limit))
-    count, loops = len(r), layout.loops
-    lo, hi = [], []
-
-    def add(entries: list[list[Interval]]) -> None:
-        flat = [value + Interval.zeros((count,)) for loop in entries for value in loop]
-        row = Interval.stack(flat, axis=-1)
-        lo.append(row.lo)
-        hi.append(row.hi)
-
-    zero, one = Interval(0), Interval(1)
-    for block in blocks.tolist():
+    zero, one, nothing = Interval(0), Interval(1), Interval.zeros((len(r),))
+    rows: list[list[Interval]] = []
+    for block in np.flatnonzero(np.isinf(layout.limit)).tolist():
         place = int(layout.block_joint[block])
         x, y, signs = r[:, place, 0], r[:, place, 1], [int(s) for s in layout.incidence[:, place]]
-        plain = (one, zero, -y), (zero, one, x)
-        if layout.block_axis[block] == ROUND:
-            wanted = plain
-        else:
+        wanted = [(one, zero, -y), (zero, one, x)]
+        if layout.block_axis[block] != ROUND:
             a, b = e[:, place, 0], e[:, place, 1]
             if layout.block_axis[block] == PITCH:
                 a, b = -b, a
-            wanted = (tuple(plain[0][i] * a + plain[1][i] * b for i in range(3)),)  # type: ignore[assignment]
-        for row in wanted:
-            add([[value * s for value in row] for s in signs])
+            wanted = [tuple(first * a + second * b for first, second in zip(*wanted))]
+        rows += [[value * s for s in signs for value in row] for row in wanted]
     columns = {
         tuple((c * (c[np.flatnonzero(c)[0]] if c.any() else 1.0)).tolist())
         for c in layout.incidence.T[np.isinf(layout.end_float)]
     }
     for column in sorted(columns):
         if any(column):
-            add([[zero, zero, Interval(int(s))] for s in column])
-    if not lo:
+            rows.append([value for s in column for value in (zero, zero, Interval(int(s)))])
+    if not rows:
         return None
-    assert loops == len(layout.incidence)
-    return Interval.from_bounds(np.stack(lo, axis=1), np.stack(hi, axis=1))
+    return Interval.stack([Interval.stack([value + nothing for value in row], axis=-1) for row in rows], axis=1)
 
 
 def start_tilts(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array, Array]:
@@ -223,9 +189,13 @@ def start_tilts(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array,
     return _fill_free(layout, (at.r.mid - found.units.centre) / length, at, (tau, zeta), length)
 
 
-def _upper(
-    layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length: float, exact: Neglected | None
-) -> Array:
+@np.errstate(all="ignore")
+def upper_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglected | None = None) -> Array:
+    """Bounds from closure; see `factor_bounds`.  With ``exact`` below 1 only where exact tilts are free too."""
+    if layout.loops == 0:
+        return np.zeros(len(at.r))
+    length = found.units.length
+    r = (at.r - Interval(found.units.centre)) / length
     tau, zeta = start_tilts(layout, at, found)
     tilts, slips = _directions(layout, r.mid, at.e.mid, found, length)
     off = _off(layout, at, r, points(tau), points(zeta), found.units)
@@ -236,20 +206,18 @@ def _upper(
         r, e = _around(r, (points(exact.r) / length).hi), _around(e, exact.e)
     columns = tilts.shape[-1]
     places, guides = _columns(r), _columns(e)
-    parts = [
-        _stacked(_closure(layout, places, guides, points(tilts[..., c]), points(slips[..., c]), length))
-        for c in range(columns)
-    ]
+    parts = []
+    for c in range(columns):
+        sums = _closure(layout, places, guides, points(tilts[..., c]), points(slips[..., c]), length)
+        parts.append(Interval.stack(sums, axis=-1))
     matrix = Interval.stack(parts, axis=-1)
     step, fine = enclosed_solve(matrix, -off)
     tau_all = points(tau) + (points(tilts) * step.reshape(len(step), 1, 1, columns)).sum(-1)
     zeta_all = points(zeta) + (points(slips) * step.reshape(len(step), 1, columns)).sum(-1)
     worst = np.zeros(len(step))
-    count = len(step)
-    limits = np.broadcast_to(layout.limit_range[0], (count, len(layout.limit))) if exact is None else exact.narrow
-    plays = (
-        np.broadcast_to(layout.end_float_range[0], (count, len(layout.joints))) if exact is None else exact.end_float
-    )
+    limits, plays = layout.limit_range[:1], layout.end_float_range[:1]
+    if exact is not None:
+        limits, plays = exact.narrow, exact.end_float
     for block in range(len(layout.limit)):
         if layout.limit[block] == 0.0 or np.isinf(limits[:, block]).any():
             continue
@@ -261,7 +229,10 @@ def _upper(
     for place in range(len(layout.joints)):
         if layout.end_float[place] > 0.0 and np.isfinite(layout.end_float_range[0, place]):
             worst = np.maximum(worst, _ratio(zeta_all[:, place].mag, plays[:, place]))
-    return np.where(fine & ~np.isnan(worst), worst, np.inf)
+    sound = fine & ~np.isnan(worst)
+    if exact is not None:
+        sound &= exact.sound
+    return np.where(sound, worst, np.inf)
 
 
 def _disturbed(layout: Layout, r: Interval, at: Pieces, tau: Array, length: float, exact: Neglected) -> Array:
@@ -330,7 +301,7 @@ def _fill_free(layout: Layout, r: Array, at: Pieces, start: tuple[Array, Array],
     slips[:, :, 2::3] = layout.incidence.T[joints]
     middle = (_columns(points(value)) for value in (r, at.e.mid, at.d.mid))
     places, guides, shift = middle
-    off = _stacked(_closure(layout, places, guides, points(tau), points(zeta), length, shift)).mid
+    off = Interval.stack(_closure(layout, places, guides, points(tau), points(zeta), length, shift), axis=-1).mid
     both = np.concatenate([rows, slips], axis=1).transpose(0, 2, 1)
     value = -(np.linalg.pinv(both, rcond=1e-12) @ np.nan_to_num(off)[:, :, None])[..., 0]
     n = 2 * int(blocks.sum())
@@ -375,41 +346,29 @@ def _columns(values: Interval) -> Columns:
     return [(values[:, k, 0], values[:, k, 1]) for k in range(values.shape[1])]
 
 
-def _moving_columns(values: Interval, slopes: Interval) -> Columns:
-    """Columns with their derivatives by the input."""
-    return [
-        (Dual(a, c.reshape(1, -1)), Dual(b, d.reshape(1, -1)))
-        for (a, b), (c, d) in zip(_columns(values), _columns(slopes))
-    ]
-
-
 def _off(layout: Layout, at: Pieces, scaled: Interval, tau: Interval, zeta: Interval, units: Units) -> Interval:
     """Enclose what is missing from the closure of given tilts over a piece, (N, 3 loops)."""
     length = units.length
-    off = _stacked(_closure(layout, _columns(scaled), _columns(at.e), tau, zeta, length, _columns(at.d)))
-    moving = at.moving
+    sums = _closure(layout, _columns(scaled), _columns(at.e), tau, zeta, length, _columns(at.d))
+    off, moving = Interval.stack(sums, axis=-1), at.moving
     if moving is None:
         return off
     centre = Interval(units.centre)
     at_middle = _closure(
         layout, _columns((moving.r - centre) / length), _columns(moving.e), tau, zeta, length, _columns(moving.d)
     )
-    sums = _closure(
-        layout,
-        _moving_columns(scaled, moving.r_slope / length),
-        _moving_columns(at.e, moving.e_slope),
-        tau,
-        zeta,
-        length,
-        _moving_columns(at.d, moving.d_slope),
+    own = (scaled, moving.r_slope / length), (at.e, moving.e_slope), (at.d, moving.d_slope)
+    places, guides, shift = (
+        [
+            (Dual(a, c.reshape(1, -1)), Dual(b, d.reshape(1, -1)))
+            for (a, b), (c, d) in zip(_columns(values), _columns(rates))
+        ]
+        for values, rates in own
     )
+    sums = _closure(layout, places, guides, tau, zeta, length, shift)
     zero = Interval.zeros((len(tau),))
     slopes = [value.grad[0] if isinstance(value, Dual) else zero for value in sums]
-    straight = _stacked([m + slope * moving.step for m, slope in zip(at_middle, slopes)])
+    straight = Interval.stack([m + slope * moving.step for m, slope in zip(at_middle, slopes)], axis=-1)
     better = off.intersect(straight)
     use = moving.sound[:, None] & ~better.is_empty
     return Interval.from_bounds(np.where(use, better.lo, off.lo), np.where(use, better.hi, off.hi))
-
-
-def _stacked(parts: list[Any]) -> Interval:
-    return Interval.stack(parts, axis=-1)

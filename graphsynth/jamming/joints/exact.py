@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from graphsynth.intervals import Dual, Interval, Status, image, variables
 from graphsynth.intervals.dual import jacobian_of
 from graphsynth.jamming.joints.closure import ROUND, Layout
+from graphsynth.jamming.joints.limits import bounds
 from graphsynth.jamming.joints.positions import PLANE, Moved, Positions, enclosed_solve
 from graphsynth.mechanism.equations import Pair
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
@@ -64,7 +65,7 @@ class Neglected(NamedTuple):
 
 
 class _Angles(NamedTuple):
-    """Largest angles of every link (N, links) and joint (N, joints of the mechanism); misalignments and their bases.
+    """Largest angles of every link (N, links) and joint (N, joints of the mechanism).
 
     ``seat`` (joints,) is the largest misalignment, ``base`` (joints,) the link that carries it, -1 without one.
     """
@@ -94,15 +95,24 @@ def neglected(
     slips = np.where(small[:, None], slips, 0.0)
     offset, twist = _disturbances(system, angles, lengths, slips)
     moved_r, turned, sound = _movements(system, layout, tubes, u, counted, offset, twist)
-    kept = list(layout.joints)
+    kept, pairs = list(layout.joints), layout.pairs
     moved_r = moved_r + offset[:, kept]
-    a = layout.pairs[:, 0]
-    along = np.stack([turned[:, link] for link in a], axis=1) if kept else np.zeros((count, 0))
-    shift = _shifts(layout, angles, turned)
+    along = turned[:, pairs[:, 0]]
+    # change of every misalignment: a sine for the angle, the tilt of its base, and the turn of its base
+    shift = np.zeros((count, len(kept)))
+    for place, _, _ in layout.misalignments:
+        k = kept[place]
+        alpha, base = float(angles.seat[k]), int(angles.base[k])
+        own = angles.link[:, base]
+        shift[:, place] = alpha**3 / 6.0 + alpha * turned[:, base]
+        shift[:, place] += alpha * (own**2 + own * alpha) / (1.0 + np.cos(own)) + 0.5 * own * alpha**2
     wide, narrow = _limits(system, layout, angles, blocks)
     lean = np.sin(_axis(system, angles))[:, kept]
     play = layout.end_float_range[0] * (1.0 - 0.5 * lean**2) / _ROUNDING
-    lift = _rest(system, layout, angles, lengths, slips)
+    # what is left of the vertical closure of every loop: h^2 (h . v) / (1 + cos) of its links, and slips
+    body = np.sin(angles.link) * lengths * (1.0 - np.cos(angles.link))
+    rest = 0.5 * (body[:, pairs[:, 0]] + body[:, pairs[:, 1]]) + slips[:, kept] * lean**2
+    lift = rest @ np.abs(layout.incidence).T
     moved_r, along, shift, lift, wide = (value * _ROUNDING for value in (moved_r, along, shift, lift, wide))
     return Neglected(moved_r, along, shift, lift, wide, narrow, play, np.asarray(sound & small))
 
@@ -120,9 +130,8 @@ def _angles(system: Positions, layout: Layout, blocks: Array) -> _Angles:
         tilt[:, k] = np.sqrt((blocks[:, layout.block_joint == place] ** 2).sum(axis=1))
     seat, base = np.zeros(len(joints)), np.full(len(joints), -1)
     for place, sign, own in layout.misalignments:
-        assert own.alpha_range is not None  # filled when made
         k = layout.joints[place]
-        seat[k] = max(abs(bound) for bound in (*own.alpha_range, own.alpha))
+        seat[k] = max(abs(bound) for bound in bounds(own, "alpha"))
         base[k] = joints[k].a if sign > 0 else joints[k].b
     link = np.full((count, links), np.inf)
     link[:, mechanism.frame] = 0.0
@@ -130,8 +139,8 @@ def _angles(system: Positions, layout: Layout, blocks: Array) -> _Angles:
         for k, joint in enumerate(joints):
             for here, there in ((joint.a, joint.b), (joint.b, joint.a)):
                 link[:, there] = np.minimum(link[:, there], (link[:, here] + tilt[:, k] + seat[k]) * _ROUNDING)
-    between = np.stack([link[:, j.a] + link[:, j.b] + seat[k] for k, j in enumerate(joints)], axis=1)
-    return _Angles(link, np.minimum(tilt, between), seat, base)
+    a, b = zip(*((joint.a, joint.b) for joint in joints))
+    return _Angles(link, np.minimum(tilt, link[:, a] + link[:, b] + seat), seat, base)
 
 
 def _lengths(system: Positions, tubes: Tubes, u: Interval) -> Array:
@@ -152,10 +161,8 @@ def _lengths(system: Positions, tubes: Tubes, u: Interval) -> Array:
 
 def _axis(system: Positions, angles: _Angles) -> Array:
     """Largest angle of either axis of every joint against the normal, (N, joints of the mechanism)."""
-    joints = system.mechanism.joints
-    return np.stack(
-        [np.maximum(angles.link[:, j.a], angles.link[:, j.b]) + angles.seat[k] for k, j in enumerate(joints)], axis=1
-    )
+    a, b = zip(*((joint.a, joint.b) for joint in system.mechanism.joints))
+    return np.asarray(np.maximum(angles.link[:, a], angles.link[:, b]) + angles.seat)
 
 
 def _slips(system: Positions, layout: Layout, angles: _Angles, lengths: Array) -> tuple[Array, Mask]:
@@ -172,10 +179,8 @@ def _slips(system: Positions, layout: Layout, angles: _Angles, lengths: Array) -
                 own = height[:, here] + rise[:, here] + play[k]
                 height[:, there] = np.minimum(height[:, there], own)
     top = height + rise
-    slips = []
-    for k, joint in enumerate(mechanism.joints):
-        slips.append(np.minimum(play[k], (top[:, joint.a] + top[:, joint.b]) / np.cos(LARGEST)))
-    found = np.stack(slips, axis=1) * _ROUNDING
+    a, b = zip(*((joint.a, joint.b) for joint in mechanism.joints))
+    found = np.minimum(play, (top[:, a] + top[:, b]) / np.cos(LARGEST)) * _ROUNDING
     return found, np.asarray(np.isfinite(found).all(axis=1))
 
 
@@ -238,7 +243,7 @@ def _movements(
             status = image(lambda x: system.equations(x, q, counted, constants), box).status
             unknowns, rate, fine = rates(box)
             sound = np.asarray(fine & (status == Status.UNIQUE))
-        change = Interval.stack([*(rate[:, k] for k in range(n)), *(around[:, k] for k in range(width - n))], axis=-1)
+        change = _beside(rate, around)
         at = system.place(unknowns[:n], q, _moved(unknowns[n:]))
 
         def size(value: Any) -> Array:
@@ -274,18 +279,6 @@ def _moved(values: list[Any]) -> Moved:
 # -- out of the plane --------------------------------------------------------------------------------------------------
 
 
-def _shifts(layout: Layout, angles: _Angles, turned: Array) -> Array:
-    """Change of every misalignment: a sine for the angle, the tilt of its base, and the turn of its base."""
-    found = np.zeros((len(turned), len(layout.joints)))
-    for place, _, _ in layout.misalignments:
-        k = layout.joints[place]
-        alpha, base = float(angles.seat[k]), int(angles.base[k])
-        own = angles.link[:, base]
-        found[:, place] = alpha**3 / 6.0 + alpha * turned[:, base]
-        found[:, place] += alpha * (own**2 + own * alpha) / (1.0 + np.cos(own)) + 0.5 * own * alpha**2
-    return found
-
-
 def _limits(system: Positions, layout: Layout, angles: _Angles, blocks: Array) -> tuple[Array, Array]:
     """Limits on linear tilts, from outside and from inside.
 
@@ -306,15 +299,3 @@ def _limits(system: Positions, layout: Layout, angles: _Angles, blocks: Array) -
         least = np.minimum(layout.limit_range[0, block], blocks[:, block])
         narrow[:, block] = np.maximum(least * (1.0 - tilt**2 / 5.0) - off * _ROUNDING, 0.0) / _ROUNDING
     return wide, narrow
-
-
-def _rest(system: Positions, layout: Layout, angles: _Angles, lengths: Array, slips: Array) -> Array:
-    """Bound what is left of the vertical closure of every loop: ``h^2 (h . v) / (1 + cos)`` of its links, and slips."""
-    body = np.sin(angles.link) * lengths * (1.0 - np.cos(angles.link))
-    lean = np.sin(_axis(system, angles))
-    own = []
-    for place, k in enumerate(layout.joints):
-        a, b = layout.pairs[place]
-        own.append(0.5 * (body[:, a] + body[:, b]) + slips[:, k] * lean[:, k] ** 2)
-    table = np.stack(own, axis=1) if own else np.zeros((len(body), 0))
-    return np.asarray(table @ np.abs(layout.incidence).T)

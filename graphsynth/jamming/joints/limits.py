@@ -6,10 +6,10 @@ A bearing's limit is its critical tilt, enclosed over the box of its dimensions.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -36,22 +36,25 @@ def _limit(name: str, value: float) -> float:
     return number
 
 
-def _pair(name: str, given: Range) -> Range:
-    """Return both bounds; raise `GeometryError` for anything that is no pair."""
-    if not isinstance(given, tuple | list) or len(given) != 2:
-        raise GeometryError(f"{name}_range = {given!r} is no pair of bounds; give (low, high)")
-    return given[0], given[1]
-
-
-def _fill(limits: Limits, *names: str) -> None:
-    """Check limits and their ranges; a range that is not given is the limit itself."""
+def _fill(own: Limits | Misalignment, check: Callable[[str, Any], float], *names: str) -> None:
+    """Check values and their ranges; a range that is not given is the value itself."""
     for name in names:
-        value, given = _limit(name, getattr(limits, name)), getattr(limits, f"{name}_range")
-        low, high = (value, value) if given is None else (_limit(f"{name} of the range", v) for v in _pair(name, given))
+        value, given = check(name, getattr(own, name)), getattr(own, f"{name}_range")
+        if given is None:
+            given = value, value
+        if not isinstance(given, tuple | list) or len(given) != 2:
+            raise GeometryError(f"{name}_range = {given!r} is no pair of bounds; give (low, high)")
+        low, high = (check(f"{name} of the range", bound) for bound in given)
         if not low <= value <= high:
             raise GeometryError(f"{name} = {value} lies outside its range ({low}, {high}); correct one of them")
-        object.__setattr__(limits, name, value)
-        object.__setattr__(limits, f"{name}_range", (low, high))
+        object.__setattr__(own, name, value)
+        object.__setattr__(own, f"{name}_range", (low, high))
+
+
+def bounds(own: Limits | Misalignment, name: str) -> Range:
+    """Return the tolerance box of a value, which is always filled."""
+    found: Range = getattr(own, f"{name}_range")
+    return found
 
 
 @dataclass(frozen=True)
@@ -78,9 +81,10 @@ class JointLimits:
     axial_clearance: float = 0.0
     tilt_range: Range | None = None
     axial_clearance_range: Range | None = None
+    tilts: ClassVar[tuple[str, ...]] = ("tilt",)
 
     def __post_init__(self) -> None:
-        _fill(self, "tilt", "axial_clearance")
+        _fill(self, _limit, *self.tilts, "axial_clearance")
 
 
 @dataclass(frozen=True)
@@ -103,9 +107,10 @@ class SlideLimits:
     roll_range: Range | None = None
     pitch_range: Range | None = None
     axial_clearance_range: Range | None = None
+    tilts: ClassVar[tuple[str, ...]] = ("roll", "pitch")
 
     def __post_init__(self) -> None:
-        _fill(self, "roll", "pitch", "axial_clearance")
+        _fill(self, _limit, *self.tilts, "axial_clearance")
 
 
 Limits: TypeAlias = JointLimits | SlideLimits
@@ -132,12 +137,7 @@ class Misalignment:
         Whether ``link`` follows the tilted axis without clearance, as on a motor shaft; with False the joint's own
         limits hold.
     alpha_range, direction_range : (float, float), optional
-        Tolerance boxes.
-
-    Raises
-    ------
-    GeometryError
-        Links that are no numbers, values outside of their ranges, |alpha| above 0.5 rad.
+        Tolerance boxes; |alpha| may not exceed 0.5 rad.
 
     Examples
     --------
@@ -154,17 +154,20 @@ class Misalignment:
     direction_range: Range | None = None
 
     def __post_init__(self) -> None:
-        for name in ("alpha", "direction"):
-            value = finite(name, getattr(self, name))
-            object.__setattr__(self, name, value)
-            given = getattr(self, f"{name}_range")
-            low, high = (value, value) if given is None else (finite(name, bound) for bound in _pair(name, given))
-            if not low <= value <= high:
-                raise GeometryError(f"{name} = {value} lies outside its range ({low}, {high}); correct one of them")
-            object.__setattr__(self, f"{name}_range", (low, high))
-            if name == "alpha" and max(abs(low), abs(high)) > 0.5:
-                largest = max(low, high, key=abs)
-                raise GeometryError(f"alpha = {largest} rad is no small tilt; the coupled model needs |alpha| <= 0.5")
+        _fill(self, finite, "alpha", "direction")
+        largest = max(bounds(self, "alpha"), key=abs)
+        if abs(largest) > 0.5:
+            raise GeometryError(f"alpha = {largest} rad is no small tilt; the coupled model needs |alpha| <= 0.5")
+
+    def sharp(self, alpha: float | None = None, direction: float | None = None) -> Misalignment:
+        """Return the misalignment without tolerances, at other values if given."""
+        alpha = self.alpha if alpha is None else alpha
+        return Misalignment(self.base, self.link, alpha, self.direction if direction is None else direction, self.rigid)
+
+    @property
+    def pair(self) -> tuple[int, int]:
+        """Both links, the smaller number first."""
+        return min(self.base, self.link), max(self.base, self.link)
 
     @property
     def vector(self) -> tuple[float, float]:
@@ -188,8 +191,7 @@ def bearing_limits(
 
     Parameters
     ----------
-    bearing : Bearing
-    condition : {"A", "B", "general"}
+    bearing, condition : Bearing, {"A", "B", "general"}
         Contact condition; "general" needs ``bearing.hole_length``.
     axial_clearance : float
         Axial clearance (end float) to either side, in the length unit of the mechanism.
@@ -282,22 +284,26 @@ def critical_range(
 ) -> tuple[float, float]:
     """Enclose the critical tilt for ``Rb``, ``Hb``, ``clearance``, ``hole_length`` within the tolerances (mm).
 
-    "A" and "B" from their two corners.  A pin in a hole ("general") touches where it would both as a short bearing and
-    as a long shaft in that hole, so that its critical tilt is the larger of the two; each is enclosed by itself.
+    A pin in a hole ("general") touches where it would both as a short bearing and as a long shaft in that hole, so that
+    its critical tilt is the larger of the two; each is enclosed by itself.
     """
-    radius, height, clearance = (
-        _around(name, value, tolerance)
-        for name, value, tolerance in zip(
-            ("Rb", "Hb", "clearance"), (bearing.Rb, bearing.Hb, bearing.clearance), tolerances[:3]
-        )
-    )
-    if condition != "general":
-        least, most = _over(radius, height, clearance, condition)
-    else:
-        assert bearing.hole_length is not None  # checked with the nominal tilt
-        hole = _around("hole_length", bearing.hole_length, tolerances[3])
-        ends = (_over(radius, height, clearance, "A"), _over(radius, hole, clearance, "B"))
-        least, most = (max(pair) for pair in zip(*ends))
+    ends = []  # of every dimension
+    for name, tolerance in zip(("Rb", "Hb", "clearance", "hole_length"), tolerances):
+        value = getattr(bearing, name)
+        if name == "hole_length" and condition != "general":
+            continue
+        low, high = Fraction(value) - Fraction(tolerance), Fraction(value) + Fraction(tolerance)
+        if low < 0 or (name in ("Rb", "hole_length") and low == 0):
+            raise GeometryError(f"{name} = {value} mm with tolerance {tolerance} mm reaches {float(low)}; reduce it")
+        ends.append((low, high))
+    radius, height, clearance, *hole = ends
+    own = [(condition, height)] if condition != "general" else [("A", height), ("B", hole[0])]
+    found = []
+    for kind, length in own:  # lower bound at the tightest corner, upper bound at the loosest one
+        small, large = radius if kind == "A" else radius[::-1]
+        low, high = _tilt(small, length[1], clearance[0], kind)[0], _tilt(large, length[0], clearance[1], kind)[1]
+        found.append((low, high))
+    least, most = (max(pair) for pair in zip(*found))
     return min(least, nominal), max(most, nominal)
 
 
@@ -306,11 +312,6 @@ def pushed(bearing: Bearing, offset: float, tolerance: float) -> Bearing:
 
     In the direction of the push both rims reach ``offset`` further, so that all three contact conditions hold with the
     clearance less the offset; in other directions more is left.  See theory/joints-that-share-a-tilt 7, level L2.
-
-    Raises
-    ------
-    GeometryError
-        An offset that is negative or more than the smallest clearance.
     """
     if not 0.0 <= offset < math.inf:
         raise GeometryError(f"radial_offset = {offset} must be a distance of zero or more, in mm; correct the value")
@@ -324,23 +325,6 @@ def pushed(bearing: Bearing, offset: float, tolerance: float) -> Bearing:
     exact = Fraction(bearing.clearance) - Fraction(offset)
     left = float(exact)
     return replace(bearing, clearance=left if Fraction(left) <= exact else math.nextafter(left, 0.0))
-
-
-_Ends = tuple[Fraction, Fraction]
-
-
-def _over(radius: _Ends, height: _Ends, clearance: _Ends, condition: str) -> tuple[float, float]:
-    """Lower bound at the tightest corner, upper bound at the loosest one."""
-    sense = 1 if condition == "A" else -1
-    least = _tilt(radius[::sense][0], height[1], clearance[0], condition)[0]
-    return least, _tilt(radius[::sense][1], height[0], clearance[1], condition)[1]
-
-
-def _around(name: str, value: float, tolerance: float) -> tuple[Fraction, Fraction]:
-    low, high = Fraction(value) - Fraction(tolerance), Fraction(value) + Fraction(tolerance)
-    if low < 0 or (name in ("Rb", "hole_length") and low == 0):
-        raise GeometryError(f"{name} = {value} mm with tolerance {tolerance} mm reaches {float(low)}; reduce it")
-    return low, high
 
 
 def _tilt(R: Fraction, H: Fraction, c: Fraction, condition: str) -> tuple[float, float]:

@@ -23,7 +23,7 @@ from graphsynth.intervals import Interval, check_rounding
 from graphsynth.jamming.joints.closure import Layout
 from graphsynth.jamming.joints.enclosure import Moving, Pieces, lower_bounds, shifts_enclosed, start_tilts, upper_bounds
 from graphsynth.jamming.joints.exact import neglected
-from graphsynth.jamming.joints.limits import Misalignment
+from graphsynth.jamming.joints.limits import Misalignment, bounds
 from graphsynth.jamming.joints.positions import Positions, Tubes, linked, points, prove_tubes, slopes
 from graphsynth.jamming.joints.program import JointProblem, PoseSolution, check_motion
 
@@ -42,9 +42,9 @@ def corner_layouts(layout: Layout) -> tuple[Layout, ...]:
     the layouts returned (certified: the polygons are rounded outward).
     """
     tilts = [tilt for _, _, tilt in layout.misalignments]
-    if all(tilt.alpha_range == (tilt.alpha,) * 2 and tilt.direction_range == (tilt.direction,) * 2 for tilt in tilts):
+    if all(tilt == tilt.sharp() for tilt in tilts):
         return (layout,)
-    if max((abs(bound) for tilt in tilts for bound in _alphas(tilt)), default=0.0) > _LARGEST:
+    if max((abs(bound) for tilt in tilts for bound in bounds(tilt, "alpha")), default=0.0) > _LARGEST:
         return (layout,)
     choices = [_around(tilt, alone=len(tilts) == 1) for tilt in tilts]
     if math.prod(len(corners) for corners in choices) > _MOST:
@@ -56,15 +56,9 @@ def corner_layouts(layout: Layout) -> tuple[Layout, ...]:
     )
 
 
-def _alphas(tilt: Misalignment) -> tuple[float, float]:
-    assert tilt.alpha_range is not None  # filled when made
-    return tilt.alpha_range
-
-
 def _around(tilt: Misalignment, *, alone: bool) -> list[Misalignment]:
     """Corners of a polygon around all ``alpha (cos, sin)(direction)`` of a box; for one alone, up to a factor <= 1."""
-    assert tilt.direction_range is not None
-    (least, most), (first, last) = _alphas(tilt), tilt.direction_range
+    (least, most), (first, last) = bounds(tilt, "alpha"), bounds(tilt, "direction")
     largest = max(abs(least), abs(most))
     if last - first >= math.pi:
         # opposite corners count alike for one alone; for several the whole circle is needed
@@ -84,7 +78,7 @@ def _around(tilt: Misalignment, *, alone: bool) -> list[Misalignment]:
     found = _corners(tilt, outer, angles, apart)
     if least < 0.0 < most:  # the opposite sector too; between the two lies all the rest
         return found + _corners(tilt, inner, angles, apart)
-    return found + [_sharp(tilt, inner, angle) for angle in (first, last)]
+    return found + [tilt.sharp(inner, angle) for angle in (first, last)]
 
 
 def _corners(
@@ -92,11 +86,7 @@ def _corners(
 ) -> list[Misalignment]:
     # both factors are rounding allowances: angles are off by some ulps, the cosine by one
     grow = (1.0 + 1e-13) / math.cos(0.5 * apart * (1.0 + 1e-12) + 1e-14) if apart > 0.0 else 1.0
-    return [_sharp(tilt, radius * own * grow, angle) for own in lengths or [1.0] for angle in angles]
-
-
-def _sharp(tilt: Misalignment, alpha: float, direction: float) -> Misalignment:
-    return Misalignment(tilt.base, tilt.link, alpha, direction, tilt.rigid)
+    return [tilt.sharp(radius * own * grow, angle) for own in lengths or [1.0] for angle in angles]
 
 
 Array = NDArray[np.float64]
@@ -126,21 +116,22 @@ class Found(NamedTuple):
 
     def take(self, rows: Mask | NDArray[np.intp]) -> Found:
         """Return some of the pieces."""
-        return Found(
-            self.lo[rows],
-            self.hi[rows],
-            self.lower[rows],
-            self.upper[rows],
-            self.proved[rows],
-            self.box_lo[rows],
-            self.box_hi[rows],
-            self.sure[rows],
-        )
+        return Found._make(part[rows] for part in self)
+
+    @property
+    def straddles(self) -> Mask:
+        """Whether small tilts decide nothing."""
+        return np.asarray(~((self.lower > 1.0) | (self.upper < 1.0)))
+
+    @property
+    def unsure(self) -> Mask:
+        """Whether small tilts decide, and exact ones do not."""
+        return np.asarray(~self.straddles & (self.sure == 0))
 
     @staticmethod
     def join(parts: list[Found]) -> Found:
         """Return all pieces in the order of the input."""
-        whole = Found(*(np.concatenate(columns) for columns in zip(*parts)))
+        whole = Found._make(np.concatenate(columns) for columns in zip(*parts))
         return whole.take(np.lexsort((whole.hi, whole.lo)))
 
 
@@ -163,25 +154,27 @@ class Work:
         edges = np.linspace(self.low, self.high, count + 1)
         return edges[:-1], edges[1:]
 
-    def evaluate(self, lo: Array, hi: Array) -> Found:
-        """Bounds of the factor over every piece."""
+    def _follow(self, inputs: Array) -> tuple[Mask, Array, Array]:
+        """Follow the motion from its start: whether it is assembled at inputs, poses and velocities (estimated)."""
         from graphsynth.kinematics.simulation import simulate
 
+        passed, back = np.unique(np.concatenate([[self.low], inputs]), return_inverse=True)
+        found, at = simulate(self.given.mechanism, passed, start=self.start, events=False), back[1:]
+        return found.assembled[at], found.poses[at], found.velocities[at]
+
+    def evaluate(self, lo: Array, hi: Array) -> Found:
+        """Bounds of the factor over every piece."""
         count, size = len(lo), self.system.size
         self.evaluated += count
         u = Interval.from_bounds(lo, hi)
-        order = np.argsort(u.mid, kind="stable")
-        inputs, back = np.unique(np.concatenate([[self.low], u.mid[order]]), return_inverse=True)
-        found = simulate(self.given.mechanism, inputs, start=self.start, events=False)
-        at = np.empty(count, dtype=np.intp)
-        at[order] = back[1:]
+        assembled, poses, velocities = self._follow(u.mid)
         lower, upper = np.zeros(count), np.full(count, np.inf)
         proved = np.zeros(count, dtype=bool)
         box, sure = np.full((2, count, size), np.nan), np.zeros(count, dtype=np.int8)
-        keep = np.flatnonzero(found.assembled[at] & np.isfinite(found.velocities[at]).all(axis=(1, 2)))
+        keep = np.flatnonzero(assembled & np.isfinite(velocities).all(axis=(1, 2)))
         if keep.size:
-            poses = found.poses[at[keep]]
-            x, rate = self.system.coordinates(poses, found.velocities[at[keep]])
+            poses = poses[keep]
+            x, rate = self.system.coordinates(poses, velocities[keep])
             counted = self.system.count(poses)
             tubes = prove_tubes(self.system, self.given.layout.joints, u[keep], x, rate, counted)
             proved[keep] = tubes.proved
@@ -261,28 +254,20 @@ class Work:
 
     def estimate(self, inputs: Array) -> Array:
         """Factor at inputs in ascending order (estimated); 0 where there is no pose."""
-        from graphsynth.kinematics.simulation import simulate
-
-        start = [] if inputs[0] == self.low else [self.low]
-        found = simulate(self.given.mechanism, [*start, *inputs], start=self.start, events=False)
-        fine = found.assembled[len(start) :]
+        fine, poses, _ = self._follow(inputs)
         value = np.zeros(len(inputs))
-        value[fine] = self.given.solve(found.poses[len(start) :][fine], "scale").lower
+        value[fine] = self.given.solve(poses[fine], "scale").lower
         return value
 
     def links(self, pieces: Found) -> Mask:
         """Whether the assemblies of neighbouring pieces are proved to be one at the input they share, (pieces - 1,)."""
-        from graphsynth.kinematics.simulation import simulate
-
         edges = pieces.lo[1:]
         found: Mask = pieces.proved[:-1] & pieces.proved[1:]
         rows = np.flatnonzero(found)
         if rows.size == 0 or self.system.size == 0:
             return found
-        inputs, back = np.unique(np.concatenate([[self.low], edges[rows]]), return_inverse=True)
-        passed = simulate(self.given.mechanism, inputs, start=self.start, events=False)
-        poses, velocities = passed.poses[back[1:]], passed.velocities[back[1:]]
-        fine = passed.assembled[back[1:]] & np.isfinite(velocities).all(axis=(1, 2))
+        fine, poses, velocities = self._follow(edges[rows])
+        fine &= np.isfinite(velocities).all(axis=(1, 2))
         found[rows[~fine]] = False
         rows, poses, velocities = rows[fine], poses[fine], velocities[fine]
         if rows.size == 0:
@@ -301,23 +286,7 @@ class Work:
         A sample of the motion stands for the one assembly proved next to it.  Every box holds exactly one for each
         input, so a box around that assembly belongs to the motion.
         """
-        found: Mask = np.zeros(len(pieces.lo), dtype=bool)
-        rows, samples = self._samples(pieces)
-        if self.system.size and rows.size:
-            poses = self.motion.poses[samples]
-            x, u = self.system.coordinates(poses, np.zeros_like(poses))[0], self.motion.inputs[samples]
-            own = prove_tubes(self.system, (), points(u), x, np.zeros_like(x), self.system.count(poses))
-            box = Interval.from_bounds(pieces.box_lo[rows], pieces.box_hi[rows])
-            rows = rows[own.proved & own.tight.subset(box).all(axis=1)]
-        found[rows] = True
-        for k in range(1, len(found)):
-            found[k] |= found[k - 1] & links[k - 1]
-        for k in range(len(found) - 2, -1, -1):
-            found[k] |= found[k + 1] & links[k]
-        return found
-
-    def _samples(self, pieces: Found) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Proved pieces within which the motion has a sample, and for each the sample nearest to its middle."""
+        # proved pieces within which the motion has a sample, and for each the sample nearest to its middle
         keep = np.flatnonzero(self.motion.assembled)
         u = self.motion.inputs[keep]
         place = np.clip(np.searchsorted(pieces.lo, u, side="right") - 1, 0, None)
@@ -326,7 +295,15 @@ class Work:
         away = np.abs(u - 0.5 * (pieces.lo[place] + pieces.hi[place]))
         order = np.lexsort((away, place))
         rows, first = np.unique(place[order], return_index=True)
-        return rows, keep[inside[order[first]]]
+        samples = keep[inside[order[first]]]
+        if self.system.size and rows.size:
+            poses = self.motion.poses[samples]
+            x, u = self.system.coordinates(poses, np.zeros_like(poses))[0], self.motion.inputs[samples]
+            own = prove_tubes(self.system, (), points(u), x, np.zeros_like(x), self.system.count(poses))
+            box = Interval.from_bounds(pieces.box_lo[rows], pieces.box_hi[rows])
+            rows = rows[own.proved & own.tight.subset(box).all(axis=1)]
+        group = np.concatenate([[0], np.cumsum(~links)])  # of pieces that are linked
+        return np.isin(group, group[rows])
 
 
 def _take(value: Any, rows: NDArray[np.intp]) -> Any:

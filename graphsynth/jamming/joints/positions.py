@@ -90,22 +90,16 @@ class Positions:
     def _tree(self) -> tuple[list[_Edge], int]:
         joints, links = self.mechanism.joints, self.mechanism.graph.links
         driver_of = {driver.pair: k for k, driver in enumerate(self.mechanism.drivers)}
-        part = list(range(links))
-
-        def root(link: int) -> int:
-            while part[link] != link:
-                link = part[link]
-            return link
+        part = list(range(links))  # of the forest grown so far, for every link
 
         chosen = []
         order = sorted(range(len(joints)), key=lambda k: (joints[k].pair not in driver_of, joints[k].mobility, k))
         for k in order:
             joint = joints[k]
-            a, b = root(joint.a), root(joint.b)
             if isinstance(joint, Gear):
                 continue
-            if a != b:
-                part[a] = b
+            if part[joint.a] != part[joint.b]:
+                part = [part[joint.b] if own == part[joint.a] else own for own in part]
                 chosen.append(k)
             elif joint.pair in driver_of:
                 raise Unsupported("the driven joints form a loop")
@@ -116,8 +110,8 @@ class Positions:
         for link in reached:
             for k in chosen:
                 joint = joints[k]
-                other = joint.b if joint.a == link else joint.a if joint.b == link else -1
-                if other < 0 or other in reached:
+                other = joint.a + joint.b - link
+                if link not in joint.pair or other in reached:
                     continue
                 driver = driver_of.get(joint.pair, -1)
                 angle = slide = -1
@@ -278,7 +272,12 @@ def enclosed_solve(matrix: Interval, right: Interval) -> tuple[Interval, Mask]:
     rest = points(np.eye(k)) - product
     size = np.where(np.isfinite(rest.mag), rest.mag, 1.0)
     first = np.where(np.isfinite(first), first, np.inf)
-    weight = _weights(size, first)
+    # positive weights near the fixed point of w = first + size w; any positive numbers give valid bounds
+    guess = np.where(np.isfinite(first), first, 1.0)
+    guess = weight = guess + 1e-3 * guess.max(axis=1, keepdims=True) + 1e-300
+    for _ in range(6):
+        weight = guess + (size @ weight[:, :, None])[..., 0]
+    weight = np.where(np.isfinite(weight), weight, 1.0)
     with np.errstate(all="ignore"):
         norm = (_nonnegative(size, weight) / points(weight)).hi.max(axis=1)
         largest = (points(first) / points(weight)).hi.max(axis=1)
@@ -291,16 +290,6 @@ def enclosed_solve(matrix: Interval, right: Interval) -> tuple[Interval, Mask]:
         spread = np.minimum(spread, (points(first) + _nonnegative(size, spread)).hi)
     around = Interval.from_bounds(-spread, spread)
     return around + points(start), np.asarray(fine)
-
-
-def _weights(size: Array, first: Array) -> Array:
-    """Positive weights near the fixed point of ``w = first + size w``; any positive numbers give valid bounds."""
-    start = np.where(np.isfinite(first), first, 1.0)
-    start = start + 1e-3 * start.max(axis=1, keepdims=True) + 1e-300
-    weight = start
-    for _ in range(6):
-        weight = start + (size @ weight[:, :, None])[..., 0]
-    return np.asarray(np.where(np.isfinite(weight), weight, 1.0))
 
 
 def _nonnegative(matrix: Array, vector: Array) -> Interval:
@@ -325,9 +314,7 @@ class Tubes(NamedTuple):
 
     def take(self, rows: NDArray[np.intp]) -> Tubes:
         """Return some of the pieces."""
-        return Tubes(
-            self.proved[rows], self.domain[rows], self.tight[rows], self.r[rows], self.e[rows], self.base[rows]
-        )
+        return Tubes._make(part[rows] for part in self)
 
 
 def prove_tubes(
@@ -342,12 +329,11 @@ def prove_tubes(
     for k in range(0, max(len(x), 1), _CHUNK):
         part = slice(k, k + _CHUNK)
         parts.append(_prove(system, joints, u[part], x[part], rate[part], counted[part]))
-    domain, tight, r, e, base = (_join([getattr(part, name) for part in parts]) for name in Tubes._fields[1:])
-    return Tubes(np.concatenate([part.proved for part in parts]), domain, tight, r, e, base)
-
-
-def _join(parts: list[Interval]) -> Interval:
-    return Interval.from_bounds(np.concatenate([p.lo for p in parts]), np.concatenate([p.hi for p in parts]))
+    proved, *boxes = zip(*parts)
+    joined = (
+        Interval.from_bounds(np.concatenate([b.lo for b in own]), np.concatenate([b.hi for b in own])) for own in boxes
+    )
+    return Tubes._make([np.concatenate(proved), *joined])
 
 
 def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, rate: Array, counted: Array) -> Tubes:

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.bearing import Bearing, Condition
 from graphsynth.jamming.joints.closure import (
-    ROLL,
-    ROUND,
+    KINDS,
     Layout,
     force_rows,
     joint_places,
@@ -32,7 +31,7 @@ from graphsynth.jamming.joints.closure import (
     shifts,
     work_row,
 )
-from graphsynth.jamming.joints.cones import ConeSolution, polish, solve_cones
+from graphsynth.jamming.joints.cones import ConeSolution, loads, polish, solve_cones
 from graphsynth.jamming.joints.limits import Limits, Misalignment, complete
 
 if TYPE_CHECKING:
@@ -72,47 +71,27 @@ class PoseSolution(NamedTuple):
     rounds: int
 
 
-def units_of(r: Array, d: Array, layout: Layout) -> Units:
-    """Units in which every number of the program is of the order of 1."""
-    flat = r.reshape(-1, 2)
-    if flat.size == 0:
-        return Units(np.zeros(2), 1.0, 1.0)
-    centre = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
-    length = float(np.abs(flat - centre).max()) or 1.0
-    return Units(centre, length, float(np.sqrt((d**2).sum(-1)).max(initial=0.0)) or 1.0)
-
-
 def solve_poses(layout: Layout, r: Array, e: Array, d: Array, mode: Mode = "tilt") -> PoseSolution:
     """Solve the program at N poses (theory/joints-that-share-a-tilt 3, 4; loop form); estimated.
 
     Positions r, guide directions e and misalignments d (radians) are (N, joints, 2).  ``lower == upper == inf`` where
-    no factor is enough.
-
-    Raises
-    ------
-    GeometryError
-        If a position is not finite.
+    no factor is enough.  Raises `GeometryError` if a position is not finite.
     """
     if not (np.isfinite(r).all() and np.isfinite(e).all() and np.isfinite(d).all()):
         raise GeometryError("a joint position is not finite; give assembled poses only")
-    count = len(r)
-    units = units_of(r, d, layout)
+    units, flat = Units(np.zeros(2), 1.0, 1.0), r.reshape(-1, 2)
+    if flat.size:  # every number of the program is then of the order of 1
+        centre = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
+        length = float(np.abs(flat - centre).max()) or 1.0
+        units = Units(centre, length, float(np.sqrt((d**2).sum(-1)).max(initial=0.0)) or 1.0)
     rows = _Rows(layout, (r - units.centre) / units.length, e, d / units.tilt, units)
-    out = PoseSolution(
-        np.zeros(count),
-        np.zeros(count),
-        np.zeros((count, 3 * layout.loops)),
-        np.zeros((count, len(layout.limit), 2)),
-        np.zeros((count, len(layout.joints))),
-        np.zeros((count, len(layout.limit))),
-        np.zeros((count, len(layout.joints))),
-        units,
-        0,
-    )
-    if layout.loops == 0 or count == 0:
+    blocks, joints = len(layout.limit), len(layout.joints)
+    shapes = (), (), (3 * layout.loops,), (blocks, 2), (joints,), (blocks,), (joints,)
+    out = PoseSolution._make([*(np.zeros((len(r), *shape)) for shape in shapes), units, 0])
+    if layout.loops == 0 or len(r) == 0:
         return out
     rounds = 0
-    for basis, poses in _allowed(rows.forbidden()):
+    for basis, poses in _allowed(rows):
         rounds = max(rounds, _solve_group(rows, basis, poses, mode, out))
     return out._replace(rounds=rounds)
 
@@ -132,21 +111,20 @@ class _Rows:
         self.s = play / (units.length * units.tilt)
         self.factor = units.tilt / self.unit  # T = factor times T of the scaled program in mode "tilt"
         self.units = units
-
-    def forbidden(self) -> Array:
-        """Rows that must vanish: moments and forces of joints without limit, (N, rows, 3 loops)."""
-        free = self.M[:, np.isinf(self.t)]
-        count = len(self.M)
-        force = np.broadcast_to(self.F[np.isinf(self.s)], (count, int(np.isinf(self.s).sum()), self.F.shape[1]))
-        return np.concatenate([free.reshape(count, -1, self.F.shape[1]), force], axis=1)
+        #: Blocks and forces that cost something.
+        self.costly = np.isfinite(self.t) & (self.t > 0.0)
+        self.pushed = np.isfinite(self.s) & (self.s > 0.0)
 
 
-def _allowed(rows: Array) -> list[tuple[Array, NDArray[np.intp]]]:
-    """Bases of the null spaces, grouped by their dimension: [(basis (n, k, free), poses (n,))]."""
-    count, m, k = rows.shape
-    if m == 0:
+def _allowed(rows: _Rows) -> list[tuple[Array, NDArray[np.intp]]]:
+    """Bases of what joints without limit let pass, grouped by their dimension: [(basis (n, k, free), poses (n,))]."""
+    count, k = len(rows.M), rows.F.shape[1]
+    force = rows.F[np.isinf(rows.s)]
+    moments = rows.M[:, np.isinf(rows.t)].reshape(count, -1, k)
+    forbidden = np.concatenate([moments, np.broadcast_to(force, (count, *force.shape))], axis=1)
+    if forbidden.shape[1] == 0:
         return [(np.broadcast_to(np.eye(k), (count, k, k)), np.arange(count))]
-    _, values, right = np.linalg.svd(rows, full_matrices=True)
+    _, values, right = np.linalg.svd(forbidden, full_matrices=True)
     rank = (values > _RANK * np.maximum(values[:, :1], 1.0)).sum(axis=1)
     return [(right[rank == n, n:].transpose(0, 2, 1), np.flatnonzero(rank == n)) for n in np.unique(rank)]
 
@@ -167,8 +145,15 @@ def _solve_group(rows: _Rows, basis: Array, poses: NDArray[np.intp], mode: Mode,
     for n in np.unique(rank):
         chosen = np.flatnonzero(rank == n)
         span, idle = right[chosen, :n].transpose(0, 2, 1), right[chosen, n:]
-        lost = np.abs((idle @ W[chosen, :, None])[..., 0]).max(axis=1, initial=0.0) > 1e-12
-        _never(poses[chosen[lost]], basis[chosen[lost]], idle[lost], W[chosen[lost]], out)
+        work = (idle @ W[chosen, :, None])[..., 0]
+        lost = np.abs(work).max(axis=1, initial=0.0) > 1e-12
+        if lost.any():  # a wrench costs nothing and does work: no factor on the limits is enough
+            q = (idle[lost].transpose(0, 2, 1) @ work[lost, :, None])[..., 0]
+            never = poses[chosen[lost]]
+            out.y[never] = (basis[chosen[lost]] @ q[:, :, None])[..., 0]
+            out.lower[never] = out.upper[never] = math.inf
+            for part in (out.tau, out.zeta, out.moment, out.force):
+                part[never] = np.nan
         chosen, span = chosen[~lost], span[~lost]
         if chosen.size == 0:
             continue
@@ -180,22 +165,9 @@ def _solve_group(rows: _Rows, basis: Array, poses: NDArray[np.intp], mode: Mode,
     return rounds
 
 
-def _never(poses: NDArray[np.intp], basis: Array, idle: Array, W: Array, out: PoseSolution) -> None:
-    """Note poses where a wrench costs nothing and does work: no factor on the limits is enough."""
-    if poses.size == 0:
-        return
-    work = (idle @ W[:, :, None])[..., 0]
-    q = (idle.transpose(0, 2, 1) @ work[:, :, None])[..., 0]
-    out.y[poses] = (basis @ q[:, :, None])[..., 0]
-    out.lower[poses] = out.upper[poses] = math.inf
-    for part in (out.tau, out.zeta, out.moment, out.force):
-        part[poses] = np.nan
-
-
 def _scaled(rows: _Rows, poses: NDArray[np.intp], mode: Mode) -> tuple[Array, Array, Array]:
     """Blocks and forces that cost something, times their limits; in mode "scale" forces are blocks."""
-    t, s = rows.t, rows.s
-    costly, pushed = np.isfinite(t) & (t > 0.0), np.isfinite(s) & (s > 0.0)
+    t, s, costly, pushed = rows.t, rows.s, rows.costly, rows.pushed
     M = rows.M[poses][:, costly] * t[costly, None, None]
     F = np.broadcast_to(rows.F[pushed] * s[pushed, None], (len(poses), int(pushed.sum()), rows.F.shape[1]))
     if mode == "scale":
@@ -217,80 +189,55 @@ def _solve_regular(
     if M.shape[1] == 0:  # only forces cost: any excess of work over them is beyond every factor
         M = np.zeros((len(W), 1, 2, W.shape[1]))
     F, W = F / unit[:, None, None], W / unit[:, None]
+    # the best lower and the best upper bound found so far, each with what proves it
     found = solve_cones(M, F, W)
-    best = _Best(M, F, W, found)
+    q, zeta = found.q.copy(), found.zeta.copy()
+    lower, upper, tau = _bounds(M, F, W, found)
     for robust, enough in ((False, 2e-15), (True, 1e-13)):
-        left = best.open(enough)
+        with np.errstate(invalid="ignore"):
+            left = np.flatnonzero(~(upper - lower <= enough * upper))
         if left.size:
+            program = M[left], F[left], W[left]
             part = ConeSolution(found.q[left], found.tau[left], found.zeta[left], found.rounds)
-            best.offer(left, polish(M[left], F[left], W[left], part, robust=robust))
-    bounds = np.where(quiet, 0.0, np.stack([best.lower, best.upper]) * unit) * rows.factor
-    q, tau, zeta = best.q, best.tau * unit[:, None, None], best.zeta
+            part = polish(*program, part, robust=robust)
+            least, most, own = _bounds(*program, part)
+            more, less = least > lower[left], most < upper[left]
+            lower[left[more]], q[left[more]] = least[more], part.q[more]
+            upper[left[less]], tau[left[less]] = most[less], own[less]
+            zeta[left[less]] = np.clip(part.zeta[less], -1.0, 1.0)
+    bounds = np.where(quiet, 0.0, np.stack([lower, upper]) * unit) * rows.factor
     y = (basis @ np.where(quiet[:, None], 0.0, q)[:, :, None])[..., 0]
-    _write(rows, poses, y, (bounds, tau, zeta), mode, out)
+    _write(rows, poses, y, (bounds, tau * unit[:, None, None], zeta), mode, out)
     return found.rounds
 
 
-class _Best:
-    """The best lower and the best upper bound found so far, each with what proves it."""
-
-    def __init__(self, M: Array, F: Array, W: Array, found: ConeSolution) -> None:
-        self.program = M, F, W
-        self.q, self.zeta = found.q.copy(), found.zeta.copy()
-        self.lower, self.upper, self.tau = _bounds(M, F, W, found)
-
-    def open(self, enough: float) -> NDArray[np.intp]:
-        """Return the poses whose bounds are further apart."""
-        with np.errstate(invalid="ignore"):
-            return np.flatnonzero(~(self.upper - self.lower <= enough * self.upper))
-
-    def offer(self, poses: NDArray[np.intp], found: ConeSolution) -> None:
-        """Take what is better."""
-        M, F, W = (part[poses] for part in self.program)
-        lower, upper, tau = _bounds(M, F, W, found)
-        more, less = lower > self.lower[poses], upper < self.upper[poses]
-        self.lower[poses[more]], self.q[poses[more]] = lower[more], found.q[more]
-        self.upper[poses[less]], self.tau[poses[less]] = upper[less], tau[less]
-        self.zeta[poses[less]] = np.clip(found.zeta[less], -1.0, 1.0)
-
-
-def _or(values: Array, other: float) -> Array:
-    return np.where(np.isnan(values), other, values)
-
-
+@np.errstate(all="ignore")
 def _bounds(M: Array, F: Array, W: Array, found: ConeSolution) -> tuple[Array, Array, Array]:
     """Lower bound from q, upper bound from tau after the closure has been restored, and that tau."""
-    with np.errstate(all="ignore"):
-        m = (M @ found.q[:, None, :, None])[..., 0]
-        f = (F @ found.q[:, :, None])[..., 0]
-        cost = np.hypot(m[..., 0], m[..., 1]).sum(axis=1)
-        lower = (np.abs((W * found.q).sum(axis=1)) - np.abs(f).sum(axis=1)) / cost
-        zeta = np.clip(found.zeta, -1.0, 1.0)
-        flat = M.reshape(len(W), -1, W.shape[1])
-        tau = found.tau.reshape(len(W), -1)
-        for _ in range(2):
-            off = W + (flat.transpose(0, 2, 1) @ tau[:, :, None])[..., 0]
-            off = off + (F.transpose(0, 2, 1) @ zeta[:, :, None])[..., 0]
-            safe = np.where(np.isfinite(off), off, 0.0)
-            tau = tau - (np.linalg.pinv(flat, rcond=1e-13).transpose(0, 2, 1) @ safe[:, :, None])[..., 0]
+    m, f = loads(M, F, found.q)
+    cost = np.hypot(m[..., 0], m[..., 1]).sum(axis=1)
+    lower = (np.abs((W * found.q).sum(axis=1)) - np.abs(f).sum(axis=1)) / cost
+    zeta = np.clip(found.zeta, -1.0, 1.0)
+    flat = M.reshape(len(W), -1, W.shape[1])
+    tau = found.tau.reshape(len(W), -1)
+    inverse = np.linalg.pinv(flat, rcond=1e-13).transpose(0, 2, 1)
+    for again in (True, True, False):
         off = W + (flat.transpose(0, 2, 1) @ tau[:, :, None])[..., 0]
         off = off + (F.transpose(0, 2, 1) @ zeta[:, :, None])[..., 0]
-        closed = np.abs(off).max(axis=1, initial=0.0) <= 1e-12 * (1.0 + np.abs(flat).max(axis=(1, 2), initial=0.0))
-        tau = tau.reshape(*M.shape[:3])
-        upper = np.where(closed, np.hypot(tau[..., 0], tau[..., 1]).max(axis=1, initial=0.0), np.inf)
-    return np.maximum(_or(lower, 0.0), 0.0), upper, tau
+        if again:
+            tau = tau - (inverse @ np.where(np.isfinite(off), off, 0.0)[:, :, None])[..., 0]
+    closed = np.abs(off).max(axis=1, initial=0.0) <= 1e-12 * (1.0 + np.abs(flat).max(axis=(1, 2), initial=0.0))
+    tau = tau.reshape(*M.shape[:3])
+    upper = np.where(closed, np.hypot(tau[..., 0], tau[..., 1]).max(axis=1, initial=0.0), np.inf)
+    return np.where(np.isnan(lower), 0.0, np.maximum(lower, 0.0)), upper, tau
 
 
-def _write(
-    rows: _Rows,
-    poses: NDArray[np.intp],
-    y: Array,
-    found: tuple[Array, Array, Array] | None,
-    mode: Mode,
-    out: PoseSolution,
-) -> None:
-    t, s = rows.t, rows.s
-    costly, pushed = np.isfinite(t) & (t > 0.0), np.isfinite(s) & (s > 0.0)
+Found: TypeAlias = tuple[Array, Array, Array] | None
+
+
+def _write(rows: _Rows, poses: NDArray[np.intp], y: Array, found: Found, mode: Mode, out: PoseSolution) -> None:
+    """Write bounds, tilts and slips of the scaled program into ``out``; without them only the wrenches."""
+    t, s, costly, pushed = rows.t, rows.s, rows.costly, rows.pushed
     out.tau[np.ix_(poses, np.flatnonzero(np.isinf(t)))] = np.nan
     out.zeta[np.ix_(poses, np.flatnonzero(np.isinf(s)))] = np.nan
     out.y[poses] = y
@@ -332,8 +279,8 @@ class JointProblem:
     @property
     def names(self) -> tuple[tuple[tuple[int, int], str], ...]:
         """Joint and kind of every limit on tilt."""
-        kinds = ["tilt" if axis == ROUND else "roll" if axis == ROLL else "pitch" for axis in self.layout.block_axis]
-        return tuple((self.pairs[place], kind) for place, kind in zip(self.layout.block_joint, kinds))
+        blocks = zip(self.layout.block_joint, self.layout.block_axis)
+        return tuple((self.pairs[place], KINDS[axis]) for place, axis in blocks)
 
     @property
     def pairs(self) -> tuple[tuple[int, int], ...]:
@@ -359,20 +306,17 @@ def problem(
 ) -> JointProblem:
     """Put a mechanism, limits and misalignments together; see `assess_coupled` for the arguments.
 
-    Raises
-    ------
-    GeometryError
-        A joint without limits, limits that do not fit a joint, a misalignment of a joint that does not exist.
+    Raises `GeometryError` for a joint without limits, limits that do not fit a joint, a misalignment of a joint that
+    does not exist.
     """
     chosen = tuple(tilts) if isinstance(tilts, Iterable) else (tilts,)
+    by_pair: dict[tuple[int, int], Misalignment] = {}
     for tilt in chosen:
         if not isinstance(tilt, Misalignment):
             raise GeometryError(
                 f"tilts = {tilt!r} is no misalignment; give Misalignment(base, link, alpha), or several"
             )
-    by_pair: dict[tuple[int, int], Misalignment] = {}
-    for tilt in chosen:
-        pair = (min(tilt.base, tilt.link), max(tilt.base, tilt.link))
+        pair = tilt.pair
         mechanism.joint(*pair)  # raises if there is none
         if pair in by_pair:
             raise GeometryError(f"joint {pair[0]}-{pair[1]} has two misalignments; give their sum")

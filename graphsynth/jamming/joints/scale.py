@@ -29,7 +29,7 @@ from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.pieces import PARTS, Found, Work, check_range, cut
 from graphsynth.jamming.joints.positions import Unsupported
-from graphsynth.jamming.joints.program import Bearings, JointProblem, check_motion, problem
+from graphsynth.jamming.joints.program import Bearings, check_motion, problem
 from graphsynth.jamming.joints.search import Budget
 
 if TYPE_CHECKING:
@@ -146,17 +146,18 @@ def _enclosed(work: Work, budget: Budget, pieces: Found, above: float, reason: s
     own = work.on_branch(pieces, links)
     peak = np.where(own, pieces.lower, 0.0)
     top = int(np.argmax(peak))
-    best, at = float(peak[top]), float(Interval.from_bounds(pieces.lo[top], pieces.hi[top]).mid)
+    best, at = float(peak[top]), math.nan
     if not (own.all() and links.all()):
         above = math.inf
         reason = reason or "the pieces are not proved to be one branch"
-    one = Interval(1)
-    low = float((one / Interval.from_bounds(above, above)).lo) if 0.0 < above < math.inf else 0.0
-    high = float((one / Interval.from_bounds(best, best)).hi) if best > 0.0 else math.inf
-    low = math.inf if above == 0.0 else low
+    low, high = math.inf if above == 0.0 else 0.0, math.inf
+    if 0.0 < above < math.inf:
+        low = float((1 / Interval.from_bounds(above, above)).lo)
+    if best > 0.0:
+        high = float((1 / Interval.from_bounds(best, best)).hi)
+        at = float(Interval.from_bounds(pieces.lo[top], pieces.hi[top]).mid)
     if not work.motion.completed:
         reason = reason or f"the motion ends: {work.motion.reason}"
-    at = at if best > 0.0 else math.nan
     return ScaleCertificate(low, high, at, work.evaluated, reason, perf_counter() - budget.begin)
 
 
@@ -183,18 +184,11 @@ _MOST = 100_000
 class DirectionMap:
     """Allowed scale over the direction and the input.
 
-    Attributes
-    ----------
-    directions : ndarray, shape (m,)
-        Angles by which all misalignments were turned, radians, in [0, pi): turning by pi changes nothing.
-    inputs : ndarray, shape (n,)
-    allowed_scale : ndarray, shape (m, n)
-        Factor by which the misalignments may grow (estimated); NaN where not assembled.
-    worst_direction, worst_input, smallest_scale : float
-        Smallest entry and where.
-    bound : float
-        No direction between those of the grid has a smaller scale than this at the inputs given (exact consequence of
-        the grid values).
+    ``directions`` (m,): angles by which all misalignments were turned, radians, in [0, pi), as turning by pi changes
+    nothing; ``inputs`` (n,).  ``allowed_scale`` (m, n): factor by which the misalignments may grow (estimated), NaN
+    where not assembled; ``smallest_scale`` at ``worst_direction`` and ``worst_input`` is its smallest entry.  No
+    direction between those of the grid has a smaller scale than ``bound`` at the inputs given (exact consequence of the
+    grid values).
     """
 
     directions: Array
@@ -216,6 +210,8 @@ def direction_map(
 ) -> DirectionMap:
     """Turn all misalignments together through half a turn and find the worst direction.
 
+    See theory/joints-that-share-a-tilt 6: the direction of the tilt matters.
+
     Parameters
     ----------
     motion, bearings, tilts, condition
@@ -232,10 +228,6 @@ def direction_map(
     ------
     GeometryError
         Fewer than 3 directions; a motion without an assembled sample.
-
-    Notes
-    -----
-    See theory/joints-that-share-a-tilt 6: the direction of the tilt matters.
     """
     if not isinstance(directions, int | np.integer) or not 3 <= directions <= _MOST:
         few = "many" if isinstance(directions, int | np.integer) and directions > _MOST else "few"
@@ -245,22 +237,14 @@ def direction_map(
     keep = np.flatnonzero(motion.assembled)
     if keep.size == 0:
         raise GeometryError(f"no sample is assembled: {motion.reason}; choose other inputs")
-    angles = math.pi * np.arange(directions) / directions
-    scale = np.full((directions, len(motion.inputs)), np.nan)
-    with np.errstate(divide="ignore"):
-        for k, angle in enumerate(angles.tolist()):
-            scale[k, keep] = 1.0 / given.solve(motion.poses[keep], "scale", angle).lower
+    angles, inputs = math.pi * np.arange(directions) / directions, motion.inputs
+    scale = np.full((directions, len(inputs)), np.nan)
+    for k, angle in enumerate(angles.tolist()):
+        scale[k, keep] = _inverse(given.solve(motion.poses[keep], "scale", angle).lower)
     at = np.unravel_index(int(np.nanargmin(scale)), scale.shape)
     least = float(scale[at])
-    return DirectionMap(
-        directions=angles,
-        inputs=motion.inputs,
-        allowed_scale=scale,
-        worst_direction=float(angles[at[0]]),
-        worst_input=float(motion.inputs[at[1]]),
-        smallest_scale=least,
-        bound=least * math.cos(0.5 * math.pi / directions),
-    )
+    bound = least * math.cos(0.5 * math.pi / directions)
+    return DirectionMap(angles, inputs, scale, float(angles[at[0]]), float(inputs[at[1]]), least, bound)
 
 
 #: Relative gains below this are rounding.
@@ -289,13 +273,8 @@ class LimitSensitivity(NamedTuple):
 class SensitivityTable:
     """Result of `compare_sensitivities`: rows from the most useful limit to the least.
 
-    Attributes
-    ----------
-    by : float
-        Relative growth of each limit.
-    scale, worst_input : float
-        Smallest allowed scale as the mechanism is, and where.
-    rows : tuple of LimitSensitivity
+    ``by`` is the relative growth of each limit; ``scale`` the smallest allowed scale as the mechanism is, and
+    ``worst_input`` where it is reached.
     """
 
     by: float
@@ -305,16 +284,16 @@ class SensitivityTable:
 
     def __str__(self) -> str:
         """Return a table in plain text; limits that gain nothing are counted."""
-        useful = [row for row in self.rows if row.gain > 0.0]
         lines = [f"smallest allowed scale {self.scale:.6g} at the input {self.worst_input:.6g}"]
-        lines += [
-            f"  joint {a}-{b} {row.what:5s} {self.by:+.0%}: scale {row.scale:.6g}, gain {row.gain:.3f}, binds at "
-            f"{row.binds_at:.6g}; without limit {row.without:.6g}"
-            for row in useful
-            for a, b in [row.joint]
-        ]
-        rest = len(self.rows) - len(useful)
-        return "\n".join([*lines, *([f"  {rest} other limits gain nothing alone"] if rest else [])])
+        for (a, b), what, scale, gain, _, binds_at, without in self.rows:
+            if gain > 0.0:
+                lines.append(
+                    f"  joint {a}-{b} {what:5s} {self.by:+.0%}: scale {scale:.6g}, gain {gain:.3f}, binds at "
+                    f"{binds_at:.6g}; without limit {without:.6g}"
+                )
+        if rest := sum(row.gain <= 0.0 for row in self.rows):
+            lines.append(f"  {rest} other limits gain nothing alone")
+        return "\n".join(lines)
 
     def to_pandas(self) -> Any:
         """Return the rows as a table."""
@@ -335,6 +314,8 @@ def compare_sensitivities(
 ) -> SensitivityTable:
     """Loosen every limit by itself and tell how much more misalignment the whole motion then takes.
 
+    See theory/joints-that-share-a-tilt 3, 4.
+
     Parameters
     ----------
     motion, bearings, tilts, condition
@@ -352,9 +333,6 @@ def compare_sensitivities(
     GeometryError
         ``by`` not positive; a motion without an assembled sample.
 
-    Notes
-    -----
-    See theory/joints-that-share-a-tilt 3, 4.
 
     Examples
     --------
@@ -374,62 +352,39 @@ def compare_sensitivities(
         raise GeometryError(f"no sample is assembled: {motion.reason}; choose other inputs")
     poses, inputs = motion.poses[keep], motion.inputs[keep]
     found = given.solve(poses, "scale")
-    allowed = _allowed(found.lower)
+    allowed = _inverse(found.lower)
     worst = int(np.argmin(allowed))
-    here = _Here(poses, inputs, allowed, worst, by)
-    rows = []
-    for name, one in _each(given):
-        promised = float((found.force if name[1] == "play" else found.moment)[worst, one.place])
-        rows.append(_sensitivity(name, one, here, promised if math.isfinite(promised) else 0.0))
-    rows.sort(key=lambda row: (-round(row.gain, 9), -row.promised, row.joint, row.what))
-    return SensitivityTable(by, float(allowed[worst]), float(inputs[worst]), tuple(rows))
-
-
-class _Here(NamedTuple):
-    """The motion as it is: poses, inputs, allowed scales, the number of the worst, and the growth asked for."""
-
-    poses: Array
-    inputs: Array
-    allowed: Array
-    worst: int
-    by: float
-
-
-def _sensitivity(name: tuple[tuple[int, int], str], one: _One, here: _Here, promised: float) -> LimitSensitivity:
-    scale, at = float(here.allowed[here.worst]), float(here.inputs[here.worst])
-    if promised <= _NOTHING or scale == 0.0:  # concave and without slope: it will not grow later either
-        return LimitSensitivity(*name, scale, 0.0, promised, at, scale)
+    scale, at = float(allowed[worst]), float(inputs[worst])
     # no pose gains more than the factor itself: only those near the smallest can be the smallest then
-    near = np.flatnonzero(here.allowed <= scale * (1.0 + here.by))
-    now = _allowed(one.by(1.0 + here.by).solve(here.poses[near], "scale").lower)
-    least = int(np.argmin(now))
-    gain = (float(now[least]) / scale - 1.0) / here.by
-    without = float(_allowed(one.by(math.inf).solve(here.poses, "scale").lower).min())
-    gain = gain if gain > _NOTHING else 0.0
-    return LimitSensitivity(*name, float(now[least]), gain, promised, float(here.inputs[near[least]]), without)
+    near = np.flatnonzero(allowed <= scale * (1.0 + by))
+
+    def loosened(field: str, place: int, factor: float, poses: Array) -> Array:
+        """Return the allowed scales with one limit so many times as large."""
+        values = getattr(given.layout, field).copy()
+        values[place] *= factor
+        other = replace(given, layout=replace(given.layout, **{field: values}))
+        return _inverse(other.solve(poses, "scale").lower)
+
+    limits = [(name, "limit", k, found.moment[worst, k]) for k, name in enumerate(given.names)]
+    limits += [((pair, "play"), "end_float", k, found.force[worst, k]) for k, pair in enumerate(given.pairs)]
+    rows = []
+    for name, field, k, share in limits:
+        if not 0.0 < getattr(given.layout, field)[k] < math.inf:
+            continue
+        promised = float(share) if math.isfinite(share) else 0.0
+        row = LimitSensitivity(*name, scale, 0.0, promised, at, scale)
+        if promised > _NOTHING and scale != 0.0:  # else concave and without slope: it will not grow later either
+            now = loosened(field, k, 1.0 + by, poses[near])
+            least = int(np.argmin(now))
+            gain = (float(now[least]) / scale - 1.0) / by
+            without = float(loosened(field, k, math.inf, poses).min())
+            own = float(now[least]), gain if gain > _NOTHING else 0.0, promised, float(inputs[near[least]]), without
+            row = LimitSensitivity(*name, *own)
+        rows.append(row)
+    rows.sort(key=lambda row: (-round(row.gain, 9), -row.promised, row.joint, row.what))
+    return SensitivityTable(by, scale, at, tuple(rows))
 
 
-def _allowed(lower: Array) -> Array:
+def _inverse(factor: Array) -> Array:
     with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / lower)
-
-
-class _One(NamedTuple):
-    """One limit of a problem."""
-
-    given: JointProblem
-    field: str
-    place: int
-
-    def by(self, factor: float) -> JointProblem:
-        """Return the problem with this limit so many times as large."""
-        values = getattr(self.given.layout, self.field).copy()
-        values[self.place] *= factor
-        return replace(self.given, layout=replace(self.given.layout, **{self.field: values}))
-
-
-def _each(given: JointProblem) -> list[tuple[tuple[tuple[int, int], str], _One]]:
-    """Limits that can be loosened, with their names."""
-    tilts = [(name, _One(given, "limit", k)) for k, name in enumerate(given.names)]
-    plays = [((pair, "play"), _One(given, "end_float", k)) for k, pair in enumerate(given.pairs)]
-    return [(name, one) for name, one in tilts + plays if 0.0 < getattr(given.layout, one.field)[one.place] < math.inf]
+        return np.asarray(1.0 / factor)

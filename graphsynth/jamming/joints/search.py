@@ -8,8 +8,8 @@ that lies in the box of a piece proved to hold exactly one assembly for every me
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals.reading import shortened
-from graphsynth.jamming.joints.limits import JointLimits, Limits, Misalignment, SlideLimits
+from graphsynth.jamming.joints.limits import Limits, Misalignment, bounds
 from graphsynth.jamming.joints.pieces import Found, Work, cut
-from graphsynth.jamming.joints.program import JointProblem, problem
+from graphsynth.jamming.joints.program import problem
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
@@ -64,7 +64,7 @@ def search(work: Work, budget: Budget) -> tuple[Found, str]:
             parts.append(_open(lo, hi, work.system.size))
             break
         found = work.evaluate(lo, hi)
-        again = (_straddles(found) | _unsure(found)) & (hi - lo > budget.smallest)
+        again = (found.straddles | found.unsure) & (hi - lo > budget.smallest)
         if not first and not budget.over:
             again &= ~_hopeless(work, found, again)
         first = False
@@ -74,15 +74,6 @@ def search(work: Work, budget: Budget) -> tuple[Found, str]:
     if not (pieces.sure == -1).any() and not ((pieces.upper < 1.0) | ~pieces.proved).all():
         pieces = _with_peak(work, pieces)
     return pieces, stopped
-
-
-def _straddles(found: Found) -> Mask:
-    return np.asarray(~((found.lower > 1.0) | (found.upper < 1.0)))
-
-
-def _unsure(found: Found) -> Mask:
-    """Decided by small tilts, not by exact ones."""
-    return np.asarray(~_straddles(found) & (found.sure == 0))
 
 
 def _hopeless(work: Work, found: Found, again: Mask) -> Mask:
@@ -98,8 +89,8 @@ def _hopeless(work: Work, found: Found, again: Mask) -> Mask:
     lo, hi = found.lo[rows], found.hi[rows]
     inputs, back = np.unique(np.concatenate([lo, 0.5 * (lo + hi), hi]), return_inverse=True)
     at = work.evaluate(inputs, inputs)
-    same = np.where(_straddles(found)[rows], _straddles(at)[back].reshape(3, -1), _unsure(at)[back].reshape(3, -1))
-    stuck[rows] = (at.proved[back].reshape(3, -1) & same).all(axis=0)
+    straddles, unsure, proved = (part[back].reshape(3, -1) for part in (at.straddles, at.unsure, at.proved))
+    stuck[rows] = (proved & np.where(found.straddles[rows], straddles, unsure)).all(axis=0)
     return stuck
 
 
@@ -176,6 +167,10 @@ class MemberWitness:
 
     def summary(self) -> dict[str, Any]:
         """Plain values."""
+        limits = []
+        for joint, own in zip(self.mechanism.joints, self.limits):
+            tilts = {name: getattr(own, name) for name in own.tilts}
+            limits.append({"joint": list(joint.pair), **tilts, "play": own.axial_clearance})
         return {
             "input": self.input,
             "factor": self.factor,
@@ -183,7 +178,7 @@ class MemberWitness:
             "misalignments": [
                 {"base": m.base, "link": m.link, "alpha": m.alpha, "direction": m.direction} for m in self.misalignments
             ],
-            "limits": [{"joint": list(j.pair), **_values(own)} for j, own in zip(self.mechanism.joints, self.limits)],
+            "limits": limits,
             "dimensions": [[list(joint.at_a), list(joint.at_b)] for joint in self.mechanism.joints],
         }
 
@@ -198,18 +193,20 @@ class MemberWitness:
         )
 
 
-def _values(own: Limits) -> dict[str, float]:
-    names = {"tilt": "tilt"} if isinstance(own, JointLimits) else {"roll": "roll", "pitch": "pitch"}
-    return {key: getattr(own, name) for key, name in {**names, "play": "axial_clearance"}.items()}
-
-
 def jamming_member(work: Work, pieces: Found, own: Mask) -> MemberWitness | None:
     """Return a member proved to jam in one of the pieces ``own`` (proved to be on the branch), or None."""
     left = np.flatnonzero(own & (pieces.upper > 1.0))
-    if left.size == 0 or not _has_tolerance(work):
+    boxes = [bounds(tilt, name) for tilt in work.given.misalignments for name in ("alpha", "direction")]
+    lows = []
+    for limit in work.given.limits:
+        ranges = {name: bounds(limit, name) for name in (*limit.tilts, "axial_clearance")}
+        boxes += ranges.values()
+        least: dict[str, Any] = {name: low for name, (low, _) in ranges.items()}
+        lows.append(type(limit)(**least))
+    if left.size == 0 or not (work.tolerance > 0.0 or any(low < high for low, high in boxes)):
         return None
-    limits = tuple(_tightest(limit) for limit in work.given.limits)
-    member = _member(work, work.given.mechanism, limits, tuple(_sharp(m) for m in work.given.misalignments))
+    tilts = tuple(tilt.sharp() for tilt in work.given.misalignments)
+    member = _member(work, work.given.mechanism, tuple(lows), tilts)
     at = peak_inputs(member, pieces, left)
     # dimensions last: their corner depends on which way the axes are tilted
     for adjust in (_worst_tilts, _worst_dimensions):
@@ -228,54 +225,21 @@ def jamming_member(work: Work, pieces: Found, own: Mask) -> MemberWitness | None
     return MemberWitness(float(at[top]), float(factor[top]), given.misalignments, given.limits, given.mechanism, exact)
 
 
-def _has_tolerance(work: Work) -> bool:
-    boxes = [m.alpha_range for m in work.given.misalignments] + [m.direction_range for m in work.given.misalignments]
-    for limit in work.given.limits:
-        boxes += [value for name, value in vars(limit).items() if name.endswith("_range")]
-    return work.tolerance > 0.0 or any(box is not None and box[0] < box[1] for box in boxes)
-
-
-def _tightest(limit: Limits) -> Limits:
-    if isinstance(limit, JointLimits):
-        assert limit.tilt_range is not None and limit.axial_clearance_range is not None  # filled when made
-        return JointLimits(limit.tilt_range[0], limit.axial_clearance_range[0])
-    assert limit.roll_range is not None and limit.pitch_range is not None and limit.axial_clearance_range is not None
-    return SlideLimits(limit.roll_range[0], limit.pitch_range[0], limit.axial_clearance_range[0])
-
-
-def _sharp(tilt: Misalignment, alpha: float | None = None, direction: float | None = None) -> Misalignment:
-    return Misalignment(
-        tilt.base,
-        tilt.link,
-        tilt.alpha if alpha is None else alpha,
-        tilt.direction if direction is None else direction,
-        tilt.rigid,
-    )
-
-
 def _member(work: Work, mechanism: Mechanism, limits: tuple[Limits, ...], tilts: tuple[Misalignment, ...]) -> Work:
     """Work of one member, from the start of the motion."""
-    rigid = {(min(t.base, t.link), max(t.base, t.link)) for t in tilts if t.rigid}
+    rigid = {tilt.pair for tilt in tilts if tilt.rigid}
     table = {joint.pair: own for joint, own in zip(mechanism.joints, limits) if joint.pair not in rigid}
-    given: JointProblem = problem(mechanism, table, tilts)
-    return Work(given, replace(work.motion, mechanism=mechanism), 0.0)
-
-
-def _choices(tilt: Misalignment) -> Iterator[Misalignment]:
-    """Members of the box of a misalignment: both ends of alpha with directions over the range."""
-    assert tilt.alpha_range is not None and tilt.direction_range is not None  # filled when made
-    low, high = tilt.direction_range
-    angles = {low, high, *np.clip(np.linspace(low, high, _DIRECTIONS), low, high).tolist()}
-    for alpha in sorted(set(tilt.alpha_range)):
-        for direction in sorted(angles):
-            yield _sharp(tilt, alpha, direction)
+    return Work(problem(mechanism, table, tilts), replace(work.motion, mechanism=mechanism), 0.0)
 
 
 def _worst_tilts(work: Work, member: Work, at: NDArray[np.float64]) -> Work:
-    """Take one misalignment after the other to where the factor is largest (it is convex in each alpha)."""
+    """Take one misalignment after the other to where the factor is largest: an end of alpha (it is convex in each)."""
     best, most = member, float(member.estimate(at).max())
     for k, tilt in enumerate(work.given.misalignments):
-        for choice in _choices(tilt):
+        low, high = bounds(tilt, "direction")
+        angles = {low, high, *np.clip(np.linspace(low, high, _DIRECTIONS), low, high).tolist()}
+        for alpha, direction in product(sorted(set(bounds(tilt, "alpha"))), sorted(angles)):
+            choice = tilt.sharp(alpha, direction)
             tilts = (*best.given.misalignments[:k], choice, *best.given.misalignments[k + 1 :])
             other = _member(work, member.given.mechanism, member.given.limits, tilts)
             value = float(other.estimate(at).max())
