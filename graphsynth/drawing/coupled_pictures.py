@@ -37,13 +37,8 @@ def clearance_picture(report: CoupledReport) -> Figure:
     if not shown:
         raise GeometryError("no joint uses any of its clearance, so there is nothing to draw")
     figure = new_figure((7.2, 3.4 + 0.22 * len(shown)))
-    top, table = figure.subplots(2, 1, sharex=True, height_ratios=(3.0, 0.6 + 0.3 * len(shown)))
-    _scale(top, report)
+    axes, table = figure.subplots(2, 1, sharex=True, height_ratios=(3.0, 0.6 + 0.3 * len(shown)))
     _uses(figure, table, report, used[:, shown].T, shown)
-    return figure
-
-
-def _scale(axes: Any, report: CoupledReport) -> None:
     proof = report.certificate
     if proof is not None:
         for state, colour, label in ((-1, "jam", "jams, proved"), (0, "soft", "undecided"), (1, "c", "free, proved")):
@@ -58,6 +53,7 @@ def _scale(axes: Any, report: CoupledReport) -> None:
     axes.set_ylim(0.0, 1.08 * min(float(finite.max(initial=1.2)), _HIGH * max(1.0, report.smallest_scale)))
     axes.set_ylabel("misalignment allowed\n(times the given one)")
     axes.legend(fontsize=8, ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
+    return figure
 
 
 def _uses(figure: Figure, axes: Any, report: CoupledReport, used: Any, shown: list[int]) -> None:
@@ -67,15 +63,11 @@ def _uses(figure: Figure, axes: Any, report: CoupledReport, used: Any, shown: li
     for row, k in enumerate(shown):
         tight = report.inputs[report.binding[:, k]]
         axes.plot(tight, np.full(tight.size, row + 0.5), ".", color=LIGHT["jam"], ms=2.5)
-    axes.set_yticks(np.arange(len(shown)) + 0.5, [_name(report.names[k]) for k in shown], fontsize=8)
+    names = [f"{a}-{b} {what}".removesuffix(" tilt") for (a, b), what in (report.names[k] for k in shown)]
+    axes.set_yticks(np.arange(len(shown)) + 0.5, names, fontsize=8)
     axes.invert_yaxis()
     axes.set_xlabel("input")
     figure.colorbar(picture, ax=axes, label="use of the limit\n(dots: binding)", fraction=0.06, pad=0.01)
-
-
-def _name(name: tuple[tuple[int, int], str]) -> str:
-    (a, b), what = name
-    return f"{a}-{b}" if what == "tilt" else f"{a}-{b} {what}"
 
 
 def sensitivity_picture(table: SensitivityTable) -> Figure:

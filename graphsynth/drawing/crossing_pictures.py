@@ -35,11 +35,15 @@ def dress(axes: Any, title: str, x: str = "x", y: str = "y") -> None:
     axes.tick_params(labelsize=8)
 
 
-def _curves(problem: CircleEllipse, count: int = 1441) -> tuple[Array, Array]:
-    """Points of the circle and of the ellipse, at the middle of their ranges."""
+def _middles(problem: CircleEllipse) -> tuple[float, float, float]:
+    """Radius of the circle and semi-axes of the ellipse at the middle of their ranges."""
     R, a, b = (float((r.lo + r.hi) / 2) for r in (problem.R1, problem.a, problem.b))
-    t = np.linspace(0.0, math.tau, count)
-    return R * np.column_stack([np.cos(t), np.sin(t)]), np.column_stack([a * np.cos(t), b * np.sin(t)])
+    return R, a, b
+
+
+def _distance(R: float, a: float, b: float, t: Array) -> Array:
+    """Distance of the ellipse from the circle in the directions t (radians)."""
+    return np.asarray(1.0 / np.hypot(np.cos(t) / a, np.sin(t) / b) - R)
 
 
 # -- crossings ---------------------------------------------------------------------------------------------------------
@@ -59,17 +63,18 @@ def crossing_picture(problem: CircleEllipse, boxes: IntersectionBoxes | None = N
     found = exact_hull(problem)
     figure = new_figure((13.5, 4.6))
     whole, detail, unrolled = figure.subplots(1, 3)
-    circle, ellipse = _curves(problem)
+    (R, a, b), t = _middles(problem), np.linspace(0.0, math.tau, 1441)
     for axes in (whole, detail):
-        axes.plot(*circle.T, color=LIGHT["a"], lw=1.3, label="circle")
-        axes.plot(*ellipse.T, color=LIGHT["b"], lw=1.3, label="ellipse")
+        axes.plot(R * np.cos(t), R * np.sin(t), color=LIGHT["a"], lw=1.3, label="circle")
+        axes.plot(a * np.cos(t), b * np.sin(t), color=LIGHT["b"], lw=1.3, label="ellipse")
     rows = found.four
     for k in range(len(rows)):
         _box(whole, rows[k], edgecolor=LIGHT["ink"], lw=1.2, zorder=4)
         middle = rows[k].mid
         whole.plot(*middle, "o", ms=9, mfc="none", mec=LIGHT["ink"], zorder=4)
         corner = np.where(middle < 0.0, rows[k].lo, rows[k].hi)
-        whole.annotate(f"{k + 1}", corner, textcoords="offset points", xytext=_away(middle), ha="center", va="center")
+        away = 16.0 * middle / (float(np.hypot(*middle)) or 1.0)  # points, from the centre outward
+        whole.annotate(f"{k + 1}", corner, textcoords="offset points", xytext=away, ha="center", va="center")
     whole.set_aspect("equal")
     dress(whole, f"{len(rows)} box{'es' * (len(rows) != 1)} ({found.status.name}), ringed")
     if found.hull.is_empty.any():
@@ -82,18 +87,15 @@ def crossing_picture(problem: CircleEllipse, boxes: IntersectionBoxes | None = N
     if boxes is not None:
         _paving(detail, boxes)
     _box(detail, found.hull, edgecolor=LIGHT["ink"], lw=1.4, ls="--", zorder=5, label="exact hull")
-    _frame(detail, found.hull)
+    for k, limit in enumerate((detail.set_xlim, detail.set_ylim)):  # a margin; a point gets one of its own scale
+        lo, hi = float(found.hull.lo[k]), float(found.hull.hi[k])
+        edge = max(0.35 * (hi - lo), 1e-6 * max(abs(hi), 1e-300))
+        limit(lo - edge, hi + edge)
     dress(detail, "box 1" if boxes is None else "box 1 and Krawczyk's boxes")
     detail.ticklabel_format(useOffset=False)
     detail.tick_params(axis="x", rotation=20)
     figure.legend(*detail.get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=8, frameon=False)
     return figure
-
-
-def _away(point: Array) -> tuple[float, float]:
-    """Offset in points, from the centre outward."""
-    size = float(np.hypot(*point)) or 1.0
-    return 16.0 * float(point[0]) / size, 16.0 * float(point[1]) / size
 
 
 def _box(axes: Any, box: Interval, **style: Any) -> None:
@@ -121,13 +123,12 @@ def _shape(axes: Any, points: Array) -> None:
 
 def _unrolled_region(axes: Any, problem: CircleEllipse, points: Array, hull: Interval) -> None:
     """Draw the solutions over the arc of the circle, against the distance from it: the shape that (x, y) hides."""
-    R, a, b = (float((r.lo + r.hi) / 2) for r in (problem.R1, problem.a, problem.b))
+    R, a, b = _middles(problem)
     ends = np.arctan2(points[:, 1], points[:, 0]) if len(points) else np.arctan2(hull.lo[1], hull.lo[0]) * np.ones(1)
     edge = max(0.3 * float(np.ptp(ends)), 1e-4)
     t = np.linspace(ends.min() - edge, ends.max() + edge, 400)
-    distance = 1.0 / np.hypot(np.cos(t) / a, np.sin(t) / b) - R
     axes.axhline(0.0, color=LIGHT["a"], lw=1.3)
-    axes.plot(np.degrees(t), distance, color=LIGHT["b"], lw=1.3)
+    axes.plot(np.degrees(t), _distance(R, a, b, t), color=LIGHT["b"], lw=1.3)
     if len(points):
         height = np.hypot(*points.T) - R
         _shape(axes, np.column_stack([np.degrees(ends), height]))
@@ -139,7 +140,7 @@ def _unrolled_region(axes: Any, problem: CircleEllipse, points: Array, hull: Int
 
 def _clipped(problem: CircleEllipse) -> Array:
     """Corners of the parallelogram in (x^2, y^2), clipped to the quadrant; of the middle radii."""
-    a, b = (float((r.lo + r.hi) / 2) for r in (problem.a, problem.b))
+    _, a, b = _middles(problem)
     if a == b:
         return np.zeros((0, 2))
     circle, level = ([float(v) for v in bounds] for bounds in (problem.circle_bounds, problem.level_bounds))
@@ -175,14 +176,6 @@ def _paving(axes: Any, boxes: IntersectionBoxes) -> None:
             axes.add_collection(PolyCollection(list(corners), zorder=4, label=label, **style), autolim=False)
 
 
-def _frame(axes: Any, hull: Interval) -> None:
-    """Show the hull with a margin; a point gets a frame of its own scale."""
-    for k, limit in enumerate((axes.set_xlim, axes.set_ylim)):
-        lo, hi = float(hull.lo[k]), float(hull.hi[k])
-        edge = max(0.35 * (hi - lo), 1e-6 * max(abs(hi), 1e-300))
-        limit(lo - edge, hi + edge)
-
-
 # -- the region between the curves -------------------------------------------------------------------------------------
 
 
@@ -197,23 +190,27 @@ def region_picture(problem: CircleEllipse, exaggeration: float | None = None) ->
     >>> len(region_picture(circle_ellipse(5, 6, 4)).axes)
     2
     """
-    R, a, b = (float((r.lo + r.hi) / 2) for r in (problem.R1, problem.a, problem.b))
+    R, a, b = _middles(problem)
     if exaggeration is None:
-        exaggeration = max(1.0, _round_down(0.2 * R / max(abs(a - R), abs(R - b), 1e-12 * R)))
+        exaggeration = 0.2 * R / max(abs(a - R), abs(R - b), 1e-12 * R)
+        unit = 10.0 ** math.floor(math.log10(exaggeration))  # one significant digit, rounded down
+        exaggeration = max(1.0, math.floor(exaggeration / unit) * unit)
     if not 0.0 < exaggeration < math.inf:
         raise GeometryError(f"exaggeration = {exaggeration} must be positive; 1 draws to scale")
-    t = math.atan2(*_nearest_crossing(R, a, b)[::-1]) + np.linspace(0.0, math.tau, 2881)
-    along = np.stack([np.cos(t), np.sin(t)])
-    radius = 1.0 / np.hypot(along[0] / a, along[1] / b)
+    # from a crossing, or the end of the nearer axis if there is none
+    start = 0.0 if abs(a - R) <= abs(R - b) else 0.5 * math.pi
+    if b < R < a:
+        start = math.atan2(b * math.sqrt((a - R) * (a + R)), a * math.sqrt((R - b) * (R + b)))
+    turn = np.linspace(0.0, math.tau, 2881)
+    t = start + turn
     figure = new_figure((10.5, 4.6))
     whole, unrolled = figure.subplots(1, 2)
-    _shade(whole, along, R, R + exaggeration * (radius - R))
+    _shade(whole, np.stack([np.cos(t), np.sin(t)]), R, R + exaggeration * _distance(R, a, b, t))
     whole.set_aspect("equal")
     scale = "to scale" if exaggeration == 1.0 else f"distance from the circle × {exaggeration:g}"
     dress(whole, f"both differences, {scale}")
     whole.legend(fontsize=8, loc="center")
-    turn = np.linspace(0.0, math.tau, 2881)
-    distance = 1.0 / np.hypot(np.cos(turn) / a, np.sin(turn) / b) - R
+    distance = _distance(R, a, b, turn)
     for sign, colour in ((1.0, LIGHT["a"]), (-1.0, LIGHT["jam"])):
         where, look = sign * distance > 0.0, {"color": colour, "alpha": 0.45, "lw": 0}
         unrolled.fill_between(np.degrees(turn), distance, 0.0, where=where, interpolate=True, **look)
@@ -223,12 +220,6 @@ def region_picture(problem: CircleEllipse, exaggeration: float | None = None) ->
     unrolled.set_xticks(np.arange(0.0, 361.0, 45.0))
     dress(unrolled, "unrolled, not exaggerated", "direction from the centre, degrees", "distance from the circle")
     return figure
-
-
-def _round_down(x: float) -> float:
-    """Round to one significant digit, downward."""
-    unit = 10.0 ** math.floor(math.log10(x))
-    return math.floor(x / unit) * unit
 
 
 def _shade(axes: Any, along: Array, R: float, oval: Array) -> None:
@@ -244,11 +235,3 @@ def _shade(axes: Any, along: Array, R: float, oval: Array) -> None:
             axes.fill(*ring, color=colour, alpha=0.45, lw=0, label=label if k == 0 else None)
     axes.plot(*circle, color=LIGHT["ink"], lw=1.2, label="circle")
     axes.plot(*ellipse, color=LIGHT["b"], lw=1.2, label="ellipse")
-
-
-def _nearest_crossing(R: float, a: float, b: float) -> tuple[float, float]:
-    """Crossing in the first quadrant; the end of the nearer axis if there is none."""
-    if not b < R < a:
-        return (R, 0.0) if abs(a - R) <= abs(R - b) else (0.0, R)
-    span = (a - b) * (a + b)
-    return a * math.sqrt((R - b) * (R + b) / span), b * math.sqrt((a - R) * (a + R) / span)

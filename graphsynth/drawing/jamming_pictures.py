@@ -78,18 +78,13 @@ def _section(axes: Any, bearing: Bearing, tilt: float, factor: float) -> None:
     depth = factor * (abs(h * S) + bend + abs(c))
     top = 1.5 * h + 0.5
     for side in (1.0, -1.0):
-        wall = side * (half + depth)
-
-        def place(distance: float, wall: float = wall, side: float = side) -> float:
-            """Where a point at a distance outside the wall of the bearing is drawn."""
-            return wall + side * factor * distance
-
-        hole = place(c)
+        wall, outward = side * (half + depth), side * factor
+        hole = wall + outward * c
         axes.fill_betweenx([-top, top], hole, hole + side * (depth + half), color=LIGHT["fill"], hatch="//", lw=0)
         axes.plot([hole, hole], [-top, top], color=LIGHT["ink"], lw=1.6, label="wall of the hole" if side > 0 else None)
         # the wall of the tilted bearing: ends (+-h) at R C +- h S along the tilt, and lifted by R S
-        ends = [(place(side * s * h * S - bend), s * h * C - side * R * S) for s in (-1.0, 1.0)]
-        inner = [(side * half * 0.3, z - side * 0.0) for _, z in reversed(ends)]
+        ends = [(wall + outward * (side * s * h * S - bend), s * h * C - side * R * S) for s in (-1.0, 1.0)]
+        inner = [(side * half * 0.3, z) for _, z in reversed(ends)]
         axes.fill(*zip(*ends, *inner), color=LIGHT["a"], alpha=0.25, lw=0)
         axes.plot(*zip(*ends), color=LIGHT["a"], lw=1.8, label="bearing" if side > 0 else None)
         _overlap(axes, ends, hole, side)
@@ -109,15 +104,9 @@ def _overlap(axes: Any, ends: list[tuple[float, float]], hole: float, side: floa
     z = z0 + (hole - x0) * (z1 - z0) / (x1 - x0)
     corner = beyond[0]
     axes.fill([hole, corner[0], hole], [z, corner[1], corner[1]], color=LIGHT["jam"], alpha=0.9, lw=0, zorder=5)
-    axes.annotate(
-        "overlap",
-        corner,
-        textcoords="offset points",
-        xytext=(-4 * side, 14 if corner[1] > 0 else -18),
-        ha="left" if side > 0.0 else "right",
-        fontsize=8,
-        color=LIGHT["jam"],
-    )
+    look: dict[str, Any] = {"ha": "left" if side > 0.0 else "right", "fontsize": 8, "color": LIGHT["jam"]}
+    away = (-4 * side, 14 if corner[1] > 0 else -18)
+    axes.annotate("overlap", corner, textcoords="offset points", xytext=away, **look)
 
 
 # -- areas over a turn -------------------------------------------------------------------------------------------------
@@ -236,11 +225,7 @@ def _bands(panels: tuple[Any, ...], report: JammingReport, shown: tuple[float, f
         (arcs.undecided, LIGHT["soft"], "depends on the tolerances, or not decided"),
         (arcs.free, LIGHT["c"], "free for all tolerances (proved)"),
     ):
-        pieces = [
-            (math.degrees(span.start) + turn, math.degrees(span.stop) + turn)
-            for span in spans
-            for turn in (-720.0, -360.0, 0.0, 360.0, 720.0)
-        ]
+        pieces = [(a + turn, b + turn) for a, b in (s.degrees() for s in spans) for turn in range(-720, 721, 360)]
         seen = [(max(a, shown[0]), min(b, shown[1])) for a, b in pieces if b > shown[0] and a < shown[1]]
         for axes in panels:
             for k, (a, b) in enumerate(seen):

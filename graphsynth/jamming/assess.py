@@ -180,9 +180,7 @@ class JammingReport(Assessment):
         """Plain values (floats, strings, lists; angles in radians) for a report or a JSON file."""
         return {
             "verdict": self.verdict.name,
-            "statement": self.statement,
-            "method": self.method,
-            "condition": self.condition,
+            **{name: getattr(self, name) for name in ("statement", "method", "condition")},
             "arcs": [[arc.start, arc.stop] for arc in self.arcs.arcs],
             "touching": list(self.arcs.touching),
             "kappa": self.arcs.kappa,
@@ -275,7 +273,7 @@ def assess_jamming(
     >>> report.verdict.name, round(report.worst_interference, 12)
     ('CERTIFIED_JAMMED', 0.035099273074)
 
-    The same dimensions with three bearings of that kind, at A, B and C, over half a rotation:
+    With three bearings of that kind, at A, B and C, over half a rotation:
 
     >>> from graphsynth import Mechanism
     >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate("0..180 deg")
@@ -336,15 +334,27 @@ def assess_bearing(
 ) -> JammingReport:
     """Assess one tilted bearing: the verdict for ``box`` (without one for the doubles given), the table for them."""
     begin = perf_counter()
-    table = table_over(linkage, bearing, condition, _angles(samples))
+    if isinstance(samples, int | np.integer):
+        if not 2 <= samples <= _MOST_SAMPLES:
+            few = "few" if samples < 2 else "many"
+            raise GeometryError(
+                f"samples = {samples} is too {few} for a table; give 2 to {_MOST_SAMPLES}, or an array of angles"
+            )
+        samples = np.linspace(0.0, math.tau, int(samples))
+    table = table_over(linkage, bearing, condition, np.atleast_1d(finite_array("samples", samples)))
     arcs = jam_arcs(linkage, bearing, condition)
     turn = linkage.full_turn()
     worst = _worst(linkage, bearing, condition, turn)
-    certificate = None
+    certificate, verdict = None, Verdict.FREE_ESTIMATED
+    if bearing.clearance < 0.0 or turn.kind == "never assembled":
+        verdict = Verdict.CANNOT_ASSEMBLE
+    elif arcs.arcs or arcs.touching:
+        verdict = Verdict.JAMMED_ESTIMATED if arcs.arcs else Verdict.TOUCHING_ESTIMATED
     if certify:
         from graphsynth.jamming.bearing.certify import certify_jamming
 
         certificate = certify_jamming(ToleranceBox.of(linkage, bearing) if box is None else box, condition)
+        verdict = certificate.verdict
     notes = [arcs.reason] if arcs.reason else []
     if not turn.possible:
         notes.append(f"{turn.statement}; the arcs hold for the assembled crank angles only")
@@ -356,7 +366,7 @@ def assess_bearing(
     return JammingReport(
         linkage=linkage,
         bearing=bearing,
-        verdict=certificate.verdict if certificate else _verdict(bearing, arcs, turn),
+        verdict=verdict,
         method=METHOD_CERTIFIED if certificate else METHOD_CLOSED_FORM,
         condition=condition,
         arcs=arcs,
@@ -372,17 +382,6 @@ def assess_bearing(
         seconds=perf_counter() - begin,
         certificate=certificate,
     )
-
-
-def _angles(samples: int | ArrayLike) -> Array:
-    if isinstance(samples, int | np.integer):
-        if not 2 <= samples <= _MOST_SAMPLES:
-            few = "few" if samples < 2 else "many"
-            raise GeometryError(
-                f"samples = {samples} is too {few} for a table; give 2 to {_MOST_SAMPLES}, or an array of angles"
-            )
-        return np.linspace(0.0, math.tau, int(samples))
-    return np.atleast_1d(finite_array("samples", samples))
 
 
 def _worst(linkage: TiltedFourBar, bearing: Bearing, condition: Condition, turn: FullTurn) -> tuple[float, float]:
@@ -404,11 +403,3 @@ def _worst(linkage: TiltedFourBar, bearing: Bearing, condition: Condition, turn:
     interference = bearing.interference(S, np.sqrt((1.0 - S) * (1.0 + S)), condition)
     best = int(np.argmax(interference))
     return float(interference[best]), turn.limit_angles[best]
-
-
-def _verdict(bearing: Bearing, arcs: JamArcs, turn: FullTurn) -> Verdict:
-    if bearing.clearance < 0.0 or turn.kind == "never assembled":
-        return Verdict.CANNOT_ASSEMBLE
-    if arcs.arcs:
-        return Verdict.JAMMED_ESTIMATED
-    return Verdict.TOUCHING_ESTIMATED if arcs.touching else Verdict.FREE_ESTIMATED

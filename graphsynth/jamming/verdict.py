@@ -21,21 +21,12 @@ class Verdict(Enum):
 
     One vocabulary for both models: one tilted bearing (L0) and joints that share the misalignment (L1).
 
-    What is proved (theory/jam-arcs 5, theory/extreme-cases 1), and the names of the theory:
-
-    ``CERTIFIED_FREE``
-        Interference < 0 for all angles and parameters: ``NO_JAM_CERTIFIED``.
-    ``CERTIFIED_JAMMED``
-        Every parameter vector binds at some angle or input: ``JAM_FOR_ALL``.
-    ``CERTIFIED_JAMMED_FOR_SOME``
-        Some parameter vector binds at some angle or input: ``JAM_FOR_SOME``.
-    ``UNDECIDED``
-        Nothing; the reason says what stands in the way: ``TOUCHING``, ``UNDECIDED``.
-    ``CANNOT_ASSEMBLE``
-        An interference fit, or no position of the linkage.
-
-    Members whose name ends in ESTIMATED rest on closed forms or samples in floating point: no rounding error is
-    included, so none of them is a certificate.
+    What is proved (theory/jam-arcs 5, theory/extreme-cases 1): ``CERTIFIED_FREE``, an interference < 0 for all angles
+    and parameters (``NO_JAM_CERTIFIED`` of the theory); ``CERTIFIED_JAMMED``, every parameter vector binds at some
+    angle or input (``JAM_FOR_ALL``); ``CERTIFIED_JAMMED_FOR_SOME``, some parameter vector does (``JAM_FOR_SOME``);
+    ``CANNOT_ASSEMBLE``, an interference fit, or no position of the linkage; ``UNDECIDED``, nothing, and the reason says
+    what stands in the way.  Members whose name ends in ESTIMATED rest on closed forms or samples in floating point: no
+    rounding error is included, so none of them is a certificate.
     """
 
     CERTIFIED_FREE = "free over the whole range, for all parameters given (certified)"

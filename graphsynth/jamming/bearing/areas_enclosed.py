@@ -320,12 +320,8 @@ class AreaCurve:
         for name in ("sine", "lid", "rim", "surrogate_gap", "surrogate_jam"):
             bounds: Interval = getattr(self, name)
             columns |= {f"{name}_lo": bounds.lo, f"{name}_hi": bounds.hi}
-        columns |= {
-            "source_ordinate": self.source_ordinate,
-            "intersecting": self.intersecting,
-            "rim_closed": self.rim_closed,
-        }
-        return pd.DataFrame(columns)
+        flags = ("source_ordinate", "intersecting", "rim_closed")
+        return pd.DataFrame(columns | {name: getattr(self, name) for name in flags})
 
 
 @checked

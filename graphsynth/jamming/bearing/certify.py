@@ -126,11 +126,6 @@ class JamCertificate:
 
         ``stop`` below ``start`` runs across the full rotation; a turn or more is the full rotation.
 
-        Raises
-        ------
-        GeometryError
-            For an angle that is not finite.
-
         Examples
         --------
         >>> from graphsynth.jamming.bearing.certify import certify_jamming
@@ -158,10 +153,7 @@ class JamCertificate:
         arcs = self.arcs
         return {
             "verdict": self.verdict.name,
-            "statement": self.statement,
-            "method": self.method,
-            "model": self.model,
-            "condition": self.condition,
+            **{name: getattr(self, name) for name in ("statement", "method", "model", "condition")},
             "parameters": self.box.describe(),
             "exact_input": self.exact_input,
             "largest_interference_mm": list(self.largest_interference),
@@ -199,10 +191,9 @@ def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertifi
 
     Parameters
     ----------
-    box : ToleranceBox
-        The linkage and the bearing; give text or fractions, not floats, if the numbers are decimals.
-    condition : {"A", "B", "general"}
-        Contact condition, see `Bearing.interference`.
+    box, condition : ToleranceBox, {"A", "B", "general"}
+        The linkage and the bearing; give text or fractions, not floats, if the numbers are decimals.  And the contact
+        condition, see `Bearing.interference`.
 
     Returns
     -------
@@ -213,8 +204,6 @@ def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertifi
     ------
     GeometryError
         An unknown condition, or "general" without a hole length.
-    GraphsynthError
-        If another library has changed the rounding mode of the processor.
 
 
     Examples

@@ -119,8 +119,9 @@ def cosine(sine: Interval) -> Interval:
     return ((1 - sine) * (1 + sine)).sqrt()
 
 
-def _interference_a(S: Interval, C: Interval, R: Interval, h: Interval, c: Interval) -> Interval:
+def _interference_a(S: Interval, R: Interval, h: Interval, c: Interval) -> Interval:
     """Condition A, both branches in stable form (theory/bearing-contact 2); grows with S and h, falls with R and c."""
+    C = cosine(S)
     rising = h * S - c - R * S.sqr() / (1 + C)
     across, along = R * S, h * C
     if (across.hi <= along.lo).all():
@@ -133,32 +134,19 @@ def _interference_a(S: Interval, C: Interval, R: Interval, h: Interval, c: Inter
     return Interval.from_bounds(lo, hi)
 
 
-def _interference_b(S: Interval, C: Interval, R: Interval, h: Interval, c: Interval) -> Interval:
-    return h * S - c + (R + c) * S.sqr() / (1 + C)
-
-
-def interference_values(
-    S: Interval, R: Interval, h: Interval, c: Interval, hole: Interval | None, condition: str
-) -> Interval:
-    """Enclose the interference (mm) elementwise for intervals of sine, radius, half height, clearance, half hole.
-
-    Condition "general" is ``min(gA, gB / C)``: the pin binds where it would both as a short bearing in a long hole and
-    as a long shaft in a hole of this length (theory/bearing-contact 4).
-    """
-    C = cosine(S)
-    if condition == "A":
-        return _interference_a(S, C, R, h, c)
-    if condition == "B":
-        return _interference_b(S, C, R, h, c)
-    assert hole is not None
-    a, b = _interference_a(S, C, R, h, c), slanted(S, R, hole, c)
-    return Interval.from_bounds(np.minimum(a.lo, b.lo), np.minimum(a.hi, b.hi))
+def _interference_b(S: Interval, R: Interval, h: Interval, c: Interval) -> Interval:
+    """Condition B for sine of tilt, radius, half height and clearance, elementwise (mm)."""
+    return h * S - c + (R + c) * S.sqr() / (1 + cosine(S))
 
 
 def slanted(S: Interval, R: Interval, hole: Interval, c: Interval) -> Interval:
-    """Interference ``gB / C`` of the slanted shaft at the rim of a hole of half length ``hole``."""
+    """Interference ``gB / C`` of the slanted shaft at the rim of a hole of half length ``hole``.
+
+    A pin in a hole ("general") has the smaller one of this and gA: it binds where it would both as a short bearing in a
+    long hole and as a long shaft in a hole of this length (theory/bearing-contact 4).
+    """
     C = cosine(S)
-    value = _interference_b(S, C, R, hole, c) / C
+    value = (hole * S - c + (R + c) * S.sqr() / (1 + C)) / C
     upright = value.is_empty  # C = 0: the shaft lies across
     return Interval.from_bounds(np.where(upright, 0.0, value.lo), np.where(upright, np.inf, value.hi))
 
@@ -167,17 +155,17 @@ def interference_corners(box: ToleranceBox, sine: Interval, condition: Condition
     """Pair of the smallest and the largest interference (mm) over the box, for a pair of sines (theory/jam-arcs 6)."""
     check_condition(box, condition)
     h, c = ends(box, "Hb") / 2, ends(box, "clearance", falling=True)
-    if condition != "general":
-        return interference_values(sine, ends(box, "Rb", falling=condition == "A"), h, c, None, condition)
+    if condition == "B":
+        return _interference_b(sine, ends(box, "Rb"), h, c)
+    a = _interference_a(sine, ends(box, "Rb", falling=True), h, c)
+    if condition == "A":
+        return a
     hole = ends(box, "hole_length") / 2
-    a = interference_values(sine, ends(box, "Rb", falling=True), h, c, None, "A")
     b = slanted(sine, ends(box, "Rb"), hole, c)
-    low = (min(float(a.lo[0]), float(b.lo[0])), min(float(a.hi[0]), float(b.hi[0])))
-    if box["Rb"].is_point:
-        high = (min(float(a.lo[1]), float(b.lo[1])), min(float(a.hi[1]), float(b.hi[1])))
-    else:
-        high = _largest_over_radius(box, sine[1], h[1], c[1], hole[1])
-    return Interval.from_bounds([low[0], high[0]], [low[1], high[1]])
+    lo, hi = np.minimum(a.lo, b.lo), np.minimum(a.hi, b.hi)
+    if not box["Rb"].is_point:
+        lo[1], hi[1] = _largest_over_radius(box, sine[1], h[1], c[1], hole[1])
+    return Interval.from_bounds(lo, hi)
 
 
 def _largest_over_radius(
@@ -187,7 +175,7 @@ def _largest_over_radius(
     (start, first), (last, stop) = box["Rb"].ends
 
     def both(points: Interval) -> tuple[Interval, Interval]:
-        return interference_values(S, points, h, c, None, "A"), slanted(S, points, hole, c)
+        return _interference_a(S, points, h, c), slanted(S, points, hole, c)
 
     a, b = both(Interval.from_bounds(start, stop))
     best, above = float(min(a.lo, b.lo)), float(min(a.hi, b.hi))
@@ -396,9 +384,11 @@ def corner_interference(box: ToleranceBox, sine: Interval, condition: Condition,
         return _spread(Interval.from_bounds(low, high), sine)
 
     h, c = end("Hb", True) / 2, end("clearance", False)
-    if condition != "general":
-        return interference_values(sine, end("Rb", condition == "B"), h, c, None, condition)
-    a = interference_values(sine, end("Rb", False), h, c, None, "A")
+    if condition == "B":
+        return _interference_b(sine, end("Rb", True), h, c)
+    a = _interference_a(sine, end("Rb", False), h, c)
+    if condition == "A":
+        return a
     # gA falls and gB / C rises with the radius: each at its own end bounds the smaller of both from either side
     b = slanted(sine, end("Rb", True), end("hole_length", True) / 2, c)
     return Interval.from_bounds(np.minimum(a.lo, b.lo), np.minimum(a.hi, b.hi))

@@ -233,8 +233,8 @@ def certified_smallest_clearance(box: ToleranceBox, condition: Condition = "A") 
 
     Parameters
     ----------
-    box, condition : ToleranceBox, {"A", "B", "general"}
-        Ranges of all parameters, for each combination of which the statement holds; contact condition.
+    box, condition
+        As for `certified_largest_misalignment`.
 
     Returns
     -------
@@ -259,8 +259,8 @@ def certified_largest_height(box: ToleranceBox, condition: Condition = "A") -> C
 
     Parameters
     ----------
-    box, condition : ToleranceBox, {"A", "B", "general"}
-        Ranges of all parameters, for each combination of which the statement holds; contact condition.
+    box, condition
+        As for `certified_largest_misalignment`.
 
     Returns
     -------

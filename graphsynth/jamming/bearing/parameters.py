@@ -55,8 +55,8 @@ class Range:
         if isinstance(value, Range):
             return value
         if isinstance(value, str):
-            first, last, is_spread = text_ends(value)
-            low, high = _number(name, first), _number(name, last)
+            one, other, is_spread = text_ends(value)
+            low, high = _number(name, one), _number(name, other)
             if not is_spread:
                 return cls._ordered(name, low, high, True)
             if high < 0:
@@ -358,9 +358,8 @@ class ToleranceBox:
         n1 = m["n1"] * math.cos(turn) - m["n2"] * math.sin(turn)
         n2 = m["n1"] * math.sin(turn) + m["n2"] * math.cos(turn)
         axis = (m["n1"], m["n2"], m["n3"]) if turn == 0.0 else (n1, n2, m["n3"])
-        lengths: Any = (m[name] for name in ("l1", "l2", "l3", "l4"))
-        options: Any = {"rod": self.rod, "convention": self.convention}
-        linkage = TiltedFourBar(*lengths, self.sgn, alpha=m["alpha"], axis=axis, **options)
+        options: Any = {"alpha": m["alpha"], "axis": axis, "rod": self.rod, "convention": self.convention}
+        linkage = TiltedFourBar(m["l1"], m["l2"], m["l3"], m["l4"], self.sgn, **options)
         return linkage, Bearing(m["Rb"], m["Hb"], m["clearance"], m.get("hole_length"))
 
     def describe(self) -> dict[str, str]:

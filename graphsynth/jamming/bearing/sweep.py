@@ -144,7 +144,8 @@ def sweep_turn(
     spans: list[list[Span]] = [[], [], [], []]
     for a, b in zip(starts, stops):
         spans[int(kind[a])].append(Span(float(lo[a]), float(hi[b])))
-    return TurnPartition(*(tuple(part) for part in spans), pieces, finished, perf_counter() - begin)
+    free, inner, undecided, missing = (tuple(part) for part in spans)
+    return TurnPartition(free, inner, undecided, missing, pieces, finished, perf_counter() - begin)
 
 
 def _split(lo: NDArray[np.float64], hi: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

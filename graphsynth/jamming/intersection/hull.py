@@ -45,10 +45,6 @@ class Exact(NamedTuple):
         """Whether it holds one number only."""
         return self.lo == self.hi
 
-    def outward(self) -> Interval:
-        """Enclose in an interval of doubles."""
-        return outward(self.lo, self.hi)
-
 
 def outward(lo: Fraction, hi: Fraction) -> Interval:
     """Return the tightest interval of doubles around two rational numbers."""
@@ -229,13 +225,10 @@ def surrogate_problem(
 
 @checked
 def spectral_radius(problem: CircleEllipse, box: Interval) -> float:
-    """Spectral radius of ``|I - Y L|`` on a box of the quadrant, Y the inverse of mid L.
+    """Spectral radius of ``|I - Y L|`` on a box of the quadrant, Y the inverse of mid L, an estimate.
 
-    An estimate in double precision.  As ``I - Y mid L = 0``, it is the radius of ``|Y| rad L``; infinite where mid L
-    is singular (a circle, or a box at the origin).
-
-    Examples
-    --------
+    As ``I - Y mid L = 0``, it is the radius of ``|Y| rad L``; infinite where mid L is singular (a circle, or a box at
+    the origin).
     >>> box = Interval.from_bounds([4.0, 2.9], [4.1, 3.0])
     >>> round(spectral_radius(circle_ellipse(5, 6, 4), box), 4)
     0.0733
@@ -370,7 +363,7 @@ def _empty(problem: CircleEllipse, reason: Reason) -> IntersectionHull:
 def _result(
     problem: CircleEllipse, status: Status, reasons: tuple[Reason, ...], u: Exact, v: Exact, tight: bool = True
 ) -> IntersectionHull:
-    squares = Interval.stack([u.outward(), v.outward()])
+    squares = Interval.stack([outward(*u), outward(*v)])
     hull = Interval.stack([outward(root_bounds(r.lo).lo, root_bounds(r.hi).hi) for r in (u, v)])
     return IntersectionHull(problem, status, reasons, hull, squares, tight)
 
@@ -382,13 +375,12 @@ def mirrored(box: Interval) -> Interval:
     Parameters
     ----------
     box : Interval, shape (2,)
-        With bounds of at least 0, or empty.
 
     Returns
     -------
     Interval, shape (M, 2)
-        M = 4 boxes; 2 where the box touches one axis, 1 where it touches both, 0 for an empty one.  Order: as in the
-        source, (+, +), (+, -), (-, -), (-, +).
+        M = 4 boxes in the order of the source, (+, +), (+, -), (-, -), (-, +); 2 where the box touches one axis, 1
+        where it touches both, 0 for an empty one.
 
     Examples
     --------
@@ -397,13 +389,9 @@ def mirrored(box: Interval) -> Interval:
     """
     if box.is_empty.any():
         return Interval.from_bounds(np.zeros((0, 2)), np.zeros((0, 2)))
-    signs = []
-    for sx, sy in ((1, 1), (1, -1), (-1, -1), (-1, 1)):
-        sign = (0 if box.lo[0] == 0.0 else sx, 0 if box.lo[1] == 0.0 else sy)
-        if sign not in signs:
-            signs.append(sign)
-    rows = []
-    for sign in signs:
-        parts = [box[k].hull(-box[k]) if s == 0 else (box[k] if s > 0 else -box[k]) for k, s in enumerate(sign)]
-        rows.append(Interval.stack(parts))
-    return Interval.stack(rows)
+    rows = {}
+    for sign in ((1, 1), (1, -1), (-1, -1), (-1, 1)):
+        on_axis = tuple(0 if box.lo[k] == 0.0 else s for k, s in enumerate(sign))
+        parts = [box[k].hull(-box[k]) if s == 0 else (box[k] if s > 0 else -box[k]) for k, s in enumerate(on_axis)]
+        rows[on_axis] = Interval.stack(parts)
+    return Interval.stack(list(rows.values()))

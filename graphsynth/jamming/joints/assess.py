@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 METHOD_SAMPLES = "convex program at the samples, double precision, not certified"
 
 
+_EXTREMES = ("worst_input", "worst_factor", "smallest_scale", "smallest_scale_input")
+
+
 class Sensitivity(NamedTuple):
     """How sensitive the allowed misalignment at the worst input is to one limit.
 
@@ -127,14 +130,7 @@ class CoupledReport(Assessment):
         """Plain values (numbers, strings, lists) for a report or a JSON file."""
         return {
             "verdict": self.verdict.name,
-            "statement": self.statement,
-            "method": self.method,
-            "model": self.model,
-            "condition": self.condition,
-            "worst_input": self.worst_input,
-            "worst_factor": self.worst_factor,
-            "smallest_scale": self.smallest_scale,
-            "smallest_scale_input": self.smallest_scale_input,
+            **{name: getattr(self, name) for name in ("statement", "method", "model", "condition", *_EXTREMES)},
             "largest_duality_gap": float(np.nanmax(self.duality_gap, initial=0.0)),
             "sensitivities": [one._asdict() | {"joint": list(one.joint)} for one in self.sensitivities],
             "certificate": None if self.certificate is None else self.certificate.summary(),

@@ -71,15 +71,6 @@ def shifts_enclosed(layout: Layout, base: Interval) -> Interval:
     return Interval.stack(columns, axis=1) if joints else Interval.zeros((count, 0, 2))
 
 
-def factor_bounds(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array, Array]:
-    """Certified bounds of the factor (mode "scale") over boxes of positions, misalignments and limits, (N,) each.
-
-    The limits' ranges of the layout are part of the box.  ``found`` is of `solve_poses` near the middle of the boxes;
-    any numbers give valid bounds: ``lower <= T <= upper`` for every member, 0 and infinity where nothing is proved.
-    """
-    return lower_bounds(layout, at, found), upper_bounds(layout, at, found)
-
-
 def _around(values: Interval, radius: Array) -> Interval:
     """Widen pairs (N, joints, 2) by (N, joints)."""
     return values + Interval.from_bounds(-radius, radius).reshape(*radius.shape, 1)
@@ -87,7 +78,12 @@ def _around(values: Interval, radius: Array) -> Interval:
 
 @np.errstate(all="ignore")
 def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglected | None = None) -> Array:
-    """Bounds from equilibrium; see `factor_bounds`.  With ``exact`` above 1 only where exact tilts bind too."""
+    """Certified lower bounds (N,) of the factor (mode "scale") over boxes of positions, misalignments and limits.
+
+    The limits' ranges of the layout are part of the box.  ``found`` is of `solve_poses` near the middle of the boxes;
+    any numbers give valid bounds for every member, 0 where nothing is proved.  With ``exact`` above 1 only where exact
+    tilts bind too.
+    """
     if layout.loops == 0:
         return np.zeros(len(at.r))
     length = found.units.length
@@ -191,7 +187,7 @@ def start_tilts(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array,
 
 @np.errstate(all="ignore")
 def upper_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglected | None = None) -> Array:
-    """Bounds from closure; see `factor_bounds`.  With ``exact`` below 1 only where exact tilts are free too."""
+    """Upper bounds as `lower_bounds`, or infinity; with ``exact`` below 1 only where exact tilts are free too."""
     if layout.loops == 0:
         return np.zeros(len(at.r))
     length = found.units.length

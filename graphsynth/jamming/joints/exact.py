@@ -89,11 +89,14 @@ def neglected(
     angles = _angles(system, layout, blocks)
     small: Mask = np.asarray((angles.link < LARGEST).all(axis=1) & (angles.joint < LARGEST).all(axis=1))
     angles = angles._replace(**{k: np.where(small[:, None], getattr(angles, k), 0.0) for k in ("link", "joint")})
+    a, b = zip(*((joint.a, joint.b) for joint in system.mechanism.joints))
+    # of the largest angle of either axis of every joint against the normal
+    lean = np.sin(np.maximum(angles.link[:, a], angles.link[:, b]) + angles.seat)
     lengths = _lengths(system, tubes, u)
     slips, reached = _slips(system, layout, angles, lengths)
     small &= reached
     slips = np.where(small[:, None], slips, 0.0)
-    offset, twist = _disturbances(system, angles, lengths, slips)
+    offset, twist = _disturbances(system, angles, lengths, slips * lean)
     moved_r, turned, sound = _movements(system, layout, tubes, u, counted, offset, twist)
     kept, pairs = list(layout.joints), layout.pairs
     moved_r = moved_r + offset[:, kept]
@@ -107,7 +110,7 @@ def neglected(
         shift[:, place] = alpha**3 / 6.0 + alpha * turned[:, base]
         shift[:, place] += alpha * (own**2 + own * alpha) / (1.0 + np.cos(own)) + 0.5 * own * alpha**2
     wide, narrow = _limits(system, layout, angles, blocks)
-    lean = np.sin(_axis(system, angles))[:, kept]
+    lean = lean[:, kept]
     play = layout.end_float_range[0] * (1.0 - 0.5 * lean**2) / _ROUNDING
     # what is left of the vertical closure of every loop: h^2 (h . v) / (1 + cos) of its links, and slips
     body = np.sin(angles.link) * lengths * (1.0 - np.cos(angles.link))
@@ -159,12 +162,6 @@ def _lengths(system: Positions, tubes: Tubes, u: Interval) -> Array:
     return found * _ROUNDING
 
 
-def _axis(system: Positions, angles: _Angles) -> Array:
-    """Largest angle of either axis of every joint against the normal, (N, joints of the mechanism)."""
-    a, b = zip(*((joint.a, joint.b) for joint in system.mechanism.joints))
-    return np.asarray(np.maximum(angles.link[:, a], angles.link[:, b]) + angles.seat)
-
-
 def _slips(system: Positions, layout: Layout, angles: _Angles, lengths: Array) -> tuple[Array, Mask]:
     """Largest slip of every joint: its axial clearance, or what the heights of both links leave where there is none."""
     mechanism = system.mechanism
@@ -187,22 +184,20 @@ def _slips(system: Positions, layout: Layout, angles: _Angles, lengths: Array) -
 # -- the plane ---------------------------------------------------------------------------------------------------------
 
 
-def _disturbances(system: Positions, angles: _Angles, lengths: Array, slips: Array) -> tuple[Array, Array]:
+def _disturbances(system: Positions, angles: _Angles, lengths: Array, offset: Array) -> tuple[Array, Array]:
     """Bounds of the offset of the plane closure at every joint, and of the twist that a joint prescribes amiss.
 
-    Two rotations of tilts x and y make one of a tilt and a twist, at most half of ``x y (1 + small)``: the area of a
-    spherical triangle.
+    ``offset`` is that of the slips along leaning axes.  Two rotations of tilts x and y make one of a tilt and a twist,
+    at most half of ``x y (1 + small)``: the area of a spherical triangle.
     """
     mechanism = system.mechanism
     short = lengths * (1.0 - np.cos(angles.link))
-    lean = np.sin(_axis(system, angles))
     driven = {driver.pair for driver in mechanism.drivers}
     parents = {edge.joint: edge.parent for edge in system.edges}
-    offset, twist = np.zeros_like(slips), np.zeros_like(slips)
+    twist = np.zeros_like(offset)
     for k, joint in enumerate(mechanism.joints):
         first, second = angles.link[:, joint.a], angles.link[:, joint.b]
         before = parents.get(k)
-        offset[:, k] = slips[:, k] * lean[:, k]
         offset[:, k] += short[:, joint.a] + short[:, joint.b] if before is None else short[:, before]
         if isinstance(joint, Gear):
             twist[:, k] = (first + second) ** 2

@@ -240,43 +240,34 @@ def complete(
     condition: Condition,
 ) -> tuple[Limits, ...]:
     """Limits of every joint: those named, else those given for all; contacts of gears, cams and slots are free."""
-    table: dict[tuple[int, int], Bearing | Limits] = {}
-    common: Bearing | Limits | None = None
-    if isinstance(given, Mapping):
-        pairs = {joint.pair for joint in joints}
-        for key, value in given.items():
-            pair = (min(key), max(key))
-            if pair not in pairs:
-                raise GeometryError(f"bearings name the joint {pair[0]}-{pair[1]}, which does not exist")
-            table[pair] = value
-    else:
-        common = given
-    found = []
+    table = {(min(pair), max(pair)): own for pair, own in given.items()} if isinstance(given, Mapping) else {}
+    common = None if isinstance(given, Mapping) else given
+    for a, b in set(table) - {joint.pair for joint in joints}:
+        raise GeometryError(f"bearings name the joint {a}-{b}, which does not exist")
+    found: list[Limits] = []
     for joint in joints:
         own = table.get(joint.pair)
         if joint.pair in misaligned and misaligned[joint.pair].rigid:
             own = RIGID if isinstance(joint, Revolute) else SlideLimits(0.0, 0.0)
         elif own is None:
             own = FREE if isinstance(joint, Gear | Cam | PinSlot) else common
-        found.append(_checked(joint, own, condition))
+        name = f"joint {joint.a}-{joint.b}"
+        if own is None:
+            raise GeometryError(f"{name} has no limits; give bearings={{({joint.a}, {joint.b}): ...}}")
+        if isinstance(own, Bearing):
+            if not isinstance(joint, Revolute):
+                raise GeometryError(f"{name} is a {joint.kind} joint, a bearing does not fit; give SlideLimits or FREE")
+            own = bearing_limits(own, condition)
+        if not isinstance(own, JointLimits | SlideLimits):
+            raise GeometryError(f"{own!r} are no limits of {name}; give a Bearing, JointLimits or SlideLimits")
+        if isinstance(own, SlideLimits) and not isinstance(joint, Prismatic | PinSlot):
+            raise GeometryError(f"{name} is a {joint.kind} joint without a direction; give JointLimits")
+        if isinstance(joint, Gear | Cam) and own != FREE:
+            raise GeometryError(
+                f"{name} is a {joint.kind} contact, which guides nothing out of the plane; leave it FREE"
+            )
+        found.append(own)
     return tuple(found)
-
-
-def _checked(joint: JointGeometry, own: Bearing | Limits | None, condition: Condition) -> Limits:
-    name = f"joint {joint.a}-{joint.b}"
-    if own is None:
-        raise GeometryError(f"{name} has no limits; give bearings={{({joint.a}, {joint.b}): ...}}")
-    if isinstance(own, Bearing):
-        if not isinstance(joint, Revolute):
-            raise GeometryError(f"{name} is a {joint.kind} joint, a bearing does not fit; give SlideLimits or FREE")
-        return bearing_limits(own, condition)
-    if not isinstance(own, JointLimits | SlideLimits):
-        raise GeometryError(f"{own!r} are no limits of {name}; give a Bearing, JointLimits or SlideLimits")
-    if isinstance(own, SlideLimits) and not isinstance(joint, Prismatic | PinSlot):
-        raise GeometryError(f"{name} is a {joint.kind} joint without a direction; give JointLimits")
-    if isinstance(joint, Gear | Cam) and own != FREE:
-        raise GeometryError(f"{name} is a {joint.kind} contact, which guides nothing out of the plane; leave it FREE")
-    return own
 
 
 def critical_range(
@@ -301,8 +292,8 @@ def critical_range(
     found = []
     for kind, length in own:  # lower bound at the tightest corner, upper bound at the loosest one
         small, large = radius if kind == "A" else radius[::-1]
-        low, high = _tilt(small, length[1], clearance[0], kind)[0], _tilt(large, length[0], clearance[1], kind)[1]
-        found.append((low, high))
+        below = _tilt(small, length[1], clearance[0], kind)[0]
+        found.append((below, _tilt(large, length[0], clearance[1], kind)[1]))
     least, most = (max(pair) for pair in zip(*found))
     return min(least, nominal), max(most, nominal)
 

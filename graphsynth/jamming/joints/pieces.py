@@ -67,8 +67,7 @@ def _around(tilt: Misalignment, *, alone: bool) -> list[Misalignment]:
         angles = [turn * k / count for k in range(count)]
         return _corners(tilt, largest, angles, turn / count)
     if first == last:
-        ends = {largest} if alone else {least, most}
-        return _corners(tilt, 1.0, [first], 0.0, sorted(ends))
+        return [tilt.sharp(end, first) for end in sorted({largest} if alone else {least, most})]
     steps = max(1, math.ceil((last - first) / _APART))
     angles = [first, *(first + (last - first) * k / steps for k in range(1, steps)), last]
     apart = max(b - a for a, b in pairwise(angles))
@@ -81,12 +80,10 @@ def _around(tilt: Misalignment, *, alone: bool) -> list[Misalignment]:
     return found + [tilt.sharp(inner, angle) for angle in (first, last)]
 
 
-def _corners(
-    tilt: Misalignment, radius: float, angles: list[float], apart: float, lengths: list[float] | None = None
-) -> list[Misalignment]:
+def _corners(tilt: Misalignment, radius: float, angles: list[float], apart: float) -> list[Misalignment]:
     # both factors are rounding allowances: angles are off by some ulps, the cosine by one
-    grow = (1.0 + 1e-13) / math.cos(0.5 * apart * (1.0 + 1e-12) + 1e-14) if apart > 0.0 else 1.0
-    return [tilt.sharp(radius * own * grow, angle) for own in lengths or [1.0] for angle in angles]
+    grow = (1.0 + 1e-13) / math.cos(0.5 * apart * (1.0 + 1e-12) + 1e-14)
+    return [tilt.sharp(radius * grow, angle) for angle in angles]
 
 
 Array = NDArray[np.float64]

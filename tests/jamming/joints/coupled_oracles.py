@@ -10,9 +10,14 @@ from scipy.optimize import linprog
 
 from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, enumerate_chains
 from graphsynth.jamming.joints.closure import PITCH, ROLL
+from graphsynth.jamming.joints.enclosure import lower_bounds, upper_bounds
 from graphsynth.kinematics.dimensional import embody
 
 SIDES = 96
+
+
+def factor_bounds(layout, at, found):
+    return lower_bounds(layout, at, found), upper_bounds(layout, at, found)
 
 
 def four_bar(ground=2.0, crank=1.0, coupler=2.5, rocker=2.5, scale=1.0):

@@ -7,7 +7,7 @@ from itertools import islice
 
 import numpy as np
 import pytest
-from coupled_oracles import embodied, four_bar
+from coupled_oracles import embodied, factor_bounds, four_bar
 from exact_oracle import Position, exact_lower, exact_upper, judge, slip_row, tilt_row
 
 from graphsynth import Mechanism, Revolute, enumerate_chains, simulate
@@ -15,7 +15,7 @@ from graphsynth.intervals import Interval
 from graphsynth.jamming import Bearing
 from graphsynth.jamming.joints import RIGID, SPHERICAL, JointLimits, Misalignment, SlideLimits
 from graphsynth.jamming.joints.closure import joint_places, lay_out, shifts
-from graphsynth.jamming.joints.enclosure import Pieces, factor_bounds
+from graphsynth.jamming.joints.enclosure import Pieces
 from graphsynth.jamming.joints.program import problem, solve_poses
 
 MARGINS = (1e-3, 1e-6, 1e-9)

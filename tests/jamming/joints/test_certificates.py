@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 import pytest
-from coupled_oracles import driven_pair, embodied, four_bar, single_loop
+from coupled_oracles import driven_pair, embodied, factor_bounds, four_bar, single_loop
 
 from graphsynth import Driver, Gear, Mechanism, MechanismGraph, PinSlot, Prismatic, Revolute, simulate
 from graphsynth.core.errors import GeometryError
@@ -24,7 +24,7 @@ from graphsynth.jamming.joints import (
     largest_scale,
 )
 from graphsynth.jamming.joints.closure import joint_places, shifts
-from graphsynth.jamming.joints.enclosure import Pieces, factor_bounds
+from graphsynth.jamming.joints.enclosure import Pieces
 from graphsynth.jamming.joints.pieces import FEWEST, PARTS, Work
 from graphsynth.jamming.joints.positions import Positions, prove_tubes, slopes
 from graphsynth.jamming.joints.program import problem
