@@ -48,9 +48,8 @@ def section_picture(
 ) -> Figure:
     """Draw the bearing in its hole, cut by the plane of the tilt, one panel for each tilt.
 
-    `tilts`: radians. `titles`: one for each panel. `exaggeration`: factor on radial distances from the wall of the
-    untilted bearing; heights are to scale.  Written on the picture. Raises `GeometryError` for an exaggeration that is
-    not positive, or no tilts.
+    `tilts`: radians, with `titles`. `exaggeration`: factor on radial distances from the wall of the untilted bearing,
+    written on the picture. Raises `GeometryError` for an exaggeration that is not positive, or no tilts.
 
     >>> from graphsynth.jamming import Bearing
     >>> len(section_picture(Bearing(), (0.003, 0.0133)).axes)
@@ -159,8 +158,7 @@ def _areas(axes: Any, curve: AreaCurve, f: Array) -> None:
 def area_chart(curve: AreaCurve, window: tuple[float, float] | None = None) -> Chart:
     """Return the areas over the crank angle as a `Chart`, for themed SVG.
 
-    `window`: degrees; only the angles inside are drawn. Raises `GeometryError` for a window without an angle of the
-    curve.
+    Of the angles inside the `window` (degrees); one without an angle of the curve raises `GeometryError`.
 
     >>> from graphsynth.jamming.bearing.areas_enclosed import area_curve
     >>> area_chart(area_curve(), (90.0, 115.5)).svg()[:15]
@@ -168,8 +166,8 @@ def area_chart(curve: AreaCurve, window: tuple[float, float] | None = None) -> C
     """
     from graphsynth.drawing.plots import Chart, Line
 
-    f = np.degrees(curve.f)
-    use = np.ones(f.shape, dtype=bool) if window is None else (f >= window[0]) & (f <= window[1])
+    f, (low, high) = np.degrees(curve.f), window or (-math.inf, math.inf)
+    use = (f >= low) & (f <= high)
     if not use.any():
         raise GeometryError(f"the window {window} degrees holds no angle of the curve; choose another")
     lines = [
@@ -257,9 +255,8 @@ def space_picture(
 ) -> Figure:
     """Draw the bearing in its cut-away hole, one panel for each tilt; what does not fit into the hole is coloured.
 
-    `tilts`: radians. `titles`: one for each panel. `exaggeration`: factor on radial distances from the wall of the
-    untilted bearing; 1 draws to scale.  Written on the picture. Raises `GeometryError` for an exaggeration that is not
-    positive, no tilts, a tilt of a right angle or more, an interference fit.
+    Arguments and errors are those of `section_picture`; besides, a tilt of a right angle or more, and an interference
+    fit, raise `GeometryError`.
 
     >>> from graphsynth.jamming import Bearing
     >>> len(space_picture(Bearing(), (0.003, 0.0133)).axes)

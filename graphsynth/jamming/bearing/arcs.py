@@ -56,8 +56,6 @@ def _certainly_full(span: Span) -> bool:
 def merge_outer(spans: Iterable[Span]) -> tuple[Span, ...]:
     """Join spans that overlap or touch, also across the turn; the union is never smaller.
 
-    Examples
-    --------
     >>> merge_outer([Span(5.0, 7.0), Span(0.5, 1.0), Span(1.0, 2.0)])
     (Span(start=5.0, stop=8.283185307179588),)
     """
@@ -80,8 +78,6 @@ def merge_outer(spans: Iterable[Span]) -> tuple[Span, ...]:
 def complement(spans: tuple[Span, ...]) -> tuple[Span, ...]:
     """Return what merged spans leave free, never larger than the true complement.
 
-    Examples
-    --------
     >>> complement((Span(1.0, 2.0),))
     (Span(start=2.0, stop=7.283185307179585),)
     """
@@ -196,18 +192,11 @@ class ArcEnclosure(NamedTuple):
 class CertifiedArcs:
     """Where the bearing binds during a turn, with proof.
 
-    Attributes
-    ----------
-    arcs : tuple of ArcEnclosure
-        The two arcs (one per lid) with their ends enclosed over the whole box; empty unless they exist for every
-        parameter vector.
-    inner, outer : tuple of Span
-        Crank angles at which every parameter vector binds, wherever the linkage can be assembled, and outside of which
-        none does.
-    kappa, phase : Enclosure
-        Range over the box of the value that ``|sin(f - phase)|`` must exceed; psi1 modulo pi, radians.
-    reason : str
-        What is special: no arcs and why, arcs that exist for some parameters only, touching.
+    ``arcs`` are the two arcs (one per lid) with their ends enclosed over the whole box; empty unless they exist for
+    every parameter vector.  ``inner`` are crank angles at which every parameter vector binds, wherever the linkage can
+    be assembled; outside of ``outer`` none does.  ``kappa`` is the range over the box of the value that
+    ``|sin(f - phase)|`` must exceed, ``phase`` psi1 modulo pi, radians.  ``reason`` tells what is special: no arcs and
+    why, arcs that exist for some parameters only, touching.
     """
 
     arcs: tuple[ArcEnclosure, ...]
@@ -294,17 +283,10 @@ class JamArc:
 class JamArcs:
     """Where the bearing binds during a turn.
 
-    Attributes
-    ----------
-    arcs : tuple of JamArc
-        The two arcs, half a turn apart, one per lid; empty if there is none.
-    touching : tuple of float
-        Crank angles (radians) of contact without overlap: the two of ``kappa = 1``, or of zero clearance.
-    kappa, phase : float
-        Sine of the critical tilt over the largest sine of tilt, infinite if there is no critical tilt or no tilt; psi1
-        with tilt proportional to ``sin(f - psi1)``, radians.
-    condition, method, reason : str
-        Contact condition used, how the arcs are known, and why there are none or what is special.
+    The two ``arcs``, half a turn apart, one per lid, or none; ``touching``, crank angles (radians) of contact without
+    overlap: the two of ``kappa = 1``, or of zero clearance.  ``kappa`` is the sine of the critical tilt over the
+    largest sine of tilt, infinite if there is no critical tilt or no tilt; ``phase`` psi1 with tilt proportional to
+    ``sin(f - psi1)``, radians.  ``reason`` says why there are no arcs, or what is special.
     """
 
     arcs: tuple[JamArc, ...]

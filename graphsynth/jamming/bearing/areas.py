@@ -170,8 +170,6 @@ def ellipse_circle_stable(R1: ArrayLike, pa: ArrayLike, qb: ArrayLike) -> Cresce
 
     Relative error of a few units in the last place down to the thinnest crescents.
 
-    Examples
-    --------
     >>> print(f"{ellipse_circle_stable(1.0, 1e-9, 1e-9).ellipse_only.item():.14e}")
     1.99999999842920e-09
     """

@@ -38,18 +38,11 @@ _ENOUGH = 64
 
 @dataclass(frozen=True, eq=False)
 class Supremum:
-    """The largest value of a function over a box.
+    """The largest value of a function over a box, between certified bounds.
 
-    Attributes
-    ----------
-    lower, upper : float
-        Certified bounds; an infinite end says that nothing is known there.
-    point : ndarray, shape (n,)
-        A point of the box whose value is at least ``lower``.
-    boxes, waiting : int
-        Boxes evaluated; boxes not settled when the search stopped.
-    finished, seconds : bool, float
-        Whether the bounds are as close as asked, or their sign decides what was asked; run time.
+    An infinite bound says that nothing is known there; at ``point`` (n,) the value is at least ``lower``.  ``boxes``
+    were evaluated, and ``waiting`` ones not settled when the search stopped; it is ``finished`` if the bounds are as
+    close as asked, or their sign decides what was asked.
     """
 
     lower: float
@@ -114,14 +107,13 @@ def maximise(
         if given.ndim != 1 or given.shape != box.shape or not bool(given.is_bounded.all()):
             raise GeometryError(f"{name} = {given!r} must be a vector of bounded intervals, one for each variable")
     search = _Search(function, box, tried)
-    while search.waiting() and search.boxes < max_boxes and perf_counter() - begin < max_seconds:
+    while len(search.bound) and search.boxes < max_boxes and perf_counter() - begin < max_seconds:
         if search.settled(tolerance, decide_sign):
             break
         search.round(min(_ROUND, max_boxes - search.boxes))
     done = search.settled(tolerance, decide_sign)
-    return Supremum(
-        search.best, search.upper(), search.point, search.boxes, search.waiting(), done, perf_counter() - begin
-    )
+    found = search.best, search.upper(), search.point, search.boxes, len(search.bound)
+    return Supremum(*found, done, perf_counter() - begin)
 
 
 class _Search:
@@ -133,9 +125,6 @@ class _Search:
         self.bound = np.array([math.inf])
         self.best, self.point, self.boxes = -math.inf, box.mid, 0
         self.closed = -math.inf  # bound of the boxes too small to cut
-
-    def waiting(self) -> int:
-        return len(self.bound)
 
     def upper(self) -> float:
         return max(self.best, self.closed, float(self.bound.max(initial=-math.inf)))
@@ -325,20 +314,13 @@ _BATCH = 100_000
 class Samples:
     """What was sampled, beside what is proved.
 
-    Attributes
-    ----------
-    count, corners : int
-        Parameter vectors with a crank angle, uniform in the box and over the turn; corners of the box tried.
-    largest_interference, corner_interference : float
-        Largest interference seen in the samples, and over the corners at the worst angle, mm (estimated).
-    jamming_positions : float
-        Part of the samples with a positive interference: the share of crank positions, over all parameter vectors.
-    jamming_mechanisms, jamming_mechanisms_range : float, (float, float)
-        Part of the parameter vectors that have a positive interference somewhere in the turn: the probability that a
-        mechanism drawn from the box binds (estimated), whether that position can be assembled or not; its confidence
-        interval, 95 %, exact for the binomial distribution [Clopper & Pearson 1934].
-    bound, outside : float, int
-        Certified upper bound of the interference, mm; samples above it: anything but 0 is a bug.
+    ``count`` parameter vectors with a crank angle, uniform in the box and over the turn, and all ``corners`` of the box
+    at the worst angle gave ``largest_interference`` and ``corner_interference`` at most, mm (estimated); ``outside`` of
+    them lie above the certified ``bound``: anything but 0 is a bug.  ``jamming_positions`` is the part of the samples
+    with a positive interference: the share of crank positions, over all parameter vectors.  ``jamming_mechanisms`` is
+    the part of the parameter vectors that have one somewhere in the turn: the probability that a mechanism drawn from
+    the box binds (estimated), whether that position can be assembled or not; ``jamming_mechanisms_range`` its
+    confidence interval, 95 %, exact for the binomial distribution [Clopper & Pearson 1934].
     """
 
     count: int
@@ -407,13 +389,24 @@ def sample_interference(
         jams += int((interference > 0.0).sum())
         ever += int((_interferences(box, condition, values, np.ones(size)) > 0.0).sum())  # the tilt is largest there
         outside += int((interference > bound).sum())
-    from scipy.special import betaincinv  # Clopper and Pearson
-
-    low = 0.0 if ever == 0 else float(betaincinv(ever, count - ever + 1, 0.025))
-    high = 1.0 if ever == count else float(betaincinv(ever + 1, count - ever, 0.975))
-    corner, tried = _corners(box, condition)
-    seen = best, jams / count, ever / count, (low, high), corner, tried
+    # the corners of the ranges that have a width, at the worst angle
+    wide = [name for name in box.ranges if not box[name].is_point]
+    signs = np.array(list(product((0, 1), repeat=len(wide)))).reshape(2 ** len(wide), len(wide))
+    tried = len(signs)
+    values = {name: np.full(tried, box[name].middle) for name in box.ranges}
+    for column, name in enumerate(wide):
+        values[name] = np.array([float(box[name].lower), float(box[name].upper)])[signs[:, column]]
+    corner = float(_interferences(box, condition, values, np.ones(tried)).max())
+    seen = best, jams / count, ever / count, _binomial_range(ever, count), corner, tried
     return Samples(count, *seen, bound, outside, perf_counter() - begin)
+
+
+def _binomial_range(hits: int, count: int) -> tuple[float, float]:
+    """Clopper and Pearson's interval of a probability, 95 %."""
+    from scipy.special import betaincinv
+
+    low = 0.0 if hits == 0 else float(betaincinv(hits, count - hits + 1, 0.025))
+    return low, 1.0 if hits == count else float(betaincinv(hits + 1, count - hits, 0.975))
 
 
 def _interferences(box: ToleranceBox, condition: str, v: dict[str, Array], wave: Array) -> Array:
@@ -432,14 +425,3 @@ def _interferences(box: ToleranceBox, condition: str, v: dict[str, Array], wave:
         return np.asarray(a)
     with np.errstate(divide="ignore"):
         return np.minimum(a, (0.5 * v["hole_length"] * S - c + (R + c) * S * S / (1.0 + C)) / C)
-
-
-def _corners(box: ToleranceBox, condition: str) -> tuple[float, int]:
-    """Largest interference over the corners of the ranges that have a width, at the worst angle."""
-    wide = [name for name in box.ranges if not box[name].is_point]
-    signs = np.array(list(product((0, 1), repeat=len(wide)))).reshape(2 ** len(wide), len(wide))
-    values = {name: np.full(len(signs), box[name].middle) for name in box.ranges}
-    for column, name in enumerate(wide):
-        ends = np.array([float(box[name].lower), float(box[name].upper)])
-        values[name] = ends[signs[:, column]]
-    return float(_interferences(box, condition, values, np.ones(len(signs))).max()), len(signs)

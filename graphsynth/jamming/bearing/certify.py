@@ -48,9 +48,7 @@ class JamCertificate:
     Attributes
     ----------
     verdict, reason : Verdict, str
-        See the table there; why nothing is proved, or what is special, empty for a plain verdict.
-    condition, box : str, ToleranceBox
-        Contact condition and parameters.
+        What is proved; why nothing is, or what is special, empty for a plain verdict.
     largest_interference : Enclosure
         Of the largest interference over the turn and the box, mm, whether the linkage can be assembled there or not;
         a negative upper end proves that all is free.
@@ -59,16 +57,12 @@ class JamCertificate:
         that every parameter vector binds if ``assembles`` is "always" (else ``witness`` does).
     largest_tilt, critical_tilt : Enclosure
         Range over the box of the largest tilt of a turn and of the critical tilt, radians; infinite: none.
-    arcs : CertifiedArcs
-        Jam arcs with inner and outer bounds.
     assembles : {"always", "at some angles", "never", "not decided"}
         What is proved about assembly, for every parameter vector.
     witness : Witness or None
         Evidence of a jam for ``CERTIFIED_JAMMED`` and ``CERTIFIED_JAMMED_FOR_SOME``.
     exact_input : bool
         False if a plain float came in; the statement then holds for that double.
-    boxes, seconds : int, float
-        Boxes evaluated, run time.
     """
 
     verdict: Verdict

@@ -167,14 +167,9 @@ _FIRST, _LAST = 2.0**-50, 2.0**-5  # relative distances from the proposed edge; 
 class CertifiedLimit:
     """A limit between two proved values.
 
-    Attributes
-    ----------
-    works, fails : float or None
-        Certified free over the full rotation and the whole box; certified to jam for at least one parameter vector.
-    unit, reason, covers : str
-        "rad" or "mm"; why an end is missing; the range of values for which freedom is proved in one go.
-    trials, seconds : int, float
-        Certificates computed, run time.
+    ``works`` is certified free over the full rotation and the whole box, ``fails`` to jam for at least one parameter
+    vector; ``reason`` says why one of them is missing.  ``covers`` tells the range of values for which freedom is
+    proved in one go, ``unit`` is "rad" or "mm", ``trials`` the number of certificates computed.
     """
 
     works: float | None

@@ -180,8 +180,6 @@ def _number(name: str, value: Any) -> Fraction:
 def exact_text(value: Fraction) -> str:
     """Write a rational number exactly: as a decimal if a short one exists, else as a fraction.
 
-    Examples
-    --------
     >>> exact_text(Fraction(27, 1000)), exact_text(Fraction(1, 30))
     ('0.027', '1/30')
     """

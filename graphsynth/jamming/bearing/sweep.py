@@ -47,13 +47,9 @@ class PieceInterference(NamedTuple):
 class TurnPartition:
     """The turn in four kinds of spans (radians, within [0, 2 pi]); together they cover it.
 
-    Attributes
-    ----------
-    free, inner, missing, undecided : tuple of Span
-        Certified: no parameter vector binds; every one is assembled and jammed; none can be assembled.  And the rest,
-        where neither is proved at this resolution.
-    pieces, finished, seconds : int, bool, float
-        Pieces evaluated; False if the budget ended the search above the resolution asked for; run time.
+    Certified: no parameter vector binds (``free``), every one is assembled and jammed (``inner``), none can be
+    assembled (``missing``); ``undecided`` is the rest, where neither is proved at this resolution.  Not ``finished``:
+    the budget ended the search, after so many ``pieces``, above the resolution asked for.
     """
 
     free: tuple[Span, ...]

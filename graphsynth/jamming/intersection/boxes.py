@@ -42,17 +42,10 @@ _MOST_POWER = 900
 class IntersectionBoxes:
     """Outcome of `krawczyk_boxes`, for the first quadrant.
 
-    Attributes
-    ----------
-    status : Status
-        ``EMPTY``: no intersection; ``UNIQUE``: exactly one in the quadrant, for every choice of the parameters;
-        ``EXISTS``: at least one for every choice, but boxes are left that may hold more; ``UNDECIDED``: see
-        ``reasons``.
-    reasons : tuple of Reason
-    rows : four ndarrays, shape (K, 4)
-        ``proved``, ``domains``, ``inner``, ``boundary`` as bounds x lo, x hi, y lo, y hi.
-    finished, tested, seconds : bool, int, float
-        False if a limit ended the search; all boxes together hold every solution all the same.  Work done.
+    ``EMPTY``: no intersection; ``UNIQUE``: exactly one in the quadrant, for every choice of the parameters; ``EXISTS``:
+    at least one for every choice, but boxes are left that may hold more; ``UNDECIDED``: see ``reasons``.  ``rows`` are
+    ``proved``, ``domains``, ``inner``, ``boundary`` as bounds x lo, x hi, y lo, y hi, (K, 4) each.  Not ``finished``: a
+    limit ended the search; all boxes together hold every solution all the same.
     """
 
     problem: CircleEllipse

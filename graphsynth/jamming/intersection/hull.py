@@ -252,15 +252,10 @@ def spectral_radius(problem: CircleEllipse, box: Interval) -> float:
 class IntersectionHull:
     """Outcome of `exact_hull`, for the first quadrant.
 
-    Attributes
-    ----------
-    status, reasons : Status, tuple of Reason
-        ``UNIQUE``: one intersection inside the quadrant for every choice of the parameters; ``EMPTY``: none for any;
-        ``UNDECIDED``: neither holds, or it depends on the parameters: see the one or two reasons.
-    hull, squares : Interval, shape (2,)
-        Of all solutions (x, y) with x, y >= 0: certified, exact up to outward rounding if ``tight``; of (x^2, y^2).
-    tight : bool
-        False only where the ranges of a and b overlap, so that the hull is an enclosure and not exact.
+    ``UNIQUE``: one intersection inside the quadrant for every choice of the parameters; ``EMPTY``: none for any;
+    ``UNDECIDED``: neither holds, or it depends on the parameters: see the one or two ``reasons``.  ``hull`` (2,) of all
+    solutions (x, y) with x, y >= 0 is certified, and exact up to outward rounding if ``tight``: unless the ranges of a
+    and b overlap; ``squares`` (2,) is that of (x^2, y^2).
     """
 
     problem: CircleEllipse

@@ -33,24 +33,16 @@ Array = NDArray[np.float64]
 
 
 class Reading(Enum):
-    """Which ellipse stands for the tilted part, against which circle.
+    """Which ellipse stands for the tilted part, against which circle."""
 
-    Members
-    -------
-    IMAGE (E1)
-        Projection of the tilted hole centred on the axis, against the bearing.
-    SECTION (E2)
-        Section of the tilted bearing, against the hole.
-    LID (E3)
-        Projection of the rim of the tilted hole at one lid, shifted by ``h sin t``, against the bearing.  The default:
-        the only one whose area is the interference of condition B.
-    SURROGATE (E4)
-        Centred ellipse that touches the near side of the lid, against the bearing: right onset, wrong area.
-    """
-
+    #: Projection of the tilted hole centred on the axis, against the bearing.
     IMAGE = "E1"
+    #: Section of the tilted bearing, against the hole.
     SECTION = "E2"
+    #: Projection of the rim of the tilted hole at one lid, shifted by ``h sin t``, against the bearing.  The default:
+    #: the only one whose area is the interference of condition B.
     LID = "E3"
+    #: Centred ellipse that touches the near side of the lid, against the bearing: right onset, wrong area.
     SURROGATE = "E4"
 
 
@@ -99,8 +91,6 @@ def reading_areas(
     For E2 the interference is the ellipse outside the circle, for the others the circle outside the ellipse.  NaN where
     the ellipse does not exist.
 
-    Examples
-    --------
     >>> [round(float(a), 12) for a in reading_areas(Bearing(), 0.0, 1.0, Reading.LID)]
     [3.301499719658, 0.0]
     """

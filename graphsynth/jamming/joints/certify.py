@@ -117,8 +117,6 @@ class TurnCertificate:
         model (first order), which neglects terms of second order; ``small_tilts`` is the verdict in that model.
     one_branch : bool
         All pieces are proved to belong to one continuous branch.
-    evaluated, seconds : int, float
-        Pieces evaluated, run time.
     """
 
     verdict: Verdict
@@ -210,12 +208,8 @@ def certify_coupled(
     Returns
     -------
     TurnCertificate
-        Certified, with exact tilts; UNDECIDED with a reason rather than a guess.
-
-    Raises
-    ------
-    GeometryError
-        Limits or misalignments that do not fit the mechanism, fewer than two assembled samples.
+        Certified, with exact tilts; UNDECIDED with a reason rather than a guess.  `GeometryError` for limits or
+        misalignments that do not fit the mechanism, and fewer than two assembled samples.
 
 
     Examples

@@ -204,9 +204,9 @@ def bearing_limits(
     Returns
     -------
     JointLimits
-        ``tilt`` is infinite if there is no critical tilt.  The range is certified (outward rounding): t_A
-        grows with the clearance and the radius and falls with the height; t_B falls with the radius and the height; a
-        pin in a hole has the larger one of both (theory/bearing-contact 4, 7).
+        ``tilt`` is infinite if there is no critical tilt.  The range is certified (outward rounding): t_A grows with
+        the clearance and the radius and falls with the height; t_B falls with the radius and the height; a pin in a
+        hole has the larger one of both (theory/bearing-contact 4, 7).
 
     Raises
     ------

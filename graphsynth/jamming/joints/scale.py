@@ -93,11 +93,6 @@ def largest_scale(
     ScaleCertificate
         Certified for the small-tilt model (branch and bound over the input).  With one misalignment its largest alpha
         lies between ``low * alpha`` and ``high * alpha``.
-
-    Raises
-    ------
-    GeometryError
-        As `certify_coupled`; and for a motion or mechanism whose positions cannot be proved at all.
     """
     begin = perf_counter()
     check_range(motion, length_tolerance, relative_gap=relative_gap, max_pieces=max_pieces, seconds=seconds)

@@ -47,13 +47,7 @@ class Budget(NamedTuple):
 
 
 def search(work: Work, budget: Budget) -> tuple[Found, str]:
-    """Cut the range until every piece is decided, too narrow, or cannot be decided; say what stopped the work.
-
-    Raises
-    ------
-    Unsupported
-        For a mechanism whose positions are not enclosed.
-    """
+    """Cut the range until every piece is decided, too narrow, or cannot be decided; say what stopped the work."""
     parts: list[Found] = []
     lo, hi = work.first()
     stopped = ""
@@ -144,18 +138,9 @@ _INSIDE = 1e-9
 class MemberWitness:
     """A member of the tolerance boxes that is proved to jam (certified).
 
-    Attributes
-    ----------
-    input : float
-        Where it binds.
-    factor : float
-        Proved lower bound of the factor on limits and plays there; above 1.
-    misalignments, limits : tuple
-        Of this member, without tolerance; limits in the order of ``mechanism.joints``.
-    mechanism : Mechanism
-        With the dimensions of this member.
-    exact : bool
-        Whether it is proved with exact tilts; else with small ones only (first order).
+    It binds at ``input``, where ``factor``, above 1, is a proved lower bound of the factor on limits and plays; with
+    ``exact`` tilts, or with small ones only (first order).  Misalignments, limits (in the order of
+    ``mechanism.joints``) and the dimensions of ``mechanism`` are those of this member, without tolerance.
     """
 
     input: float
