@@ -257,10 +257,8 @@ def assess_jamming(
     Returns
     -------
     JammingReport or CoupledReport
-        Both print one sentence and a table; ``details()`` tells all.  Both have ``verdict`` (`Verdict`), ``statement``,
-        ``method``, ``condition``, ``certificate``, ``notes``, ``seconds``, ``summary()`` and ``to_pandas()``.  The
-        verdict is certified by default: for all tolerances, or for the doubles given, which it says.  It never comes
-        from the samples.
+        Both print one sentence and a table; ``details()`` tells all.  The verdict is certified by default: for all
+        tolerances, or for the doubles given, which it says.  It never comes from the samples.
 
     Raises
     ------

@@ -79,7 +79,7 @@ def maximise(
         Exhausted: the bounds found so far, ``finished`` False.
     tried : Interval, shape (n,), optional
         Where points are tried, if ``box`` is a box of doubles around exact ranges: the doubles inside each range, or
-        the doubles around it where there is none (then ``lower`` holds for every value between them).
+        those around it where there is none (then ``lower`` holds for every value between them).
 
     Returns
     -------
@@ -285,7 +285,7 @@ def largest_interference(box: ToleranceBox, condition: Condition = "A", **option
     Raises
     ------
     GeometryError
-        For a range of axes, or the rod of the source; "general" without a hole length.
+        For a range of axes, or the rod of the source.
 
     Examples
     --------

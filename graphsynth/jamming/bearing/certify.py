@@ -172,7 +172,7 @@ class JamCertificate:
         return frame.sort_values("start", ignore_index=True)
 
 
-_ANGLES = 64  # angles of the turn tried as positions of a jam
+_ANGLES = 64  # angles of the turn tried as positions of a jam: a multiple of four, so the quarter turns are among them
 _PIECES = 256  # pieces of the turn on which assembly is proved
 
 
@@ -323,7 +323,8 @@ class _Proof:
                 interference = Enclosure.of(depths[0])
             angle = Enclosure.of(corners.phase(box) + pi() / 2)
             return Witness(parameters, angle, interference) if interference.lo > 0.0 else None
-        turn = corners.grid(_ANGLES)  # angles after the phase
+        halves = 2.0 * np.arange(_ANGLES) / _ANGLES
+        turn = pi() * Interval.from_bounds(halves, halves)  # angles after the phase
         tilt = corners.sines(box) if box is not self.box else self.tilt
         amplitude = Interval.from_bounds(tilt.amplitude.lo[0], tilt.amplitude.hi[0])
         sine = corners.sine_of(amplitude * abs(sin(turn)), box.rod)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.checks import choice
 from graphsynth.core.errors import GeometryError
-from graphsynth.intervals import Interval, asin, atan2, cos, hypot, pi, sin
+from graphsynth.intervals import Interval, asin, atan2, cos, hypot, sin
 from graphsynth.intervals.reading import enclose
 from graphsynth.jamming.bearing.bearing import CONDITIONS, Condition
 from graphsynth.jamming.bearing.parameters import ToleranceBox
@@ -366,16 +366,6 @@ def _direction(box: ToleranceBox) -> tuple[Interval, Interval, Interval, Interva
     return unit[0], unit[1], unit[2], alpha
 
 
-def pose_interference(box: ToleranceBox, f: Interval, condition: Condition) -> tuple[Interval, Pose]:
-    """Enclose the interference g (mm) over pieces of the turn for all parameters of the box, with the poses."""
-    check_condition(box, condition)
-    found = pose(box, f)
-    low, high = found.sine.lo, found.sine.hi
-    lower = corner_interference(box, Interval.from_bounds(low, low), condition, 0).lo
-    upper = corner_interference(box, Interval.from_bounds(high, high), condition, 1).hi
-    return Interval.from_bounds(lower, upper), found
-
-
 def corner_interference(box: ToleranceBox, sine: Interval, condition: Condition, corner: int) -> Interval:
     """Interference at the sine given and at the corner of the bearing that makes it smallest (0) or largest (1)."""
 
@@ -392,8 +382,3 @@ def corner_interference(box: ToleranceBox, sine: Interval, condition: Condition,
     # gA falls and gB / C rises with the radius: each at its own end bounds the smaller of both from either side
     b = slanted(sine, end("Rb", True), end("hole_length", True) / 2, c)
     return Interval.from_bounds(np.minimum(a.lo, b.lo), np.minimum(a.hi, b.hi))
-
-
-def grid(count: int) -> Interval:
-    """Return ``count`` angles over the turn, a multiple of four, so that the quarter turns are among them."""
-    return pi() * Interval.from_bounds(2.0 * np.arange(count) / count, 2.0 * np.arange(count) / count)

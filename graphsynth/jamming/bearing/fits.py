@@ -176,11 +176,6 @@ def assess_fits(
     list of FitVerdict
         In the order of ``fits``; certified.
 
-    Raises
-    ------
-    GeometryError
-        Fits that are no list of names.
-
     Examples
     --------
     >>> [v.fit.name for v in assess_fits(ToleranceBox(alpha="1/300")) if v.verdict.is_free][:2]

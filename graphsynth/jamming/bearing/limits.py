@@ -204,11 +204,6 @@ def certified_largest_misalignment(box: ToleranceBox, condition: Condition = "A"
     CertifiedLimit
         An angle that works and one that fails, both proved.
 
-    Raises
-    ------
-    GeometryError
-        For an interference fit, or a condition that lacks its dimensions.
-
     Examples
     --------
     >>> limit = certified_largest_misalignment(ToleranceBox())

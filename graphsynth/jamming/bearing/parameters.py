@@ -115,7 +115,8 @@ class Range:
         return Interval.from_bounds(first, last) if first <= last else Interval.from_bounds(below, above)
 
     def __str__(self) -> str:
-        low, high = (_short(end) for end in (self.lower, self.upper))
+        ends = ((end, exact_text(end)) for end in (self.lower, self.upper))
+        low, high = (text if len(text) <= 24 else f"{float(end):.12g}" for end, text in ends)
         return low if self.is_point else f"[{low}, {high}]"
 
 
@@ -195,12 +196,6 @@ def exact_text(value: Fraction) -> str:
             text = f"{decimal:f}"
             return text if len(text) <= 24 else f"{decimal:e}"
     return f"{value.numerator}/{value.denominator}"
-
-
-def _short(value: Fraction) -> str:
-    """Write a rational number exactly if that is short, else rounded to 12 digits."""
-    text = exact_text(value)
-    return text if len(text) <= 24 else f"{float(value):.12g}"
 
 
 #: Names of the ranges of a box, in a fixed order.

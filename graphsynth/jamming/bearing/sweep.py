@@ -185,10 +185,15 @@ def sweep_linkage(
     >>> len(found.inner), len(found.missing), found.undecided_part < 1e-3
     (2, 0, True)
     """
-    from graphsynth.jamming.bearing.corners import pose_interference
+    from graphsynth.intervals import Interval
+    from graphsynth.jamming.bearing.corners import check_condition, corner_interference, pose
+
+    check_condition(box, condition)
 
     def interference(f: Interval) -> PieceInterference:
-        value, found = pose_interference(box, f, condition)
-        return PieceInterference(value, found.assembled, found.missing)
+        found = pose(box, f)
+        low, high = (Interval.from_bounds(end, end) for end in (found.sine.lo, found.sine.hi))
+        lower, upper = corner_interference(box, low, condition, 0).lo, corner_interference(box, high, condition, 1).hi
+        return PieceInterference(Interval.from_bounds(lower, upper), found.assembled, found.missing)
 
     return sweep_turn(interference, resolution=resolution, max_pieces=max_pieces, max_seconds=max_seconds)

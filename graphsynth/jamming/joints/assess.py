@@ -187,12 +187,7 @@ def assess_coupled(
     -------
     CoupledReport
         Estimated at the samples, with primal and dual values and their gap; with ``certify`` the verdict and the
-        reason are those of the proof.
-
-    Raises
-    ------
-    GeometryError
-        For limits or misalignments that do not fit the mechanism.
+        reason are those of the proof.  `GeometryError` for limits or misalignments that do not fit the mechanism.
 
     Examples
     --------

@@ -89,16 +89,10 @@ class JointLimits:
 
 @dataclass(frozen=True)
 class SlideLimits:
-    """Limits of a straight guide (prismatic joint, or a pin guided in its slot).
+    """Limits of a straight guide (prismatic joint, or a pin guided in its slot), with tolerance boxes.
 
-    Parameters
-    ----------
-    roll, pitch : float
-        Largest tilt about the direction of the guide and about the perpendicular in the plane, radians.
-    axial_clearance : float
-        Axial clearance: largest slip out of the plane to either side, in the length unit of the mechanism.
-    roll_range, pitch_range, axial_clearance_range : (float, float), optional
-        Tolerance boxes.
+    ``roll`` and ``pitch`` are the largest tilts about the direction of the guide and about the perpendicular in the
+    plane, radians; ``axial_clearance`` the largest slip out of the plane to either side, as in `JointLimits`.
     """
 
     roll: float
