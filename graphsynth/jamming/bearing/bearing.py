@@ -47,7 +47,7 @@ class Bearing:
         Radius of the inner cylinder, millimetres; height of the bearing (condition A), or length of the hole (condition
         B), millimetres; zero is a thin plate.
     clearance : float
-        Radial clearance, millimetres; negative means an interference fit.
+        Radial clearance, millimetres, above ``-Rb``; negative means an interference fit.
     hole_length : float, optional
         Length of the hole for condition "general" (pin of height Hb in a hole of that length), millimetres.
 
@@ -56,7 +56,6 @@ class Bearing:
     GeometryError
         A radius that is not positive, a negative height, a clearance of ``-Rb`` or less, a NaN, a size beyond 1e60 or
         between 0 and 1e-60.
-
 
     Examples
     --------

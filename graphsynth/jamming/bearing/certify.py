@@ -199,7 +199,6 @@ def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertifi
     GeometryError
         An unknown condition, or "general" without a hole length.
 
-
     Examples
     --------
     >>> found = certify_jamming(ToleranceBox(alpha="0.0130 +- 0.00013", clearance="0.03 +- 0.003"))

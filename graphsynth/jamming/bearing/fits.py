@@ -73,13 +73,7 @@ class Fit:
 
     @classmethod
     def read(cls, name: str, diameter: Given) -> Fit:
-        """Look up a fit ``H<grade>/<letter><grade>``.
-
-        Raises
-        ------
-        GeometryError
-            For a name that is no text or not in the table, or a diameter outside 0 to 500 mm.
-        """
+        """Look up a fit ``H<grade>/<letter><grade>``; `GeometryError` if it is not in the table, up to 500 mm."""
         if not isinstance(name, str):
             raise GeometryError(f"fit {name!r} is no text; give a name such as H7/g6")
         parts = re.fullmatch(r"H(\d+)/([a-h])(\d+)", name.strip())

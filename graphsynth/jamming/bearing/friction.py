@@ -174,11 +174,7 @@ class InsertionDiagram:
         ----------
         lateral, axial, moment, radius : Given
             Fx, Fz (positive for insertion), the moment at the centre of the tip, and the radius of the peg.
-
-        Raises
-        ------
-        GeometryError
-            If the axial force or the radius is not positive.
+            `GeometryError` unless axial force and radius are positive.
         """
         load = {"axial": axial, "radius": radius, "lateral": lateral, "moment": moment}
         ranges = {name: Range.read(name, value) for name, value in load.items()}

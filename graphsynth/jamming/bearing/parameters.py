@@ -47,10 +47,7 @@ class Range:
     def read(cls, name: str, value: Any) -> Range:
         """Read a number, decimal text, ``"[a, b]"``, ``"a +- b"``, a pair or an `Interval`.
 
-        Raises
-        ------
-        GeometryError
-            For anything that is no finite number, and for reversed bounds; the sentence names the parameter.
+        `GeometryError` for anything that is no finite number, and for reversed bounds; it names the parameter.
         """
         if isinstance(value, Range):
             return value
@@ -233,11 +230,6 @@ class ToleranceBox:
         ``clearance``: radius and height of the bearing, radial clearance, millimetres (17.5, 10, 0.03).
         ``hole_length``: length of the hole for condition "general", millimetres.  ``sgn``, ``rod``, ``convention``: as
         for `TiltedFourBar`.
-
-    Raises
-    ------
-    GeometryError
-        With the parameter, its value and the bound it breaks.
 
     Examples
     --------

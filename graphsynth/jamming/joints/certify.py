@@ -211,7 +211,6 @@ def certify_coupled(
         Certified, with exact tilts; UNDECIDED with a reason rather than a guess.  `GeometryError` for limits or
         misalignments that do not fit the mechanism, and fewer than two assembled samples.
 
-
     Examples
     --------
     >>> from graphsynth import Mechanism

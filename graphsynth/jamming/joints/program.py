@@ -232,10 +232,10 @@ def _bounds(M: Array, F: Array, W: Array, found: ConeSolution) -> tuple[Array, A
     return np.where(np.isnan(lower), 0.0, np.maximum(lower, 0.0)), upper, tau
 
 
-Found: TypeAlias = tuple[Array, Array, Array] | None
+_Scaled: TypeAlias = tuple[Array, Array, Array] | None
 
 
-def _write(rows: _Rows, poses: NDArray[np.intp], y: Array, found: Found, mode: Mode, out: PoseSolution) -> None:
+def _write(rows: _Rows, poses: NDArray[np.intp], y: Array, found: _Scaled, mode: Mode, out: PoseSolution) -> None:
     """Write bounds, tilts and slips of the scaled program into ``out``; without them only the wrenches."""
     t, s, costly, pushed = rows.t, rows.s, rows.costly, rows.pushed
     out.tau[np.ix_(poses, np.flatnonzero(np.isinf(t)))] = np.nan

@@ -328,7 +328,6 @@ def compare_sensitivities(
     GeometryError
         ``by`` not positive; a motion without an assembled sample.
 
-
     Examples
     --------
     >>> from graphsynth import Mechanism
