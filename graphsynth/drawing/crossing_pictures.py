@@ -46,9 +46,6 @@ def _distance(R: float, a: float, b: float, t: Array) -> Array:
     return np.asarray(1.0 / np.hypot(np.cos(t) / a, np.sin(t) / b) - R)
 
 
-# -- crossings ---------------------------------------------------------------------------------------------------------
-
-
 def crossing_picture(problem: CircleEllipse, boxes: IntersectionBoxes | None = None) -> Figure:
     """Draw the four crossings of a circle and an ellipse with tolerances; one of them enlarged, and unrolled.
 
@@ -174,9 +171,6 @@ def _paving(axes: Any, boxes: IntersectionBoxes) -> None:
             (x0, y0), (x1, y1) = group.lo.T, group.hi.T
             corners = np.stack([np.column_stack(p) for p in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))], axis=1)
             axes.add_collection(PolyCollection(list(corners), zorder=4, label=label, **style), autolim=False)
-
-
-# -- the region between the curves -------------------------------------------------------------------------------------
 
 
 def region_picture(problem: CircleEllipse, exaggeration: float | None = None) -> Figure:

@@ -229,6 +229,7 @@ def spectral_radius(problem: CircleEllipse, box: Interval) -> float:
 
     As ``I - Y mid L = 0``, it is the radius of ``|Y| rad L``; infinite where mid L is singular (a circle, or a box at
     the origin).
+
     >>> box = Interval.from_bounds([4.0, 2.9], [4.1, 3.0])
     >>> round(spectral_radius(circle_ellipse(5, 6, 4), box), 4)
     0.0733

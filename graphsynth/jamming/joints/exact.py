@@ -120,9 +120,6 @@ def neglected(
     return Neglected(moved_r, along, shift, lift, wide, narrow, play, np.asarray(sound & small))
 
 
-# -- angles and lengths ------------------------------------------------------------------------------------------------
-
-
 def _angles(system: Positions, layout: Layout, blocks: Array) -> _Angles:
     """Largest angles: shortest paths from the frame through the joints whose tilt is bounded."""
     mechanism = system.mechanism
@@ -179,9 +176,6 @@ def _slips(system: Positions, layout: Layout, angles: _Angles, lengths: Array) -
     a, b = zip(*((joint.a, joint.b) for joint in mechanism.joints))
     found = np.minimum(play, (top[:, a] + top[:, b]) / np.cos(LARGEST)) * _ROUNDING
     return found, np.asarray(np.isfinite(found).all(axis=1))
-
-
-# -- the plane ---------------------------------------------------------------------------------------------------------
 
 
 def _disturbances(system: Positions, angles: _Angles, lengths: Array, offset: Array) -> tuple[Array, Array]:
@@ -269,9 +263,6 @@ def _moved(values: list[Any]) -> Moved:
     third = len(values) // 3
     offsets = map(Pair, values[:third], values[third : 2 * third])
     return list(zip(offsets, values[2 * third :]))
-
-
-# -- out of the plane --------------------------------------------------------------------------------------------------
 
 
 def _limits(system: Positions, layout: Layout, angles: _Angles, blocks: Array) -> tuple[Array, Array]:

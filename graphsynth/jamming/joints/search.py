@@ -157,9 +157,7 @@ class MemberWitness:
             tilts = {name: getattr(own, name) for name in own.tilts}
             limits.append({"joint": list(joint.pair), **tilts, "play": own.axial_clearance})
         return {
-            "input": self.input,
-            "factor": self.factor,
-            "exact": self.exact,
+            **{name: getattr(self, name) for name in ("input", "factor", "exact")},
             "misalignments": [
                 {"base": m.base, "link": m.link, "alpha": m.alpha, "direction": m.direction} for m in self.misalignments
             ],
