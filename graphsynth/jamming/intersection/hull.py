@@ -45,10 +45,9 @@ class Exact(NamedTuple):
         """Whether it holds one number only."""
         return self.lo == self.hi
 
-
-def outward(lo: Fraction, hi: Fraction) -> Interval:
-    """Return the tightest interval of doubles around two rational numbers."""
-    return Interval.from_bounds(lower_bound(lo) + 0.0, upper_bound(hi) + 0.0)  # no negative zero
+    def outward(self) -> Interval:
+        """Return the tightest interval of doubles around it."""
+        return Interval.from_bounds(lower_bound(self.lo) + 0.0, upper_bound(self.hi) + 0.0)  # no negative zero
 
 
 def exact_range(name: str, value: Any) -> Exact:
@@ -359,8 +358,8 @@ def _empty(problem: CircleEllipse, reason: Reason) -> IntersectionHull:
 def _result(
     problem: CircleEllipse, status: Status, reasons: tuple[Reason, ...], u: Exact, v: Exact, tight: bool = True
 ) -> IntersectionHull:
-    squares = Interval.stack([outward(*u), outward(*v)])
-    hull = Interval.stack([outward(root_bounds(r.lo).lo, root_bounds(r.hi).hi) for r in (u, v)])
+    squares = Interval.stack([u.outward(), v.outward()])
+    hull = Interval.stack([Exact(root_bounds(r.lo).lo, root_bounds(r.hi).hi).outward() for r in (u, v)])
     return IntersectionHull(problem, status, reasons, hull, squares, tight)
 
 
