@@ -6,7 +6,7 @@ import math
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -161,7 +161,8 @@ class Evaluated:
     """Sets of the lattice with everything that is known of each, arrays of shape (n,).
 
     `lengths` (n, 4): frame, crank, coupler, rocker in units of the lattice (exact); `kind`, `type`: exact, see
-    `classify`; `size`: longest length over the crank; `passes`: keeps the limits of the scene.
+    `classify`; `size`: longest length over the crank; `passes`: keeps the limits of the scene;
+    `rejected`: sets by the first limit that they miss.
     """
 
     sets: Ints
@@ -172,6 +173,7 @@ class Evaluated:
     jamming: Jamming
     size: Array
     passes: NDArray[np.bool_]
+    rejected: dict[str, int]
 
     def quantity(self, name: str) -> Array:
         """Return a margin of `QUANTITIES` by set, in its unit."""
@@ -220,19 +222,18 @@ def evaluate_sets(context: Context, lattice: Lattice, sets: Ints) -> Evaluated:
     moved = move(lengths, table.positions)
     jamming = close_form(table, lengths)
     size = lengths.max(axis=1) / lattice.crank
-    done = Evaluated(sets, lengths, kind, types, moved, jamming, size, np.zeros(len(sets), dtype=np.bool_))
-    return replace(done, passes=np.all(list(_kept(table, done).values()), axis=0))
-
-
-def _kept(table: SurveyTable, done: Evaluated) -> dict[str, NDArray[np.bool_]]:
-    """Return which sets keep each limit, by the words that reject the others, in the order of asking."""
+    done = Evaluated(sets, lengths, kind, types, moved, jamming, size, np.ones(len(sets), dtype=np.bool_), {})
     least = round(Unit.parse("deg").from_si(table.limits.transmission), 9)
-    return {
+    limits = {
         "the crank does not turn fully": done.kind == KINDS.index("full turn"),
         f"not {' or '.join(table.limits.types)}": np.isin(done.type, [TYPES.index(t) for t in table.limits.types]),
         "the transmission angle is too small": done.rounded("transmission angle") >= least,
-        "the bearing binds at the tilt of the scene": (done.jamming.part == 0.0) | (not table.limits.free),
+        "the bearing binds at the tilt of the scene": (jamming.part == 0.0) | (not table.limits.free),
     }
+    for words, kept in limits.items():
+        done.rejected[words] = int(np.sum(done.passes & ~kept))
+        done.passes[~kept] = False
+    return done
 
 
 def evaluate(context: Context, shard: Shard) -> tuple[Evaluated, dict[str, Any]]:
@@ -251,21 +252,12 @@ def evaluate(context: Context, shard: Shard) -> tuple[Evaluated, dict[str, Any]]
         "sets": len(done.sets),
         "positions": int(done.moved.positions),
         "classes": [[*what, count] for what, count in sorted(classes.items())],
-        "rejected": _rejected(context.scene.mechanism, done),
+        "rejected": done.rejected,
         "maps": _maps(lattice, done),
         "passing": len(passing),
         "front": done.sets[passing[front_of(losses)]].tolist(),
         "losses": b64encode(np.column_stack([done.sets[passing], losses]).astype("<f8").tobytes()).decode(),
     }
-
-
-def _rejected(table: SurveyTable, done: Evaluated) -> dict[str, int]:
-    """Count the sets that a limit rejects; each is counted at the first limit it misses."""
-    left, found = np.ones(len(done.sets), dtype=np.bool_), {}
-    for words, kept in _kept(table, done).items():
-        found[words] = int(np.sum(left & ~kept))
-        left &= kept
-    return found
 
 
 def _maps(lattice: Lattice, done: Evaluated) -> dict[str, list[Any]]:
