@@ -14,11 +14,11 @@ from graphsynth.cli import main
 from graphsynth.core import journal as journals
 from graphsynth.core.errors import FormatError, GraphsynthError
 from graphsynth.core.journal import Journal, Work, digest_of
-from graphsynth.synthesis.problem import Problem
+from graphsynth.synthesis.problem import EnumerationProblem
 from graphsynth.synthesis.writing import count_with_checkpoint, write_listing
 
 WORK = Work("count", "the question", digest_of("question", 1))
-TWELVE = Problem.chains(12, 1, 3, None, False, None)
+TWELVE = EnumerationProblem.chains(12, 1, 3, None, False, None)
 COUNT = 6856
 
 

@@ -22,7 +22,7 @@ from graphsynth.core.errors import SpecError, TooLargeError
 from graphsynth.synthesis.chunks import Chunk, estimates
 
 if TYPE_CHECKING:
-    from graphsynth.synthesis.problem import Problem, WorkItem
+    from graphsynth.synthesis.problem import EnumerationProblem, WorkItem
 
 
 Watch = Callable[[BuildStep], None]
@@ -93,7 +93,7 @@ def _family(
         finish_family(connection, family_id)
 
 
-def expected_of(problem: Problem, executor: Executor | None) -> int:
+def expected_of(problem: EnumerationProblem, executor: Executor | None) -> int:
     """Count the chains of a family without listing them."""
     from graphsynth.synthesis.problem import counts
 
@@ -134,14 +134,14 @@ class Task:
     piece: WorkItem  # its weight bounds the work
 
 
-def problem_of(links: int, mobility: int, fractionated: bool) -> Problem:
+def problem_of(links: int, mobility: int, fractionated: bool) -> EnumerationProblem:
     """State the enumeration of a family.
 
     Raises `SpecError, TooLargeError` for numbers out of their bounds.
     """
-    from graphsynth.synthesis.problem import Problem
+    from graphsynth.synthesis.problem import EnumerationProblem
 
-    return Problem.chains(links, mobility, 3, None, fractionated, None)
+    return EnumerationProblem.chains(links, mobility, 3, None, fractionated, None)
 
 
 def tasks_of(links: int, mobility: int, fractionated: bool) -> list[Task]:
@@ -179,7 +179,7 @@ def _parts(piece: Chunk, size: float) -> Iterator[Chunk]:
         yield replace(piece, part=part, parts=piece.parts * times, weight=piece.weight / times)
 
 
-def fingerprint(problem: Problem, tasks: list[Task]) -> str:
+def fingerprint(problem: EnumerationProblem, tasks: list[Task]) -> str:
     """Short text that differs when the question or its cut differ: pieces of two cuts are never mixed."""
     return sha256(f"{problem.signature} {len(tasks)} {[task.piece.weight for task in tasks]}".encode()).hexdigest()[:16]
 

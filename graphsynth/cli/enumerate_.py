@@ -17,7 +17,7 @@ from graphsynth.core.errors import GraphsynthError, SpecError, TooLargeError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from graphsynth.synthesis.problem import Problem
+    from graphsynth.synthesis.problem import EnumerationProblem
 
 BIG = 5e7  # labellings (before sparsity) from which all cores are used
 
@@ -104,7 +104,7 @@ def _write_whole(blocks: Iterable[bytes], options: argparse.Namespace) -> int:
     return write((graph for data in blocks for graph in read_stream(BytesIO(data), "text")), options.output)
 
 
-def _check_disk(problem: Problem, options: argparse.Namespace) -> None:
+def _check_disk(problem: EnumerationProblem, options: argparse.Namespace) -> None:
     """Refuse at once a listing that cannot fit the disk."""
     from graphsynth.synthesis.writing import estimated_size
 

@@ -10,7 +10,7 @@ from graphsynth.core.errors import SpecError
 
 if TYPE_CHECKING:
     from graphsynth.structure.system.spec import StructuralSpec
-    from graphsynth.synthesis.problem import Problem
+    from graphsynth.synthesis.problem import EnumerationProblem
 
 _VARIABLES = {
     "mobility": ("W", "mobility"),
@@ -61,9 +61,9 @@ def spec_of(options: argparse.Namespace) -> StructuralSpec:
     return StructuralSpec(**question)
 
 
-def problem_of(options: argparse.Namespace) -> Problem:
+def problem_of(options: argparse.Namespace) -> EnumerationProblem:
     """Return what ``count`` and ``enumerate`` are asked to do."""
-    from graphsynth.synthesis.problem import Problem
+    from graphsynth.synthesis.problem import EnumerationProblem
 
     given = _given(options)
     if options.assur is not None or options.truss is not None:
@@ -80,12 +80,12 @@ def problem_of(options: argparse.Namespace) -> Problem:
         if not space.isdecimal():
             raise SpecError(f"Pi = {space} must be a whole number from 2 to 6")
         links = options.truss if options.assur is None else options.assur + 1
-        return Problem.trusses(links, int(space), options.assur is not None)
+        return EnumerationProblem.trusses(links, int(space), options.assur is not None)
     if options.frame or options.spec or options.set or set(given) - _OF_CHAINS:
         spec = spec_of(options)
         if spec.bounds("W") == (None, None) and "p" not in spec.ranges:
             spec = spec.replace(W=1)  # the default of chains
-        return Problem.mechanisms(spec, options.symmetry)
+        return EnumerationProblem.mechanisms(spec, options.symmetry)
     for symbol, text in given.items():
         if not text.isdecimal():
             raise SpecError(f"{symbol} = {text} must be a whole number for chains; with --frame it may be a range")
@@ -94,7 +94,7 @@ def problem_of(options: argparse.Namespace) -> Problem:
     asked = {symbol: int(text) for symbol, text in given.items()}
     joints = {int(symbol[1:]): count for symbol, count in asked.items() if symbol[0] == "p"}
     plane, mobility = asked.get("Pi", 3), asked.get("W", 1)
-    return Problem.chains(asked["N"], mobility, plane, joints, options.fractionated, options.symmetry)
+    return EnumerationProblem.chains(asked["N"], mobility, plane, joints, options.fractionated, options.symmetry)
 
 
 def shard(text: str) -> tuple[int, int]:

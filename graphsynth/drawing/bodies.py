@@ -36,7 +36,7 @@ class Guide:
 
 
 @dataclass(slots=True)
-class Body:
+class LinkBody:
     """One link: where other links or named points are attached, its guides, pitch circles and cams."""
 
     link: int
@@ -62,9 +62,9 @@ def world(poses: Array, link: int, point: complex) -> Complex:
     return np.asarray(pose[:, 0] + 1j * pose[:, 1] + np.exp(1j * pose[:, 2]) * point)
 
 
-def bodies(mechanism: Mechanism, poses: Array, reserve: float) -> list[Body]:
+def bodies(mechanism: Mechanism, poses: Array, reserve: float) -> list[LinkBody]:
     """Return what each link shows over the poses; guides are ``reserve`` longer at both ends than the travel."""
-    found = [Body(link) for link in range(mechanism.graph.links)]
+    found = [LinkBody(link) for link in range(mechanism.graph.links)]
     for joint in mechanism.joints:
         a, b = found[joint.a], found[joint.b]
         at_a, at_b = complex(*joint.at_a), complex(*joint.at_b)

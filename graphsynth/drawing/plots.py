@@ -188,11 +188,14 @@ _FEW = 20_000
 
 
 def new_figure(size: tuple[float, float]) -> Figure:
-    """Return an empty figure of a size in inches."""
+    """Return an empty figure of a size in inches; a notebook shows it as it is drawn, pyplot or not."""
     from matplotlib.figure import Figure
 
-    figure: Figure = Figure(figsize=size, layout="constrained")
-    return figure
+    class Shown(Figure):
+        def _repr_svg_(self) -> str:
+            return themed_svg(self)
+
+    return Shown(figsize=size, layout="constrained")
 
 
 def legend_place(points: int) -> str:

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.drawing.bodies import Body, Guide, outline, rounded, thickness, world
+from graphsynth.drawing.bodies import Guide, LinkBody, outline, rounded, thickness, world
 from graphsynth.drawing.palette import TRACE_COLOURS
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.mechanism.joints import Cam, PinSlot, Prismatic, Revolute
@@ -38,7 +38,7 @@ class Plan:
     mechanism: Mechanism
     poses: Array
     sketch: Sketch
-    bodies: list[Body]
+    bodies: list[LinkBody]
     grounded: bool
 
     @property
@@ -66,7 +66,7 @@ def draw_traces(plan: Plan) -> None:
             plan.sketch.trace(path.tolist(), TRACE_COLOURS[k % len(TRACE_COLOURS)], 2.0)
 
 
-def draw_link(plan: Plan, body: Body) -> None:
+def draw_link(plan: Plan, body: LinkBody) -> None:
     """Pitch circles, guides, and the bar or plate that joins what is attached."""
     sketch, link = plan.sketch, body.link
     for centre, radius, gear in body.wheels:
@@ -325,7 +325,7 @@ def _along(corners: list[complex], step: float) -> list[complex]:
     return found
 
 
-def _beside(body: Body, px: float) -> list[complex]:
+def _beside(body: LinkBody, px: float) -> list[complex]:
     """Candidates for a number: inside a wide plate, beside the longest side of another link, above a block."""
     corners = outline(body.vertices(), 2.0 * px)
     if len(corners) > 2 and thickness(corners) > 26.0 * px:

@@ -15,7 +15,7 @@ from graphsynth.dynamics.forms.one_coordinate import OneCoordinateForm, one_coor
 from graphsynth.dynamics.friction.problem import FrictionSolution
 from graphsynth.dynamics.model import Rack, Rigid
 from graphsynth.dynamics.reactions import reactions_from_multipliers, world
-from graphsynth.dynamics.result import Checks, FrictionHistory, MotorHistory
+from graphsynth.dynamics.result import FrictionHistory, MotorHistory, RunChecks
 from graphsynth.dynamics.start import StartReport
 from graphsynth.dynamics.switching import motor_torques, shaft_speeds
 from graphsynth.dynamics.tables import Compiled
@@ -113,10 +113,10 @@ def energy_error(times: Array, kinetic: Array, potential: Array, work: Array, po
 
 def checks_of(
     compiled: Compiled, times: Array, balances: list[Balance], work: Array, second: list[Array | None]
-) -> Checks:
+) -> RunChecks:
     """Collect the checks of all states reached; those of the run as a whole are left open."""
     if not balances:
-        return Checks()
+        return RunChecks()
     kinetic, potential, power = (
         np.array([getattr(b, name) for b in balances]) for name in ("kinetic", "potential", "power")
     )
@@ -132,7 +132,7 @@ def checks_of(
         for b, other, size in zip(balances, second, sizes)
         if other is not None
     ]
-    return Checks(
+    return RunChecks(
         max(b.position for b in balances),
         max(b.velocity for b in balances),
         energy_error(times[:n], kinetic, potential, work[:n], power, np.array([b.bodies for b in balances])),
@@ -173,7 +173,7 @@ def electric_error(compiled: Compiled, times: Array, tail: Array, motors: tuple[
     return error / scale if scale > 0.0 else 0.0
 
 
-def warnings_of(checks: Checks, rtol: float, friction: FrictionHistory | None = None) -> tuple[str, ...]:
+def warnings_of(checks: RunChecks, rtol: float, friction: FrictionHistory | None = None) -> tuple[str, ...]:
     """Say which checks are worse than expected, each in a sentence."""
     found = [
         f"{', '.join(names)} stick together in a loop: how they share their friction is not determined, and the "

@@ -64,7 +64,7 @@ class MotorHistory(NamedTuple):
     output: Array
 
 
-class Checks(NamedTuple):
+class RunChecks(NamedTuple):
     """Numbers that tell whether a result can be trusted (theory/planar-dynamics 8); NaN where a check does not apply.
 
     ``position_drift``, ``velocity_drift``: largest violation of scaled rows at the output times (lengths over the
@@ -146,7 +146,7 @@ class DynamicMotion:
     reached: float
     events: tuple[DynamicEvent, ...]
     start: StartReport
-    checks: Checks
+    checks: RunChecks
     warnings: tuple[str, ...]
     error_estimate: Array | None
     form: str

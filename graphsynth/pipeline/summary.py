@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -144,7 +145,8 @@ def _nothing_left(records: Sequence[Record]) -> list[Finding]:
 
 def _rejected(records: Sequence[Record]) -> list[Finding]:
     """Count the reasons of those that were rejected."""
-    causes = _counted(r.cause or r.reason for r in records if r.status in ("rejected", "failed"))
+    ended = (r.cause or r.reason for r in records if r.status in ("rejected", "failed"))
+    causes = _counted(re.sub(r"^[a-z_]+: (?=no )", "", cause) for cause in ended)  # without the name of the stage
     total = sum(count for _, count in causes)
     if not causes:
         return []

@@ -9,7 +9,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, overload
 
 from graphsynth.core.errors import GraphError
-from graphsynth.synthesis.problem import Problem, counts, graphs
+from graphsynth.synthesis.problem import EnumerationProblem, counts, graphs
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
@@ -67,11 +67,11 @@ class Graphs(Iterator["MechanismGraph"]):
         return f"<p>{escape(self._what)}</p>{pictures}{more}"
 
 
-def _list(what: str, problem: Problem, executor: Executor | None) -> Graphs:
+def _list(what: str, problem: EnumerationProblem, executor: Executor | None) -> Graphs:
     return Graphs(what, lambda: graphs(problem.work_items(listing=True), executor))
 
 
-def _count(problem: Problem, executor: Executor | None) -> int:
+def _count(problem: EnumerationProblem, executor: Executor | None) -> int:
     return sum(counts(problem.work_items(listing=False), executor))
 
 
@@ -125,7 +125,7 @@ def enumerate_chains(
     >>> [chain.graph6() for chain in enumerate_chains(6)]
     ['Er`G', 'E]`G']
     """
-    problem = Problem.chains(links, mobility, space, joints_by_mobility, fractionated, symmetry)
+    problem = EnumerationProblem.chains(links, mobility, space, joints_by_mobility, fractionated, symmetry)
     return _list(f"chains of {links} links, mobility {mobility}", problem, executor)
 
 
@@ -160,7 +160,7 @@ def count_chains(
     >>> [count_chains(n) for n in (4, 6, 8, 10, 12, 14)]
     [1, 2, 16, 230, 6856, 318162]
     """
-    problem = Problem.chains(links, mobility, space, joints_by_mobility, fractionated, symmetry)
+    problem = EnumerationProblem.chains(links, mobility, space, joints_by_mobility, fractionated, symmetry)
     return _count(problem, executor)
 
 
@@ -194,7 +194,7 @@ def enumerate_mechanisms(
     >>> sum(1 for _ in enumerate_mechanisms(StructuralSpec(W=1, links=8)))
     71
     """
-    return _list("mechanisms that answer the question", Problem.mechanisms(spec, symmetry), executor)
+    return _list("mechanisms that answer the question", EnumerationProblem.mechanisms(spec, symmetry), executor)
 
 
 def count_mechanisms(
@@ -219,7 +219,7 @@ def count_mechanisms(
     >>> count_mechanisms(StructuralSpec(W=1, Pi=3, v_ct=6, p=22, p2=3, n=14, t0=7, n4=4))
     9663907
     """
-    return _count(Problem.mechanisms(spec, symmetry), executor)
+    return _count(EnumerationProblem.mechanisms(spec, symmetry), executor)
 
 
 def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) -> list[MechanismGraph]:
@@ -252,7 +252,7 @@ def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) 
     """
     from graphsynth.synthesis.sampling import sample
 
-    return sample(Problem.mechanisms(spec, None), k, seed)
+    return sample(EnumerationProblem.mechanisms(spec, None), k, seed)
 
 
 def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | None = None) -> Graphs:
@@ -276,7 +276,7 @@ def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | N
     >>> [group.to_text() for group in enumerate_assur_groups(2)]
     ['Bw f0']
     """
-    return _list(f"Assur groups of {links} links", Problem.groups(links, space), executor)
+    return _list(f"Assur groups of {links} links", EnumerationProblem.groups(links, space), executor)
 
 
 def count_assur_groups(links: int, *, space: int = 3, executor: Executor | None = None) -> int:
@@ -296,7 +296,7 @@ def count_assur_groups(links: int, *, space: int = 3, executor: Executor | None 
     >>> [count_assur_groups(n) for n in (2, 4, 6, 8, 10)]
     [1, 2, 10, 173, 5438]
     """
-    return _count(Problem.groups(links, space), executor)
+    return _count(EnumerationProblem.groups(links, space), executor)
 
 
 def enumerate_baranov_trusses(links: int, *, space: int = 3, executor: Executor | None = None) -> Graphs:
@@ -318,7 +318,7 @@ def enumerate_baranov_trusses(links: int, *, space: int = 3, executor: Executor 
     >>> sum(1 for _ in enumerate_baranov_trusses(9))
     28
     """
-    return _list(f"Baranov trusses of {links} links", Problem.trusses(links, space, False), executor)
+    return _list(f"Baranov trusses of {links} links", EnumerationProblem.trusses(links, space, False), executor)
 
 
 def count_baranov_trusses(links: int, *, space: int = 3, executor: Executor | None = None) -> int:
@@ -338,4 +338,4 @@ def count_baranov_trusses(links: int, *, space: int = 3, executor: Executor | No
     >>> [count_baranov_trusses(n) for n in (3, 5, 7, 9, 11)]
     [1, 1, 3, 28, 562]
     """
-    return _count(Problem.trusses(links, space, False), executor)
+    return _count(EnumerationProblem.trusses(links, space, False), executor)

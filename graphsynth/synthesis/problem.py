@@ -45,7 +45,7 @@ WorkItem = Chunk | OneByOne
 
 
 @dataclass(frozen=True)
-class Problem:
+class EnumerationProblem:
     """What to enumerate or to count."""
 
     title: str  # one line for people; also identifies the problem when interrupted work is resumed
@@ -76,7 +76,7 @@ class Problem:
         symmetry: int | None,
         *,
         framed: bool = False,
-    ) -> Problem:
+    ) -> EnumerationProblem:
         """State the enumeration of chains (of mechanisms with every frame, if ``framed``).
 
         Raises `SpecError` for a value out of its bounds, `TooLargeError` for more loops than there are contracted
@@ -100,7 +100,7 @@ class Problem:
         return cls(title + (f" symmetry={order}" if order else ""), tuple(families), tuple(one_by_one), order)
 
     @classmethod
-    def mechanisms(cls, question: StructuralSpec | LinkAssortment, symmetry: int | None) -> Problem:
+    def mechanisms(cls, question: StructuralSpec | LinkAssortment, symmetry: int | None) -> EnumerationProblem:
         """State the enumeration of the mechanisms that answer a structural question.
 
         Raises `SpecError` for what is none, `InfeasibleSpecError` for one without an answer, `TooLargeError` for more
@@ -145,12 +145,12 @@ class Problem:
         return cls(title, tuple(families), tuple(one_by_one), order)
 
     @classmethod
-    def groups(cls, moving: int, space: int) -> Problem:
+    def groups(cls, moving: int, space: int) -> EnumerationProblem:
         """State the enumeration of Assur groups with a number of moving links; see `trusses`."""
         return cls.trusses(whole(moving, "moving links", 1, MOST_LINKS - 1) + 1, space, True)
 
     @classmethod
-    def trusses(cls, links: int, space: int, framed: bool) -> Problem:
+    def trusses(cls, links: int, space: int, framed: bool) -> EnumerationProblem:
         """State the enumeration of Baranov trusses (of Assur groups, if ``framed``).
 
         Raises `SpecError` for a number of links out of its bounds, `TooLargeError` for more loops than there are
@@ -167,7 +167,7 @@ class Problem:
 
 
 @lru_cache(maxsize=4)
-def _work_items(problem: Problem, listing: bool) -> tuple[WorkItem, ...]:
+def _work_items(problem: EnumerationProblem, listing: bool) -> tuple[WorkItem, ...]:
     return (*problem.one_by_one, *cut(problem.families, listing=listing, symmetry=problem.symmetry))
 
 
@@ -310,7 +310,7 @@ def processes(workers: int) -> AbstractContextManager[Executor | None]:
 
 
 def _compile_kernels() -> None:
-    smallest = Problem.chains(6, 1, 3, None, False, None)
+    smallest = EnumerationProblem.chains(6, 1, 3, None, False, None)
     for item in smallest.work_items(listing=False):
         item.count()
     for item in smallest.work_items(listing=True):

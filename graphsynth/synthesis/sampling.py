@@ -22,12 +22,12 @@ from graphsynth.synthesis.families import Family
 from graphsynth.synthesis.kernels.counting import count_block, decode_fixed, open_fixed
 from graphsynth.synthesis.kernels.expanding import expand_packed
 from graphsynth.synthesis.kernels.layout import HEADER
-from graphsynth.synthesis.problem import Problem
+from graphsynth.synthesis.problem import EnumerationProblem
 
 _PAIRS = 1 << 16
 
 
-def sample(problem: Problem, k: int, seed: int) -> list[MechanismGraph]:
+def sample(problem: EnumerationProblem, k: int, seed: int) -> list[MechanismGraph]:
     """Draw k graphs of a problem, independently and exactly uniformly.
 
     Raises `SpecError` if k is negative, the seed no whole number, or the problem asks for a symmetry or for levels.

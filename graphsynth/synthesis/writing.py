@@ -21,7 +21,7 @@ from graphsynth.core.journal import Journal, Work, digest_of
 from graphsynth.core.ordered import in_order
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis.chunks import Chunk
-from graphsynth.synthesis.problem import Problem, WorkItem, counts, graphs, texts
+from graphsynth.synthesis.problem import EnumerationProblem, WorkItem, counts, graphs, texts
 from graphsynth.synthesis.shards import shard_of
 
 _SAMPLED = 16  # items made to estimate the size of a listing
@@ -35,7 +35,9 @@ class Step:
     done: float  # share of the work done, 0..1, by the bounds on the items
 
 
-def _work(problem: Problem, items: Sequence[WorkItem], form: str, remedy: str, again: str = "the same command") -> Work:
+def _work(
+    problem: EnumerationProblem, items: Sequence[WorkItem], form: str, remedy: str, again: str = "the same command"
+) -> Work:
     """State what a journal is of: the question and its cut."""
     cut = [(repr(item.weight), *(getattr(item, name, 0) for name in ("start", "stop", "part"))) for item in items]
     return Work(form, problem.title, digest_of(problem.signature, form, cut), remedy=remedy, again=again)
@@ -55,7 +57,7 @@ def _json_lines(item: WorkItem) -> tuple[bytes, int]:
 
 
 def write_listing(
-    problem: Problem,
+    problem: EnumerationProblem,
     path: Path,
     *,
     shard: tuple[int, int] | None = None,
@@ -113,7 +115,7 @@ def _blocks(items: Sequence[WorkItem], form: str, executor: Executor | None) -> 
 
 
 def estimated_size(
-    problem: Problem, path: Path, shard: tuple[int, int] | None = None, *, enough: float = 0.0
+    problem: EnumerationProblem, path: Path, shard: tuple[int, int] | None = None, *, enough: float = 0.0
 ) -> tuple[float, float]:
     """Return about how many graphs, and bytes, a listing to a file has; their bounds if these bytes are enough.
 
@@ -175,7 +177,7 @@ def _graphs_of_complete(path: Path, items: Sequence[WorkItem], form: str) -> int
 
 
 def count_with_checkpoint(
-    problem: Problem,
+    problem: EnumerationProblem,
     *,
     shard: tuple[int, int] | None = None,
     checkpoint: Path | None = None,

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from graphsynth import StructuralSpec, count_chains, count_mechanisms, enumerate_chains
-from graphsynth.synthesis.problem import Problem
+from graphsynth.synthesis.problem import EnumerationProblem
 from graphsynth.synthesis.writing import write_listing
 
 FILTER = Path(__file__).with_name("sparse_filter.c")
@@ -28,7 +28,7 @@ def compiled(tmp_path_factory):
     """Compile, or load from the cache, everything that is timed."""
     count_chains(8)
     count_mechanisms(StructuralSpec(W=1, links=8))
-    write_listing(Problem.chains(8, 1, 3, None, False, None), tmp_path_factory.mktemp("warm") / "chains.g6")
+    write_listing(EnumerationProblem.chains(8, 1, 3, None, False, None), tmp_path_factory.mktemp("warm") / "chains.g6")
 
 
 def repeat(benchmark, function, rounds=5):
@@ -44,7 +44,7 @@ def fresh(tmp_path):
 
 def listing(links, path):
     """List chains to a file, as ``graphsynth enumerate --links N -o FILE`` does."""
-    return write_listing(Problem.chains(links, 1, 3, None, False, None), path)
+    return write_listing(EnumerationProblem.chains(links, 1, 3, None, False, None), path)
 
 
 @pytest.mark.parametrize(("links", "count"), [(12, 6856), (14, 318162), (16, 19819281)])
@@ -65,7 +65,7 @@ def test_list_chains_as_graphs(benchmark, links, count):
 
 
 def test_list_mechanisms_to_disk(benchmark, fresh):
-    problem = Problem.mechanisms(StructuralSpec(W=1, links=12), None)
+    problem = EnumerationProblem.mechanisms(StructuralSpec(W=1, links=12), None)
     assert repeat(benchmark, lambda: write_listing(problem, fresh())) == 75397
 
 

@@ -21,7 +21,7 @@ from graphsynth.dynamics import (
 from graphsynth.dynamics.checks import warnings_of
 from graphsynth.dynamics.forms.one_coordinate import OneCoordinateForm
 from graphsynth.dynamics.integrate import make_form
-from graphsynth.dynamics.result import Checks
+from graphsynth.dynamics.result import RunChecks
 from graphsynth.dynamics.stepping import CvodeStepper
 from graphsynth.dynamics.tables import compile_model
 from graphsynth.mechanism.joints import Prismatic, Revolute
@@ -196,7 +196,7 @@ def test_an_output_without_a_pose_is_a_failure(monkeypatch):
 
 
 def test_a_check_without_a_value_is_a_warning():
-    good = Checks(*[0.0] * 10)
+    good = RunChecks(*[0.0] * 10)
     assert warnings_of(good, 1e-9) == ()
     assert "no value of energy" in warnings_of(good._replace(energy=math.nan), 1e-9)[0]
 

@@ -15,7 +15,7 @@ from graphsynth.dynamics.friction.loads import _real_roots
 from graphsynth.dynamics.integrate import scales
 from graphsynth.dynamics.kernels.rubbing import friction_unit
 from graphsynth.dynamics.kernels.systems import pull
-from graphsynth.dynamics.result import Checks
+from graphsynth.dynamics.result import RunChecks
 from graphsynth.dynamics.start import consistent_start
 from graphsynth.dynamics.tables import compile_model
 from graphsynth.mechanism.joints import Prismatic, Revolute
@@ -66,7 +66,7 @@ def test_complex_roots_are_none():
 
 
 def test_warnings_begin_at_their_bounds():
-    good = Checks(*[0.0] * 10)
+    good = RunChecks(*[0.0] * 10)
     for name, bound in (("energy", 1e-7), ("position_drift", 1e-9), ("power", 1e-9), ("dalembert", 1e-9),
                         ("second_form", 1e-7), ("electric", 1e-7)):  # fmt: skip
         assert warnings_of(good._replace(**{name: 0.9 * bound}), 1e-9) == ()

@@ -72,9 +72,12 @@ def test_a_mechanism_that_does_not_move_through_the_range_is_no_problem_but_a_re
         planar.positions(context, QUICK)
 
 
-def test_searches_say_that_they_are_not_the_scene_s():
-    problem = planar._fixed(planar.replace(_nothing(), note="They draw lots."))
-    assert problem.note.startswith("Not the target of the scene") and problem.note.endswith("They draw lots.")
+@pytest.mark.parametrize("search", ["dimensions", "path_dimensions"])
+def test_searches_say_that_they_are_not_the_scene_s(monkeypatch, search):
+    for problem in ("line_problem", "path_problem"):
+        monkeypatch.setattr(f"graphsynth.evidence.embodiment.{problem}", lambda _: replace(_nothing(), note="Lots."))
+    note = getattr(planar, search)(None, QUICK).note
+    assert note.startswith("Not the target of the scene") and note.endswith(" Lots.")
 
 
 def _nothing():

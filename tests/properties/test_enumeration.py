@@ -27,7 +27,7 @@ from graphsynth import (
 )
 from graphsynth.synthesis.chunks import Chunk, cut
 from graphsynth.synthesis.families import chain_families
-from graphsynth.synthesis.problem import Problem, texts
+from graphsynth.synthesis.problem import EnumerationProblem, texts
 from graphsynth.synthesis.shards import shard_of
 from graphsynth.testing import chains, specs
 
@@ -237,12 +237,12 @@ def test_symmetric_families_are_not_empty():
 # --- pieces and shards ------------------------------------------------------------------------------------------------
 
 PROBLEMS = [
-    Problem.chains(10, 1, 3, None, False, None),
-    Problem.chains(9, 2, 3, None, True, None),
-    Problem.chains(6, 1, 3, {2: 2}, False, None),
-    Problem.trusses(9, 3, True),
-    Problem.mechanisms(StructuralSpec(W=1, links=8), None),
-    Problem.chains(5, 1, 3, None, False, None),  # none at all
+    EnumerationProblem.chains(10, 1, 3, None, False, None),
+    EnumerationProblem.chains(9, 2, 3, None, True, None),
+    EnumerationProblem.chains(6, 1, 3, {2: 2}, False, None),
+    EnumerationProblem.trusses(9, 3, True),
+    EnumerationProblem.mechanisms(StructuralSpec(W=1, links=8), None),
+    EnumerationProblem.chains(5, 1, 3, None, False, None),  # none at all
 ]
 
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import linprog
 
 from graphsynth import StructuralSpec
-from graphsynth.structure.system.equations import Problem, domains_of, propagate, rows_of
+from graphsynth.structure.system.equations import IntegerProblem, domains_of, propagate, rows_of
 from graphsynth.structure.system.solving import _box
 
 
@@ -23,7 +23,7 @@ from graphsynth.structure.system.solving import _box
     ],
 )
 def test_open_sides_are_closed_at_the_extreme(question):
-    problem = Problem((("Pi", (3, 3)), *sorted(question.items())))
+    problem = IntegerProblem((("Pi", (3, 3)), *sorted(question.items())))
     box = _box(problem, 3)
     domains, rows = domains_of(problem, 3), rows_of(problem, 3)
     assert propagate(problem, domains, rows) and domains["n"][1] is None and box is not None

@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 
 from graphsynth import StructuralSpec
 from graphsynth.core.errors import FormatError, SpecError
-from graphsynth.structure.system.equations import Row
+from graphsynth.structure.system.equations import EquationRow
 from graphsynth.structure.system.solving import maximum
 
 SHIPPED = Path(__file__).parents[2] / "catalog" / "specs"
@@ -127,7 +127,9 @@ def test_the_exact_linear_programme_agrees_with_scipy(seed):
     for _ in range(random_.randint(1, 4)):
         terms = tuple((name, random_.randint(-3, 4)) for name in random_.sample(names, random_.randint(1, 4)))
         side = random_.randint(-2, 8)
-        rows.append(Row("", terms, *random_.choice([(None, side), (side, None), (side, side), (side - 2, side + 2)])))
+        rows.append(
+            EquationRow("", terms, *random_.choice([(None, side), (side, None), (side, side), (side - 2, side + 2)]))
+        )
     objective = {name: random_.randint(-2, 3) for name in names}
     upper, bounds = [], []
     for row in rows:

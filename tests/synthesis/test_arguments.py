@@ -21,7 +21,7 @@ from graphsynth import (
 from graphsynth.cli import main
 from graphsynth.core.errors import GraphError, GraphsynthError, SpecError
 from graphsynth.structure.system.variables import Counts
-from graphsynth.synthesis.problem import Problem
+from graphsynth.synthesis.problem import EnumerationProblem
 
 SIX = StructuralSpec(W=1, links=6)
 HUGE = 10**5000
@@ -63,8 +63,8 @@ def test_whole_numbers_of_numpy(kind):
 
 def test_numbers_of_numpy_are_the_same_question():
     one, other = (
-        Problem.chains(8, 1, 3, {2: 0}, False, None),
-        Problem.chains(np.int64(8), 1, np.uint8(3), None, False, None),
+        EnumerationProblem.chains(8, 1, 3, {2: 0}, False, None),
+        EnumerationProblem.chains(np.int64(8), 1, np.uint8(3), None, False, None),
     )
     assert one.signature == other.signature
     assert StructuralSpec(levels={np.int64(1): 2}).levels == {1: (2, 2)}

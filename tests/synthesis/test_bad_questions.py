@@ -15,7 +15,7 @@ from graphsynth import (
 )
 from graphsynth.core.errors import SpecError
 from graphsynth.synthesis import chunks
-from graphsynth.synthesis.problem import Problem
+from graphsynth.synthesis.problem import EnumerationProblem
 
 SIX = StructuralSpec(W=1, links=6)
 
@@ -49,8 +49,8 @@ def test_no_moving_links(links):
 @pytest.mark.parametrize(
     "problem",
     [
-        Problem.chains(8, 1, 3, None, False, None), Problem.chains(6, 1, 3, {2: 1}, False, None),
-        Problem.mechanisms(SIX, None), Problem.chains(5, 1, 2, None, False, None),
+        EnumerationProblem.chains(8, 1, 3, None, False, None), EnumerationProblem.chains(6, 1, 3, {2: 1}, False, None),
+        EnumerationProblem.mechanisms(SIX, None), EnumerationProblem.chains(5, 1, 2, None, False, None),
     ],
     ids=lambda problem: problem.title,
 )  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 from graphsynth import StructuralSpec, count_chains, count_mechanisms
 from graphsynth.synthesis import fractionated
 from graphsynth.synthesis.fractionated import count_fractionated, fractionated_chains
-from graphsynth.synthesis.problem import Problem
+from graphsynth.synthesis.problem import EnumerationProblem
 
 SMALL = [
     *[(links, 2, 3, ()) for links in (5, 7, 9, 11)],
@@ -46,10 +46,10 @@ def test_no_fractionated_chain_is_made_to_be_counted(links, mobility, chains, mo
 
 def test_restricted_counts_are_those_of_the_listing():
     question = StructuralSpec(W=2, links=9, fractionated=True)
-    found = Problem.mechanisms(question, None)
+    found = EnumerationProblem.mechanisms(question, None)
     assert sum(item.count() for item in found.work_items(listing=True)) == count_mechanisms(question)
     assert count_chains(9, 2, fractionated=True, symmetry=3) == sum(
         chain.automorphism_order % 3 == 0
-        for item in Problem.chains(9, 2, 3, None, True, None).work_items(listing=True)
+        for item in EnumerationProblem.chains(9, 2, 3, None, True, None).work_items(listing=True)
         for chain in item.graphs()
     )

@@ -9,7 +9,7 @@ from graphsynth.cli import main
 from graphsynth.core.errors import TooLargeError
 from graphsynth.structure.system.solving import number_of_solutions, solutions
 from graphsynth.synthesis.contracted import contracted_graphs, generate
-from graphsynth.synthesis.problem import Problem, extrapolated
+from graphsynth.synthesis.problem import EnumerationProblem, extrapolated
 
 
 @pytest.fixture(autouse=True)
@@ -62,7 +62,7 @@ def test_the_refusal_speaks_of_the_question(call, words):
 
 def test_a_question_of_minutes_is_not_refused():
     """Nine loops, few links: the contracted graphs that it needs are made when they are asked for."""
-    assert len(Problem.chains(11, 1, 2, None, False, None).families) == 10
+    assert len(EnumerationProblem.chains(11, 1, 2, None, False, None).families) == 10
     assert [len(contracted_graphs(9, k)) for k in range(2, 7)] == [1, 9, 126, 1193, 8915]
     anew = generate(9, 5)[9]
     assert all((contracted_graphs(9, k) == anew[k]).all() for k in anew)

@@ -15,12 +15,12 @@ from graphsynth.cli import main
 from graphsynth.core.errors import GraphsynthError, SpecError
 from graphsynth.core.ordered import AHEAD, in_order
 from graphsynth.synthesis import problem as parallel
-from graphsynth.synthesis.problem import Problem
+from graphsynth.synthesis.problem import EnumerationProblem
 from graphsynth.synthesis.shards import shard_of
 from graphsynth.synthesis.writing import count_with_checkpoint, write_listing
 
 QUESTION = StructuralSpec(W=1, links=10)
-LONG = Problem.mechanisms(StructuralSpec(W=1, links=12), None)  # 75397 lines
+LONG = EnumerationProblem.mechanisms(StructuralSpec(W=1, links=12), None)  # 75397 lines
 
 
 def digest(executor):
@@ -155,7 +155,7 @@ class Interrupted(Exception):
 
 
 def test_a_complete_listing_is_kept_unless_it_is_to_be_replaced(tmp_path):
-    problem, path = Problem.chains(8, 1, 3, None, False, None), tmp_path / "listing.txt"
+    problem, path = EnumerationProblem.chains(8, 1, 3, None, False, None), tmp_path / "listing.txt"
     lines = write_listing(problem, path)
     whole = read(path)
     with pytest.raises(GraphsynthError, match="exists: name another file, or replace it with --force"):
@@ -186,7 +186,7 @@ def test_a_resumed_listing_is_the_same_to_the_byte(tmp_path, stop, junk):
     with pytest.raises(GraphsynthError, match="--resume"):
         write_listing(LONG, path)
     with pytest.raises(GraphsynthError, match="another question"):
-        write_listing(Problem.chains(10, 1, 3, None, False, None), path, resume=True)
+        write_listing(EnumerationProblem.chains(10, 1, 3, None, False, None), path, resume=True)
     assert write_listing(LONG, path, resume=True) == 75397
     assert read(path) == read(whole)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["listing.txt", "whole.txt"]
@@ -202,7 +202,7 @@ def test_progress_grows_to_one(tmp_path):
 
 @pytest.mark.parametrize("keep", [0, 1, 3])
 def test_a_count_goes_on_from_its_checkpoint(tmp_path, keep):
-    problem = Problem.chains(14, 1, 3, None, False, None)
+    problem = EnumerationProblem.chains(14, 1, 3, None, False, None)
     path = tmp_path / "count.txt"
     assert count_with_checkpoint(problem, checkpoint=path) == 318162
     lines = path.read_text().splitlines(keepends=True)

@@ -16,11 +16,11 @@ from graphsynth.synthesis.chunks import Chunk, count_each, estimates
 from graphsynth.synthesis.kernels.counting import LISTING
 from graphsynth.synthesis.kernels.layout import HEADER, make_work
 from graphsynth.synthesis.kernels.listing import VISITED, list_rows, rewind
-from graphsynth.synthesis.problem import Problem
+from graphsynth.synthesis.problem import EnumerationProblem
 from graphsynth.synthesis.shards import shard_of, works
 
-FOURTEEN = Problem.chains(14, 1, 3, None, False, None)
-MECHANISMS = Problem.mechanisms(StructuralSpec(W=1, links=12), None)
+FOURTEEN = EnumerationProblem.chains(14, 1, 3, None, False, None)
+MECHANISMS = EnumerationProblem.mechanisms(StructuralSpec(W=1, links=12), None)
 
 
 def cuts(problem, shards, *, listing=True):
@@ -97,7 +97,7 @@ def test_the_estimate_is_what_is_visited():
 )
 def test_visits_of_shards(links, shards):
     """Cut by labellings and the order of the group, the largest had 1.15 and 1.43 times the mean."""
-    found = cuts(Problem.chains(links, 1, 3, None, False, None), shards)
+    found = cuts(EnumerationProblem.chains(links, 1, 3, None, False, None), shards)
     loads = [sum(visited(piece) for piece in own if isinstance(piece, Chunk)) for own in found]
     assert all(found)
     assert spread(loads) < 1.12
@@ -131,7 +131,7 @@ def test_counts_of_shards(shards):
 
 
 def test_more_shards_than_graphs():
-    problem = Problem.chains(6, 1, 3, None, False, None)
+    problem = EnumerationProblem.chains(6, 1, 3, None, False, None)
     found = cuts(problem, 50)
     assert sum(map(bool, found)) == sum(len(family.graphs) for family in problem.families) + 1  # and the rings
     assert sum(piece.count() for shard in found for piece in shard) == 2

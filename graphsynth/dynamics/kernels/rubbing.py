@@ -41,8 +41,9 @@ def friction_unit(T, x, J, f, Q):
     px, py = T.table[r, 2], T.table[r, 3]
     wx, wy = x[b, 2] * px - x[b, 3] * py, x[b, 3] * px + x[b, 2] * py
     ax, ay = x[b, 0] + wx - x[a, 0], x[b, 1] + wy - x[a, 1]
-    speed = (tx * (x[b, 5] - x[b, 7] * wy - x[a, 5] + x[a, 7] * ay)
-             + ty * (x[b, 6] + x[b, 7] * wx - x[a, 6] - x[a, 7] * ax))  # fmt: skip
+    vx = x[b, 5] - x[b, 7] * wy - x[a, 5] + x[a, 7] * ay
+    vy = x[b, 6] + x[b, 7] * wx - x[a, 6] - x[a, 7] * ax
+    speed = tx * vx + ty * vy
     mu = friction_factor(p, speed)
     return pull(T, Q, x, b, wx, wy, -mu * tx, -mu * ty) + pull(T, Q, x, a, ax, ay, mu * tx, mu * ty)
 

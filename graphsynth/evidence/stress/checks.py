@@ -18,7 +18,7 @@ from typing import Any
 from graphsynth.core.errors import GraphsynthError
 
 
-class Status(enum.Enum):
+class CaseStatus(enum.Enum):
     """Outcome of a check or of a case; a case has the worst of its checks."""
 
     OK = "ok"
@@ -28,7 +28,7 @@ class Status(enum.Enum):
 
 
 #: From harmless to bad.
-SEVERITY = (Status.OK, Status.FLAGGED, Status.NOT_RUN, Status.WRONG)
+SEVERITY = (CaseStatus.OK, CaseStatus.FLAGGED, CaseStatus.NOT_RUN, CaseStatus.WRONG)
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Check:
     source: str
     error: float
     bound: float
-    status: Status
+    status: CaseStatus
 
 
 def exact(value: Any) -> Fraction | None:
@@ -124,10 +124,10 @@ class Checks:
             raise ValueError(f"what is right for {what} is not finite: use reports() for reports")
         bound = Fraction(relative) * abs(wanted) + Fraction(absolute)
         error = math.inf if found is None else abs(found - wanted)
-        status = Status.OK if error <= bound else Status.WRONG
+        status = CaseStatus.OK if error <= bound else CaseStatus.WRONG
         self._add(status, what, _text(right), _text(given), source, _as_float(error), _as_float(bound))
 
-    def _add(self, status: Status, what: str, right: str, given: str, source: str, *numbers: float) -> None:
+    def _add(self, status: CaseStatus, what: str, right: str, given: str, source: str, *numbers: float) -> None:
         error, bound = numbers or (math.nan, math.nan)
         self.rows.append(Check(what, right, given, source or self.source, error, bound, status))
 
@@ -157,22 +157,22 @@ class Checks:
 
     def reports(self, what: str, given: Any, right: Any, *, source: str = "") -> None:
         """Require a report of something extreme: a status, an event, a flag, a proof withheld; others: `equals`."""
-        self._add(Status.FLAGGED if given == right else Status.WRONG, what, _text(right), _text(given), source)
+        self._add(CaseStatus.FLAGGED if given == right else CaseStatus.WRONG, what, _text(right), _text(given), source)
 
     def equals(self, what: str, given: Any, right: Any, *, source: str = "") -> None:
         """Require an answer that is no number with an error: a count, a list, a proved verdict; OK if it is right."""
-        self._add(Status.OK if given == right else Status.WRONG, what, _text(right), _text(given), source)
+        self._add(CaseStatus.OK if given == right else CaseStatus.WRONG, what, _text(right), _text(given), source)
 
     def holds(self, what: str, good: object, given: Any = "", right: str = "yes", *, source: str = "") -> None:
         """Require a statement to hold; ``given`` shows what was found."""
         shown = _text(given) if given != "" else ("yes" if good else "no")
-        self._add(Status.OK if good else Status.WRONG, what, right, shown, source)
+        self._add(CaseStatus.OK if good else CaseStatus.WRONG, what, right, shown, source)
 
     def mentions(self, what: str, given: str, *words: str, source: str = "") -> None:
         """Require a sentence for a person that contains all the words."""
         good = given and all(word in given for word in words)
         right = " ... ".join(f"“{word}”" for word in words)
-        self._add(Status.FLAGGED if good else Status.WRONG, what, right, given, source)
+        self._add(CaseStatus.FLAGGED if good else CaseStatus.WRONG, what, right, given, source)
 
     def refused(self, what: str, call: Callable[[], object], *words: str, source: str = "") -> None:
         """Require a refusal: an exception of the library with one line that contains all the words."""
@@ -185,7 +185,7 @@ class Checks:
             else:
                 self.mentions(what, text, *words, source=source)
         else:
-            self._add(Status.WRONG, what, "a refusal", f"no refusal but {type(found).__name__}", source)
+            self._add(CaseStatus.WRONG, what, "a refusal", f"no refusal but {type(found).__name__}", source)
 
 
 def _as_float(value: Any) -> float:

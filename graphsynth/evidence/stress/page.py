@@ -7,8 +7,8 @@ from pathlib import Path
 
 import graphsynth
 from graphsynth.drawing.pages import template, whole_page
-from graphsynth.evidence.stress.checks import SEVERITY, Status
-from graphsynth.evidence.stress.running import Outcome, StressReport
+from graphsynth.evidence.stress.checks import SEVERITY, CaseStatus
+from graphsynth.evidence.stress.running import CaseOutcome, StressReport
 
 _CSS = """
 :root{color-scheme:light dark;--ink:#1b2733;--soft:#5b6875;--paper:#fff;--card:#f5f7f9;--rule:#d5dbe1;
@@ -76,7 +76,7 @@ extreme, and the library reports it as required. <b>WRONG</b>: anything else. Op
 
 def stress_html(report: StressReport) -> str:
     """Return the page of a run as one string; values are escaped, nothing is loaded from elsewhere."""
-    pages: dict[str, list[Outcome]] = {}
+    pages: dict[str, list[CaseOutcome]] = {}
     for outcome in report.outcomes:
         pages.setdefault(outcome.case.page_title, []).append(outcome)
     facts = [(status, report.count(status)) for status in SEVERITY]
@@ -84,7 +84,7 @@ def stress_html(report: StressReport) -> str:
     body = template(_PAGE, css=_class, worst=_worst).render(
         report=report,
         pages=pages,
-        facts=[(status, number) for status, number in facts if number or status is Status.WRONG],
+        facts=[(status, number) for status, number in facts if number or status is CaseStatus.WRONG],
         left=left,
         lost=lost,
         version=graphsynth.__version__,
@@ -101,11 +101,11 @@ def write_report(report: StressReport, folder: Path) -> tuple[Path, Path]:
     return html, csv
 
 
-def _class(status: Status) -> str:
+def _class(status: CaseStatus) -> str:
     return status.value.replace(" ", "-")
 
 
-def _worst(outcome: Outcome) -> str:
+def _worst(outcome: CaseOutcome) -> str:
     worst = outcome.worst
     if not worst or math.isnan(worst.error):
         return ""

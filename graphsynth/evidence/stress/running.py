@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import MissingExtraError
 from graphsynth.evidence.stress.cases import Case, stress_cases
-from graphsynth.evidence.stress.checks import SEVERITY, Check, Checks, Status
+from graphsynth.evidence.stress.checks import SEVERITY, CaseStatus, Check, Checks
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CaseOutcome:
     """What a case gave.
 
     Attributes
@@ -45,17 +45,17 @@ class Outcome:
     missing: bool = False
 
     @property
-    def status(self) -> Status:
+    def status(self) -> CaseStatus:
         """The worst status of the checks; WRONG if there are none, or if the case did not end for want of no extra."""
-        worst = max((check.status for check in self.checks), key=SEVERITY.index, default=Status.OK)
-        if self.missing and worst is not Status.WRONG:
-            return Status.NOT_RUN
-        return Status.WRONG if self.reason or not self.checks else worst
+        worst = max((check.status for check in self.checks), key=SEVERITY.index, default=CaseStatus.OK)
+        if self.missing and worst is not CaseStatus.WRONG:
+            return CaseStatus.NOT_RUN
+        return CaseStatus.WRONG if self.reason or not self.checks else worst
 
     @property
     def worst(self) -> Check | None:
         """The wrong check, or the number nearest to its bound; None without numbers."""
-        wrong = [check for check in self.checks if check.status is Status.WRONG]
+        wrong = [check for check in self.checks if check.status is CaseStatus.WRONG]
         numbers = [check for check in self.checks if not math.isnan(check.error)]
         if wrong or not numbers:
             return wrong[0] if wrong else None
@@ -93,26 +93,28 @@ class StressReport:
         Cases that were asked for but not ended when the run was interrupted.
     """
 
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[CaseOutcome, ...]
     left_out: tuple[Case, ...]
     seconds: float
     not_reached: tuple[Case, ...] = ()
 
-    def count(self, status: Status) -> int:
+    def count(self, status: CaseStatus) -> int:
         """Return the number of cases with a status."""
         return sum(outcome.status is status for outcome in self.outcomes)
 
     @property
-    def wrong(self) -> tuple[Outcome, ...]:
+    def wrong(self) -> tuple[CaseOutcome, ...]:
         """The cases that are wrong."""
-        return tuple(outcome for outcome in self.outcomes if outcome.status is Status.WRONG)
+        return tuple(outcome for outcome in self.outcomes if outcome.status is CaseStatus.WRONG)
 
     @property
     def statement(self) -> str:
         """The result in one sentence."""
-        parts = [f"{self.count(status)} {status.value}" for status in (Status.OK, Status.FLAGGED, Status.WRONG)]
-        if self.count(Status.NOT_RUN):
-            parts.append(f"{self.count(Status.NOT_RUN)} not run")
+        parts = [
+            f"{self.count(status)} {status.value}" for status in (CaseStatus.OK, CaseStatus.FLAGGED, CaseStatus.WRONG)
+        ]
+        if self.count(CaseStatus.NOT_RUN):
+            parts.append(f"{self.count(CaseStatus.NOT_RUN)} not run")
         if self.left_out:
             parts.append(f"{len(self.left_out)} slow ones left out")
         if self.not_reached:
@@ -146,7 +148,7 @@ class StressReport:
         }
 
 
-def run_case(case: Case) -> Outcome:
+def run_case(case: Case) -> CaseOutcome:
     """Run one case; whatever it raises becomes its reason.
 
     Warnings are not shown: what a case returns counts, whatever a library warns about.
@@ -172,7 +174,7 @@ def run_case(case: Case) -> Outcome:
         missing, reason = True, str(error)
     except Exception as error:  # a defect of the library is a result of a stress run, not its end
         reason = f"{type(error).__name__}: {error}"
-    return Outcome(case, tuple(checks.rows), perf_counter() - start, reason, missing)
+    return CaseOutcome(case, tuple(checks.rows), perf_counter() - start, reason, missing)
 
 
 def run_stress(
@@ -216,7 +218,7 @@ def run_stress(
     chosen = stress_cases(names, slow=slow, files=files)
     left_out = tuple(case for case in stress_cases(names, files=files) if case not in chosen)
     start = perf_counter()
-    outcomes: list[Outcome] = []
+    outcomes: list[CaseOutcome] = []
     with _interrupts() as received, suppress(KeyboardInterrupt):
         for k, case in enumerate(chosen):
             if progress is not None:

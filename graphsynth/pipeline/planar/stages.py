@@ -106,7 +106,7 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
         causes = [why.removeprefix("result: ") for why in found.reasons if why.startswith("result: ")]
         error = found.figures.goal_error if found.figures is not None else math.nan
         best = f"; error {error:.3g}" if math.isfinite(error) else ""
-        raise Rejected(f"no dimensions found: {causes[0] if causes else 'nothing moves'}", found.statement + best)
+        raise Rejected(f"no dimensions were found: {causes[0] if causes else 'nothing moves'}", found.statement + best)
     margins = [Quantity("length ratio", found.figures.length_ratio)]
     if math.isfinite(found.figures.goal_error):
         margins.insert(0, Quantity("deviation", found.figures.goal_error))

@@ -41,7 +41,7 @@ _HUGE = 10**9  # a vertex of the system has far smaller coordinates: a lower bou
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class IntegerProblem:
     """A structural question with every rule of reading it made explicit."""
 
     #: tuple of (symbol, range): What the question fixes or bounds; ``n`` instead of ``N``, ``Pi`` always present
@@ -66,7 +66,7 @@ class Problem:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class EquationRow:
     """``lowest <= sum coefficient * variable <= highest``."""
 
     label: str
@@ -75,7 +75,7 @@ class Row:
     highest: int | None = 0
 
 
-def rows_of(problem: Problem, space: int, equations: Collection[str] = EQUATIONS) -> list[Row]:
+def rows_of(problem: IntegerProblem, space: int, equations: Collection[str] = EQUATIONS) -> list[EquationRow]:
     """Return the given equations for Pi = ``space``.
 
     Two consequences that make propagation strong are added when the equations imply them:
@@ -95,18 +95,18 @@ def rows_of(problem: Problem, space: int, equations: Collection[str] = EQUATIONS
         (("p", -2), ("t0", 1), *kinds, ("e", 1)),
         (("G", -1), *freedoms),
     )
-    rows = [Row(label, own) for label, own in zip(EQUATIONS, terms) if label in equations]
-    rows.append(Row(_TAIL, (("e", 1), ("k", -problem.largest_kind - 1)), 0, None))
+    rows = [EquationRow(label, own) for label, own in zip(EQUATIONS, terms) if label in equations]
+    rows.append(EquationRow(_TAIL, (("e", 1), ("k", -problem.largest_kind - 1)), 0, None))
     if problem.link_limit is not None:
-        rows.append(Row(_TAIL, (("e", -1), ("k", problem.link_limit)), 0, None))
+        rows.append(EquationRow(_TAIL, (("e", -1), ("k", problem.link_limit)), 0, None))
     consequences = (
-        ((0, 1, 2, 7), Row("", (("n", space), ("W", -1), *freedom))),
-        ((2, 3, 6), Row("", (("v", -2), ("t0", 1), *excess, ("e", 1), ("k", -2)))),
+        ((0, 1, 2, 7), EquationRow("", (("n", space), ("W", -1), *freedom))),
+        ((2, 3, 6), EquationRow("", (("v", -2), ("t0", 1), *excess, ("e", 1), ("k", -2)))),
     )
     return rows + [row for parents, row in consequences if all(EQUATIONS[parent] in equations for parent in parents)]
 
 
-def domains_of(problem: Problem, space: int, natural: Iterable[str] = NATURAL) -> Domains:
+def domains_of(problem: IntegerProblem, space: int, natural: Iterable[str] = NATURAL) -> Domains:
     """Return the domain of every variable before propagation: the natural bounds and the question's own."""
     domains: Domains = {"W": (None, None), "n": (1, None), "p": (1, None)}
     domains.update(dict.fromkeys(("v", "v_ct", "v_P", "G", "k", "e"), (0, None)))
@@ -127,7 +127,9 @@ def _meet(first: Range, second: Range) -> Range:
     return max(lows, default=None), min(highs, default=None)
 
 
-def propagate(problem: Problem, domains: Domains, rows: list[Row], natural: Iterable[str] = NATURAL) -> bool:
+def propagate(
+    problem: IntegerProblem, domains: Domains, rows: list[EquationRow], natural: Iterable[str] = NATURAL
+) -> bool:
     """Shrink ``domains`` in place by every row until nothing changes.
 
     Returns False if some domain is empty: then there is no integer solution.  True proves nothing.
@@ -149,7 +151,7 @@ def propagate(problem: Problem, domains: Domains, rows: list[Row], natural: Iter
     return True
 
 
-def kind_limit(problem: Problem, loops: int, mobility: int) -> int:
+def kind_limit(problem: IntegerProblem, loops: int, mobility: int) -> int:
     """Return the largest possible number of joints on a moving link.
 
     A link with a joints leaves v - a + c' >= 0 loops when it is taken away, c' the number of parts left: a <= v + c'.
@@ -159,7 +161,7 @@ def kind_limit(problem: Problem, loops: int, mobility: int) -> int:
     return natural if problem.link_limit is None else min(natural, problem.link_limit)
 
 
-def _limit_kinds(problem: Problem, domains: Domains, bounded_kinds: bool) -> bool:
+def _limit_kinds(problem: IntegerProblem, domains: Domains, bounded_kinds: bool) -> bool:
     """Apply a <= limit to the domains of the link kinds, and 1 <= c <= max(1, W)."""
     limit = problem.link_limit
     loops, mobility = domains["v"][1], domains["W"][1]
@@ -174,12 +176,12 @@ def _limit_kinds(problem: Problem, domains: Domains, bounded_kinds: bool) -> boo
             domains[f"n{a}"] = _meet(domains[f"n{a}"], (0, 0))
     if limit <= problem.largest_kind:
         domains["k"] = domains["e"] = (0, 0)
-    row = Row(_TAIL, (("e", -1), ("k", limit)), 0, None)
+    row = EquationRow(_TAIL, (("e", -1), ("k", limit)), 0, None)
     empty = any(lo is not None and hi is not None and lo > hi for lo, hi in domains.values())
     return not empty and _tighten(row, domains)
 
 
-def _tighten(row: Row, domains: Domains) -> bool:
+def _tighten(row: EquationRow, domains: Domains) -> bool:
     """Shrink the domains of one row's variables; False if one becomes empty."""
     least, most, open_below, open_above = 0, 0, 0, 0
     spans: list[Range] = []
@@ -227,7 +229,7 @@ class _Item:
     default: bool = False
 
 
-def explain(problem: Problem, default_space: bool, default_mobilities: bool) -> InfeasibleSpecError:
+def explain(problem: IntegerProblem, default_space: bool, default_mobilities: bool) -> InfeasibleSpecError:
     """Name a smallest set of equations, and in it a minimal set of values, that contradict each other.
 
     The subsets of the equations are tried by increasing size; then every value that is not needed is dropped (a
@@ -264,7 +266,7 @@ def explain(problem: Problem, default_space: bool, default_mobilities: bool) -> 
     return InfeasibleSpecError(message, (*said, *broken))
 
 
-def _only(problem: Problem, items: Iterable[_Item]) -> Problem:
+def _only(problem: IntegerProblem, items: Iterable[_Item]) -> IntegerProblem:
     """Return the problem with nothing but the given items; everything else is free."""
     said = {item.symbol for item in items}
     ranges = tuple((symbol, own) for symbol, own in problem.ranges if symbol in said)
@@ -278,7 +280,7 @@ def _only(problem: Problem, items: Iterable[_Item]) -> Problem:
     )
 
 
-def _possible(problem: Problem, equations: Sequence[str], natural: Iterable[str]) -> bool:
+def _possible(problem: IntegerProblem, equations: Sequence[str], natural: Iterable[str]) -> bool:
     """Whether some integers satisfy these equations; True also when the search gives up.
 
     Depth first for one integer point, with propagation and a budget of nodes; the narrowest domain is divided.

@@ -14,19 +14,26 @@ from math import ceil, floor
 
 from graphsynth.core.errors import SpecError
 from graphsynth.structure.system.assortment import LinkAssortment
-from graphsynth.structure.system.equations import Problem, Row, domains_of, kind_limit, propagate, rows_of
+from graphsynth.structure.system.equations import (
+    EquationRow,
+    IntegerProblem,
+    domains_of,
+    kind_limit,
+    propagate,
+    rows_of,
+)
 from graphsynth.structure.system.variables import LARGEST, SPACES, Counts, Range
 
 _WORDS = {"n": "n (moving links)", "p": "p (joints)", "W": "W (mobility)"}
 
 
-def solutions(problem: Problem) -> Iterator[LinkAssortment]:
+def solutions(problem: IntegerProblem) -> Iterator[LinkAssortment]:
     """Yield every integer solution, lexicographically by (W, Pi, n, p, p_1.., t0, v_ct, n_2, n_3, ...).
 
     Raises `SpecError` before the first solution, if the question does not bound the search; names the variable to
     bound.
 
-    >>> next(solutions(Problem((("Pi", (3, 3)), ("W", (1, 1)), ("n", (3, 3)))))).frame_joints
+    >>> next(solutions(IntegerProblem((("Pi", (3, 3)), ("W", (1, 1)), ("n", (3, 3)))))).frame_joints
     2
     """
     for mobility, space, links, joints in _sizes(problem):
@@ -54,7 +61,7 @@ def solutions(problem: Problem) -> Iterator[LinkAssortment]:
                     )
 
 
-def _box(problem: Problem, space: int) -> dict[str, tuple[int, int]] | None:
+def _box(problem: IntegerProblem, space: int) -> dict[str, tuple[int, int]] | None:
     """Finite bounds of W, n and p for one space, or None if it has no solution."""
     lowest, highest = problem.range("Pi")
     if not (lowest or 0) <= space <= (highest or SPACES[-1]):
@@ -87,7 +94,7 @@ def _box(problem: Problem, space: int) -> dict[str, tuple[int, int]] | None:
     return box
 
 
-def _sizes(problem: Problem) -> Iterator[tuple[int, int, int, int]]:
+def _sizes(problem: IntegerProblem) -> Iterator[tuple[int, int, int, int]]:
     """Yield (W, Pi, n, p) in order: W = Pi*n - sum (Pi-i)*p_i bounds p on both sides once n is known."""
     boxes = {space: box for space in SPACES if (box := _box(problem, space)) is not None}
     reached = [mobility for box in boxes.values() for mobility in box["W"]]
@@ -104,12 +111,12 @@ def _sizes(problem: Problem) -> Iterator[tuple[int, int, int, int]]:
                         yield mobility, space, links, joints
 
 
-def number_of_solutions(problem: Problem, enough: int) -> int:
+def number_of_solutions(problem: IntegerProblem, enough: int) -> int:
     """Count the solutions without listing them: exactly, or the first number beyond ``enough`` that is found.
 
     A number above ``enough`` need not be the exact one.
 
-    >>> question = Problem((("Pi", (3, 3)), ("n", (40, 40)), ("p", (59, 59))))
+    >>> question = IntegerProblem((("Pi", (3, 3)), ("n", (40, 40)), ("p", (59, 59))))
     >>> number_of_solutions(question, 10**6)
     93339
     """
@@ -161,7 +168,7 @@ def _moved(counts: Mapping[int, int], by: int, most: int) -> dict[int, int]:
     return {above + by: count for above, count in counts.items() if above + by <= most}
 
 
-def _attachments(problem: Problem, mobility: int, links: int, loops: int) -> Iterator[tuple[int, int]]:
+def _attachments(problem: IntegerProblem, mobility: int, links: int, loops: int) -> Iterator[tuple[int, int]]:
     """Yield (t0, c) by increasing t0, then increasing v_ct = t0 - c."""
     most_parts = max(1, min(mobility, links)) if problem.fractionated else 1
     for frame_joints in range(2, loops + most_parts + 1):
@@ -181,7 +188,7 @@ def _within(bounds: Range, value: int) -> bool:
     return (lo is None or lo <= value) and (hi is None or value <= hi)
 
 
-def _mobility_ranges(problem: Problem, space: int) -> dict[int, Range]:
+def _mobility_ranges(problem: IntegerProblem, space: int) -> dict[int, Range]:
     ranges = {i: problem.range(f"p{i}") for i in range(1, space)}
     return {i: (lo or 0, hi if i in problem.mobilities else 0) for i, (lo, hi) in ranges.items()}
 
@@ -231,15 +238,15 @@ def _free_compositions(
         )
 
 
-def maximum(objective: Mapping[str, int], rows: Iterable[Row], domains: Mapping[str, Range]) -> Fraction | None:
+def maximum(objective: Mapping[str, int], rows: Iterable[EquationRow], domains: Mapping[str, Range]) -> Fraction | None:
     """Maximise ``sum coefficient * variable`` over the rows and domains, in rational numbers.
 
     Returns the exact maximum; None if it is infinite. Raises `ValueError` if no rational point satisfies the rows.
     Two-phase simplex with Bland's rule (R. G. Bland, Math. Oper. Res. 2 (1977) 103), which cannot cycle.
 
-    >>> maximum({"x": 1}, [Row("", (("x", 2), ("y", 1)), None, 7)], {"x": (0, None), "y": (1, None)})
+    >>> maximum({"x": 1}, [EquationRow("", (("x", 2), ("y", 1)), None, 7)], {"x": (0, None), "y": (1, None)})
     Fraction(3, 1)
-    >>> maximum({"y": 1}, [Row("", (("x", 1), ("y", -1)), 0, None)], {"x": (0, None), "y": (1, None)}) is None
+    >>> maximum({"y": 1}, [EquationRow("", (("x", 1), ("y", -1)), 0, None)], {"x": (0, None), "y": (1, None)}) is None
     True
     """
     limits = [

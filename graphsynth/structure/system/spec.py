@@ -14,7 +14,7 @@ from graphsynth.core.textfiles import read_bytes, text_of, toml_tables
 from graphsynth.core.wording import shown, whole
 from graphsynth.structure.system import variables
 from graphsynth.structure.system.assortment import LinkAssortment
-from graphsynth.structure.system.equations import Problem, explain
+from graphsynth.structure.system.equations import IntegerProblem, explain
 from graphsynth.structure.system.solving import number_of_solutions, solutions
 from graphsynth.structure.system.variables import ALIASES, FAMILIES, SPACES, Range, show_range
 
@@ -236,25 +236,27 @@ class StructuralSpec:
             raise explain(self._readings(widest=True)[0], default_space, default_mobilities)
         return solutions(reading_of)
 
-    def reading(self) -> Problem:
+    def reading(self) -> IntegerProblem:
         """Return the question with every default made explicit, as :meth:`solve` reads it."""
         chosen, _ = self._first()
         return self._readings(widest=True)[0] if chosen is None else chosen
 
-    def _first(self) -> tuple[Problem | None, LinkAssortment | None]:
+    def _first(self) -> tuple[IntegerProblem | None, LinkAssortment | None]:
         """Return the first reading that has a solution, and that solution."""
         for problem in self._readings():
             for solution in solutions(problem):
                 return problem, solution
         return None, None
 
-    def _readings(self, *, widest: bool = False) -> list[Problem]:
+    def _readings(self, *, widest: bool = False) -> list[IntegerProblem]:
         """Return the readings of the question by the default rules, narrowest first."""
         mobilities, link_limits = self._mobilities(), self._link_limits()
         if widest:  # a contradiction must not hang on a default of ours that solve() would have widened
             mobilities, link_limits = mobilities[-1:], link_limits[-1:]
         ranges = tuple(self._ranges if "Pi" in self.ranges else [("Pi", (3, 3)), *self._ranges])
-        return [Problem(ranges, allowed, limit, self.fractionated) for allowed in mobilities for limit in link_limits]
+        return [
+            IntegerProblem(ranges, allowed, limit, self.fractionated) for allowed in mobilities for limit in link_limits
+        ]
 
     def _mobilities(self) -> list[tuple[int, ...]]:
         if self.max_joint_mobility is not None:

@@ -66,7 +66,7 @@ def pointing_picture(
     middle, reach = 0.5 * (low + high), 0.55 * float((high - low).max())
     for set_limits, centre in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle):
         set_limits(centre - reach, centre + reach)
-    axes.set_box_aspect((1, 1, 1), zoom=1.12 if plain else 1.08)
+    axes.set_box_aspect((1, 1, 1), zoom=0.9 if plain else 1.08)
     axes.view_init(elev=22, azim=38)
     axes.set(xlabel="x", ylabel="y", zlabel="z")
     axes.tick_params(labelsize=7)

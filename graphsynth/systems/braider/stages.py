@@ -123,6 +123,7 @@ def _margins(context: Context, braider: Braider, run: DriveRun) -> tuple[Quantit
     (least, most), rough = (braider.steady_range(samples=n) for n in (720, 500))
     peak, spacing = braider.largest_current(run), float(np.diff(run.time).max())
     moment = float(np.nanmax(np.abs(braider.load_moment(np.linspace(0.0, math.tau, 361)))))
+    ripple_error = abs(least - rough[0]) + abs(most - rough[1])
     settled = [
         Quantity(f"settling time, ±{100 * band:g} %", a, "s", "estimated", abs(a - b) + 1e-12)
         for band, a, b in zip(bands, fine, coarse)
@@ -131,9 +132,10 @@ def _margins(context: Context, braider: Braider, run: DriveRun) -> tuple[Quantit
         *settled,
         Quantity(f"crank speed at {start.end:g} s", float(run.speed[-1]), "rad/s", "estimated", w_error),
         Quantity(f"crank angle at {start.end:g} s", float(run.angle[-1]), "rad", "estimated", float(run.error[0])),
+        Quantity("ripple of the steady speed, peak to peak", most - least, "rad/s", "estimated", ripple_error),
+        Quantity("largest current i_q", peak.value, "A", "estimated", peak.error + float(run.error[-1])),
         Quantity("least speed of the steady motion", least, "rad/s", "estimated", abs(least - rough[0])),
         Quantity("largest speed of the steady motion", most, "rad/s", "estimated", abs(most - rough[1])),
-        Quantity("largest current i_q", peak.value, "A", "estimated", peak.error + float(run.error[-1])),
         Quantity("time of the largest current", peak.time, "s", "estimated", spacing / 200.0),
         Quantity("largest moment of the thread about O2", 0.0 if moment < 1e-15 else moment, "N m", "estimated", 1e-15),
         Quantity("inertia of rotor and train at the crank", inertia, "kg m^2", "exact", 4.0 * math.ulp(inertia)),

@@ -15,7 +15,7 @@ from graphsynth.systems.platform.inverse_design import Design, _wanted, assess_d
 from graphsynth.systems.platform.small_crank import small_crank
 
 if TYPE_CHECKING:
-    from graphsynth.systems.platform.motion import Motion
+    from graphsynth.systems.platform.motion import TurnMotion
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 Array = NDArray[np.float64]
@@ -156,7 +156,7 @@ class TwoPoseDesign:
     first_error: float
     second_error: float
     off_line: float
-    motion: Motion | None
+    motion: TurnMotion | None
 
 
 @checked

@@ -23,7 +23,7 @@ from graphsynth.systems.platform.small_crank import (
 )
 
 if TYPE_CHECKING:
-    from graphsynth.systems.platform.motion import Motion
+    from graphsynth.systems.platform.motion import TurnMotion
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 Array = NDArray[np.float64]
@@ -64,7 +64,7 @@ class Design:
     off_line: float
     iterations: int
     amplitude_reached: float
-    motion: Motion | None
+    motion: TurnMotion | None
 
 
 def translation_along(amplitude: float, angle: float) -> Complex:

@@ -127,7 +127,7 @@ class TurnBatch(_Followed):
 
 
 @dataclass(frozen=True, eq=False)
-class Motion(_Followed):
+class TurnMotion(_Followed):
     """One tracked branch over the wheel angle, up to where it stops.
 
     * `leg` (shape (n, 3)): ``JT_kk = sigma_k S_k`` of the legs.
@@ -215,7 +215,7 @@ class Tracked(NamedTuple):
 
 
 def followed(psi: Array, found: Tracked, key: Any) -> dict[str, Any]:
-    """Arrays of `Sweep`, `TurnBatch` and `Motion`: ``key`` takes the machine and the angles."""
+    """Arrays of `Sweep`, `TurnBatch` and `TurnMotion`: ``key`` takes the machine and the angles."""
     names = {"theta_velocity": "theta1", "theta_acceleration": "theta2"}
     arrays = {name: getattr(found, names.get(name, name)) for name in _Followed.__annotations__ if name != "psi"}
     second = found.theta2.shape[1] > 0

@@ -24,10 +24,10 @@ from graphsynth.systems.platform.motion import (
     BranchEnd,
     BranchLabel,
     Monodromy,
-    Motion,
     Sweep,
     Tracked,
     TurnBatch,
+    TurnMotion,
     compare,
     dimension_sets,
     distance,
@@ -352,7 +352,7 @@ class SingleMotorPlatform:
         ends = tuple(math.nan if target >= 0 else float(at) for target, at in zip(permutation, tracked.end[:, 0]))
         return Monodromy(modes, tuple(permutation), ends, tuple(reasons))
 
-    def full_turn(self, samples: int | ArrayLike = 361, start: ArrayLike | None = None) -> Motion:
+    def full_turn(self, samples: int | ArrayLike = 361, start: ArrayLike | None = None) -> TurnMotion:
         """Follow one branch over a rotation of the wheels, with events and a closure test.
 
         Parameters
@@ -385,7 +385,7 @@ class SingleMotorPlatform:
             period = monodromy.periods[nearest]
         sigma = (int(np.sign(leg[0, 0])), int(np.sign(leg[0, 1])), int(np.sign(leg[0, 2])))
         scale = max(*self.platform.l1, *self.platform.l2) ** 2
-        return Motion(
+        return TurnMotion(
             **found,
             leg=leg,
             drive=self.drive(psi[:reached]).h_phi,

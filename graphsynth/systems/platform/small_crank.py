@@ -19,7 +19,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.systems.platform.field import determinant
 
 if TYPE_CHECKING:
-    from graphsynth.systems.platform.motion import Motion
+    from graphsynth.systems.platform.motion import TurnMotion
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 Array = NDArray[np.float64]
@@ -254,7 +254,7 @@ class Sweep:
     h_phi: Array
     sigma: tuple[int, ...]
     sign: int
-    motion: Motion | None = None
+    motion: TurnMotion | None = None
 
 
 @checked

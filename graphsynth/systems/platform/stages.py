@@ -20,7 +20,7 @@ from graphsynth.systems.platform.system import PlatformTable
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from graphsynth.systems.platform.motion import Motion
+    from graphsynth.systems.platform.motion import TurnMotion
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 
@@ -39,7 +39,7 @@ class PlatformMotion:
     """
 
     mechanism: SingleMotorPlatform
-    motion: Motion
+    motion: TurnMotion
     O: NDArray[np.complex128]
     D: NDArray[np.complex128]
     B: NDArray[np.complex128]
@@ -137,7 +137,7 @@ def _verdict(moved: PlatformMotion) -> tuple[str, bool, tuple[Quantity, ...]]:
     return words, good, _margins(motion)
 
 
-def _margins(motion: Motion) -> tuple[Quantity, ...]:
+def _margins(motion: TurnMotion) -> tuple[Quantity, ...]:
     travel = np.ptp(motion.pose, axis=0)
     closure = motion.closure_error * motion.Lc
     error, turned = (closure, motion.closure_error) if math.isfinite(closure) else (None, None)

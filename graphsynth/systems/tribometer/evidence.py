@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.integrate import simulate_dynamics
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 from graphsynth.systems.tribometer.forms import model_error
 from graphsynth.systems.tribometer.model import Tribometer, general_model
@@ -190,6 +189,8 @@ def tolerance_rows(
 
 def _general_rows(model: Tribometer, truth: PreciseMotion, duration: float, effort: Effort) -> list[Row]:
     """Compare the same as a model of the general dynamics, with sticking as a state of its joint."""
+    from graphsynth.dynamics.integrate import simulate_dynamics
+
     own = signature(simulate_dynamics).parameters["rtol"].default
     general, start = general_model(model)
     rows = []

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError, TooLargeError
-from graphsynth.dynamics.motors import whole
 from graphsynth.systems.tribometer.motion import (
     RunStatus,
     StickSlipEvent,
@@ -213,6 +212,8 @@ def regularised(
     `RunStatus.FAILED` if the solver stopped, `RunStatus.UNRELIABLE` if the cross-check objects; `SpecError` if the law
     has two coefficients, or a number is out of its bounds.
     """
+    from graphsynth.dynamics.motors import whole
+
     duration, times = output_times(duration, times)
     if not 1e-13 <= finite("relative tolerance", rtol) <= 1e-2:
         raise SpecError(f"The relative tolerance is {rtol:g}; give a number from 1e-13 to 1e-2.")

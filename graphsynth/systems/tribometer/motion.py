@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.motors import numbers
 from graphsynth.systems.tribometer.platforms import Platforms, finite, positive
 
 if TYPE_CHECKING:
@@ -264,6 +263,8 @@ def motion_of(
 
 def output_times(duration: float, times: ArrayLike | None) -> tuple[float, Array]:
     """Check the final time and the times of the curves, s; 1001 equal steps if these are not given."""
+    from graphsynth.dynamics.motors import numbers
+
     duration = positive("duration", duration)
     if times is None:
         return duration, np.linspace(0.0, duration, 1001)

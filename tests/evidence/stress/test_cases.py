@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from graphsynth.evidence.stress import Status, run_case, stress_cases
+from graphsynth.evidence.stress import CaseStatus, run_case, stress_cases
 
 PAGE = Path(__file__).parents[3] / "docs" / "explanation" / "stress.md"
 ROW = re.compile(r"^\| `([a-z]+-[\d.]+)` .* \| (\w+)(?:, slow)? \|$", re.MULTILINE)
@@ -18,10 +18,10 @@ CASES = [pytest.param(c, id=c.name, marks=pytest.mark.slow if c.slow else ()) fo
 @pytest.mark.parametrize("case", CASES)
 def test_case(case):
     outcome = run_case(case)
-    if outcome.status is Status.NOT_RUN:
+    if outcome.status is CaseStatus.NOT_RUN:
         pytest.skip(outcome.reason)
-    wrong = [c for c in outcome.checks if c.status is Status.WRONG]
+    wrong = [c for c in outcome.checks if c.status is CaseStatus.WRONG]
     assert not outcome.reason
     assert not wrong
-    assert outcome.status in (Status.OK, Status.FLAGGED) and outcome.checks
+    assert outcome.status in (CaseStatus.OK, CaseStatus.FLAGGED) and outcome.checks
     assert SAID[case.name] == outcome.status.value  # the page tells what runs gave

@@ -24,8 +24,8 @@ from graphsynth.cli import main
 from graphsynth.core.errors import GraphsynthError, MissingExtraError, SpecError
 from graphsynth.evidence.stress import (
     Case,
+    CaseStatus,
     Checks,
-    Status,
     cases as cases_module,
     run_case,
     run_stress,
@@ -35,13 +35,13 @@ from graphsynth.evidence.stress import (
 from graphsynth.evidence.stress.cases import PAGES
 from graphsynth.evidence.stress.checks import exact
 from graphsynth.evidence.stress.page import stress_html, write_report
-from graphsynth.evidence.stress.running import Outcome, StressReport
+from graphsynth.evidence.stress.running import CaseOutcome, StressReport
 
 CASES = stress_cases()
 DOCS = Path(__file__).parents[3] / "docs"
 
 
-def status_of(*calls) -> list[Status]:
+def status_of(*calls) -> list[CaseStatus]:
     checks = Checks("somewhere")
     for name, args, options in calls:
         getattr(checks, name)("it", *args, **options)
@@ -51,21 +51,21 @@ def status_of(*calls) -> list[Status]:
 @pytest.mark.parametrize(
     ("given", "right", "options", "status"),
     [
-        (0.1, "0.1", {}, Status.WRONG),  # the double is not the decimal
-        (0.1, "0.1", {"absolute": 1e-17}, Status.OK),
-        (0.1, 0.1, {}, Status.OK),
-        (1.0 + 2.0**-52, 1, {"relative": 2.2e-16}, Status.WRONG),
-        (1.0 + 2.0**-52, 1, {"relative": 2.3e-16}, Status.OK),
-        (math.nan, 1, {"relative": 1.0}, Status.WRONG),
-        (math.inf, 1, {"absolute": 1e300}, Status.WRONG),
-        (-2.0, 2, {"relative": 1.0}, Status.WRONG),
-        (1e308, "-1e308", {"absolute": 1e308}, Status.WRONG),
-        (mpmath.mpf(1) / 4, Fraction(1, 4), {}, Status.OK),
-        (mpmath.mpf("nan"), 0, {"absolute": 1}, Status.WRONG),
-        (np.int64(2**53 + 1), 2**53 + 1, {}, Status.OK),  # a double does not hold it
-        (np.int64(2**53 + 1), 2**53, {}, Status.WRONG),
-        (np.array(0.5), "0.5", {}, Status.OK),
-        (np.float32(0.1), 0.1, {"relative": 1e-9}, Status.WRONG),
+        (0.1, "0.1", {}, CaseStatus.WRONG),  # the double is not the decimal
+        (0.1, "0.1", {"absolute": 1e-17}, CaseStatus.OK),
+        (0.1, 0.1, {}, CaseStatus.OK),
+        (1.0 + 2.0**-52, 1, {"relative": 2.2e-16}, CaseStatus.WRONG),
+        (1.0 + 2.0**-52, 1, {"relative": 2.3e-16}, CaseStatus.OK),
+        (math.nan, 1, {"relative": 1.0}, CaseStatus.WRONG),
+        (math.inf, 1, {"absolute": 1e300}, CaseStatus.WRONG),
+        (-2.0, 2, {"relative": 1.0}, CaseStatus.WRONG),
+        (1e308, "-1e308", {"absolute": 1e308}, CaseStatus.WRONG),
+        (mpmath.mpf(1) / 4, Fraction(1, 4), {}, CaseStatus.OK),
+        (mpmath.mpf("nan"), 0, {"absolute": 1}, CaseStatus.WRONG),
+        (np.int64(2**53 + 1), 2**53 + 1, {}, CaseStatus.OK),  # a double does not hold it
+        (np.int64(2**53 + 1), 2**53, {}, CaseStatus.WRONG),
+        (np.array(0.5), "0.5", {}, CaseStatus.OK),
+        (np.float32(0.1), 0.1, {"relative": 1e-9}, CaseStatus.WRONG),
     ],
 )
 def test_numbers(given, right, options, status):
@@ -86,18 +86,18 @@ def test_exact_numbers_of_mpmath():
 
 
 def test_lists_of_different_length_are_wrong():
-    assert status_of(("values", ([1, 2], [1, 2, 3]), {})) == [Status.OK, Status.OK, Status.WRONG]
-    assert status_of(("values", ([1, 2], [1]), {})) == [Status.OK, Status.WRONG]
+    assert status_of(("values", ([1, 2], [1, 2, 3]), {})) == [CaseStatus.OK, CaseStatus.OK, CaseStatus.WRONG]
+    assert status_of(("values", ([1, 2], [1]), {})) == [CaseStatus.OK, CaseStatus.WRONG]
 
 
 def test_reports_and_statements():
-    assert status_of(("reports", (1, 1), {}), ("reports", (1, 2), {})) == [Status.FLAGGED, Status.WRONG]
-    assert status_of(("equals", (5, 5), {}), ("equals", (5, 6), {})) == [Status.OK, Status.WRONG]
-    assert status_of(("holds", (True,), {}), ("holds", (0,), {})) == [Status.OK, Status.WRONG]
-    assert status_of(("mentions", ("leg 2 is short", "leg 2"), {})) == [Status.FLAGGED]
-    assert status_of(("mentions", ("leg 2 is short", "leg 3"), {})) == [Status.WRONG]
-    assert status_of(("mentions", ("", ""), {})) == [Status.WRONG]
-    assert status_of(("below", (1e-3, 1e-2), {}), ("below", (math.nan, 1.0), {})) == [Status.OK, Status.WRONG]
+    assert status_of(("reports", (1, 1), {}), ("reports", (1, 2), {})) == [CaseStatus.FLAGGED, CaseStatus.WRONG]
+    assert status_of(("equals", (5, 5), {}), ("equals", (5, 6), {})) == [CaseStatus.OK, CaseStatus.WRONG]
+    assert status_of(("holds", (True,), {}), ("holds", (0,), {})) == [CaseStatus.OK, CaseStatus.WRONG]
+    assert status_of(("mentions", ("leg 2 is short", "leg 2"), {})) == [CaseStatus.FLAGGED]
+    assert status_of(("mentions", ("leg 2 is short", "leg 3"), {})) == [CaseStatus.WRONG]
+    assert status_of(("mentions", ("", ""), {})) == [CaseStatus.WRONG]
+    assert status_of(("below", (1e-3, 1e-2), {}), ("below", (math.nan, 1.0), {})) == [CaseStatus.OK, CaseStatus.WRONG]
 
 
 def raises(error):
@@ -108,15 +108,15 @@ def raises(error):
 
 
 def test_refusals():
-    assert status_of(("refused", (raises(SpecError("n = 3 is odd")), "n = 3"), {})) == [Status.FLAGGED]
-    assert status_of(("refused", (raises(SpecError("n = 3 is odd")), "m"), {})) == [Status.WRONG]
-    assert status_of(("refused", (raises(SpecError("n\nm")), "n"), {})) == [Status.WRONG]
-    assert status_of(("refused", (lambda: 5, "n"), {})) == [Status.WRONG]
+    assert status_of(("refused", (raises(SpecError("n = 3 is odd")), "n = 3"), {})) == [CaseStatus.FLAGGED]
+    assert status_of(("refused", (raises(SpecError("n = 3 is odd")), "m"), {})) == [CaseStatus.WRONG]
+    assert status_of(("refused", (raises(SpecError("n\nm")), "n"), {})) == [CaseStatus.WRONG]
+    assert status_of(("refused", (lambda: 5, "n"), {})) == [CaseStatus.WRONG]
     with pytest.raises(ZeroDivisionError):
         status_of(("refused", (lambda: 1 / 0, "n"), {}))
 
 
-def outcome_of(monkeypatch, function) -> Outcome:
+def outcome_of(monkeypatch, function) -> CaseOutcome:
     monkeypatch.setattr(Case, "load", lambda self: function)
     return run_case(CASES[0])
 
@@ -127,19 +127,21 @@ def test_a_case_that_breaks_is_wrong(monkeypatch):
         raise ZeroDivisionError("by zero")
 
     found = outcome_of(monkeypatch, breaks)
-    assert found.status is Status.WRONG and found.reason == "ZeroDivisionError: by zero" and len(found.checks) == 1
-    assert outcome_of(monkeypatch, lambda check: None).status is Status.WRONG  # a case without checks proves nothing
+    assert found.status is CaseStatus.WRONG and found.reason == "ZeroDivisionError: by zero" and len(found.checks) == 1
+    assert (
+        outcome_of(monkeypatch, lambda check: None).status is CaseStatus.WRONG
+    )  # a case without checks proves nothing
     refused = outcome_of(monkeypatch, lambda check: raises(GraphsynthError("no"))())
-    assert refused.status is Status.WRONG
+    assert refused.status is CaseStatus.WRONG
 
 
 def test_a_missing_extra_is_no_result(monkeypatch):
     found = outcome_of(monkeypatch, lambda check: raises(MissingExtraError("pip install 'graphsynth[stiff]'"))())
-    assert found.status is Status.NOT_RUN
+    assert found.status is CaseStatus.NOT_RUN
 
 
 def test_a_missing_extra_after_a_check(monkeypatch):
-    for right, status in ((1, Status.NOT_RUN), (2, Status.WRONG)):
+    for right, status in ((1, CaseStatus.NOT_RUN), (2, CaseStatus.WRONG)):
 
         def late(check, right=right):
             check.value("one", 1, right)
@@ -154,13 +156,13 @@ def wrong_report() -> StressReport:
     checks.reports("verdict", "FREE", "FREE")
     good = Checks("section 1")
     good.value("y", 1.0, 1)
-    outcomes = (Outcome(CASES[0], tuple(checks.rows), 0.5), Outcome(CASES[1], tuple(good.rows), 0.25))
+    outcomes = (CaseOutcome(CASES[0], tuple(checks.rows), 0.5), CaseOutcome(CASES[1], tuple(good.rows), 0.25))
     return StressReport(outcomes, (CASES[-1],), 0.75)
 
 
 def test_report():
     report = wrong_report()
-    assert [o.status for o in report.outcomes] == [Status.WRONG, Status.OK]
+    assert [o.status for o in report.outcomes] == [CaseStatus.WRONG, CaseStatus.OK]
     assert report.statement == "2 stress cases with 3 checks: 1 ok, 0 flagged, 1 WRONG, 1 slow ones left out."
     assert report.outcomes[0].worst.what == "x <of> A" and report.wrong == (report.outcomes[0],)
     table = report.to_pandas()
@@ -201,7 +203,7 @@ def test_page_and_table(tmp_path):
 
 
 def test_a_broken_case_is_on_the_page_and_in_the_table():
-    broken = StressReport((Outcome(CASES[0], (), 0.1, "KeyError: 'x'"),), (), 0.1)
+    broken = StressReport((CaseOutcome(CASES[0], (), 0.1, "KeyError: 'x'"),), (), 0.1)
     assert "KeyError" in stress_html(broken)
     assert broken.to_pandas()["given"].tolist() == ["KeyError: 'x'"]
 
@@ -293,7 +295,7 @@ def test_interrupted_runs_keep_what_was_run(capsys, tmp_path, monkeypatch):
 
 
 def test_interrupts_are_handed_back(monkeypatch):
-    monkeypatch.setattr(running_module, "run_case", lambda case: Outcome(case, (), 0.0))
+    monkeypatch.setattr(running_module, "run_case", lambda case: CaseOutcome(case, (), 0.0))
     before = signal.getsignal(signal.SIGINT)
     assert not run_stress(["structure-2"]).not_reached
     assert signal.getsignal(signal.SIGINT) is before
@@ -320,7 +322,7 @@ def test_command_tells_what_is_wrong(capsys, monkeypatch):
 
 def test_progress_is_told_before_each_case(monkeypatch):
     seen = []
-    monkeypatch.setattr(running_module, "run_case", lambda case: Outcome(case, (), 0.0))
+    monkeypatch.setattr(running_module, "run_case", lambda case: CaseOutcome(case, (), 0.0))
     run_stress(["structure-2"], progress=lambda case, number, total: seen.append((case.name, number, total)))
     assert seen == [(f"structure-2.{k + 1}", k, 3) for k in range(3)]
 
@@ -404,7 +406,7 @@ def test_a_name_that_does_not_exist_makes_a_case_wrong(tmp_path):
     (tmp_path / "mine.toml").write_text(OWN.replace("Bearing(-1.0)", "bering(-1.0)"), encoding="utf-8")
     (case, _) = stress_cases(files=[tmp_path / "mine.toml"])
     outcome = run_case(case)
-    assert outcome.status is Status.WRONG and "NameError" in outcome.reason and len(outcome.checks) == 2
+    assert outcome.status is CaseStatus.WRONG and "NameError" in outcome.reason and len(outcome.checks) == 2
 
 
 def test_the_cases_of_a_wheel_are_found(tmp_path, monkeypatch):
