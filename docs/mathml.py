@@ -33,7 +33,9 @@ def _italic(letter: str) -> str:
 
 
 def mathml(tex: str, block: bool) -> str:
-    """Markup of a formula; a ValueError names one that docutils cannot read."""
+    """Markup of a formula; a ValueError names one that docutils cannot read, or would misread."""
+    if re.search(r"frac\s*[0-9]", tex):
+        raise ValueError(f"formula {tex!r}: numerator and denominator want braces")
     try:
         markup = latex2mathml.tex2mathml(tex, as_block=block)
     except MathError as error:
