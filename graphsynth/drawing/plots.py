@@ -10,6 +10,7 @@ import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -191,11 +192,9 @@ def new_figure(size: tuple[float, float]) -> Figure:
     """Return an empty figure of a size in inches; a notebook shows it as it is drawn, pyplot or not."""
     from matplotlib.figure import Figure
 
-    class Shown(Figure):
-        def _repr_svg_(self) -> str:
-            return themed_svg(self)
-
-    return Shown(figsize=size, layout="constrained")
+    figure: Figure = Figure(figsize=size, layout="constrained")
+    figure._repr_svg_ = partial(themed_svg, figure)  # type: ignore[attr-defined]
+    return figure
 
 
 def legend_place(points: int) -> str:
