@@ -22,6 +22,9 @@ def test_collinear_second_guide_is_redundant():
     start = consistent_start(second_guide(0.0), **G3_START)
     assert start.consistent and start.pose_class == "redundant"
     assert len(start.rows) - start.rank == 2 and start.rank == 8 and start.freedom == 1
+    assert "; 2 redundant rows, their reactions are not determined" in start.message
+    assert consistent_start(g3(), **G3_START).message.startswith("consistent: rank 8 of 8 rows, freedom 1")
+    assert "redundant" not in consistent_start(g3(), **G3_START).message
     assert {frozenset(found) for found in start.redundant} == {
         frozenset({"P 0-3 normal", "additional 1: P 0-3 normal"}),
         frozenset({"P 0-3 angle", "additional 1: P 0-3 angle"}),

@@ -211,6 +211,11 @@ def test_an_infinity_is_no_number_of_any_interval():
     assert Interval(1, 2).contains(np.array(1.5)) and Interval(1, 2).contains(np.int64(2))
 
 
+def test_bounded_are_intervals_with_two_finite_ends():
+    lo, hi = np.array([-1.0, 0.0, -INF, -INF, INF]), np.array([2.0, INF, 0.0, INF, -INF])
+    assert Interval.from_bounds(lo, hi).is_bounded.tolist() == [True, False, False, False, False]
+
+
 def test_midpoints_of_half_lines():
     largest = float(np.finfo(np.float64).max)
     assert Interval(0, INF).mid == largest and Interval(-INF, 5).mid == -largest
