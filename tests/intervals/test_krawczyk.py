@@ -312,6 +312,12 @@ def test_many_boxes_at_once_equal_one_by_one():
     assert set(together.status.tolist()) >= {Status.EMPTY, Status.UNIQUE, Status.UNDECIDED}
 
 
+def test_a_box_where_nothing_is_guaranteed_spoils_no_other():
+    boxes = Interval.from_bounds([[0.9], [-1.0], [0.9]], [[1.1], [2.0], [1.1]])
+    found = image(lambda x: [sqrt(x[0]) - 1], boxes)
+    assert found.status.tolist() == [Status.UNIQUE, Status.UNDECIDED, Status.UNIQUE]
+
+
 # -- linear systems ------------------------------------------------------------------------------------------
 
 

@@ -125,6 +125,12 @@ def test_symmetric_graphs(name):
     assert other.form == form
     assert prod(other.index) == order
     assert sorted(lab) == list(range(n))
+    for chosen in (generators, other.generators):  # each joins orbits that those before it have left apart
+        joined = nx.empty_graph(n)
+        for generator in chosen:
+            apart = nx.number_connected_components(joined)
+            joined.add_edges_from(enumerate(generator))
+            assert nx.number_connected_components(joined) < apart
     for generator in generators:
         assert all(graph.has_edge(generator[a], generator[b]) for a, b in graph.edges)
         assert all(orbits[v] == orbits[generator[v]] for v in range(n))

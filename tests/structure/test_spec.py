@@ -303,9 +303,18 @@ def test_bounds_that_follow_only_from_several_equations_together_suffice():
     assert (only.n, only.t0) == (5, 3)
 
 
+@pytest.mark.parametrize("least", [None, 4])
+@pytest.mark.parametrize("most", [None, 6])
+def test_links_are_moving_links_and_the_frame(least, most):
+    links = [None if number is None else number - 1 for number in (least, most)]
+    assert StructuralSpec(W=1, p=7, N=(least, most)).solve() == StructuralSpec(W=1, p=7, n=tuple(links)).solve()
+
+
 def test_too_many_solutions_are_refused():
     with pytest.raises(TooLargeError, match="more than 100 "):
         StructuralSpec(W=1, n=99).solve(limit=100)
+    with pytest.raises(SpecError, match="1000000000000"):
+        StructuralSpec(W=1, n=3).solve(limit=10**12 + 1)
     assert next(StructuralSpec(W=1, n=9999).iter_solutions()).v == 4999
 
 
