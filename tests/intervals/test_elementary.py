@@ -249,6 +249,20 @@ def test_angle_of_boxes(y, x, height, width, s, t):
         assert not result.guaranteed
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_angles_of_boxes_on_one_side_are_those_of_corners(sign):
+    """A box above or below the x axis: the smallest and the largest angle are at corners, and tight."""
+    rng = np.random.default_rng(8)
+    y, x = np.sort(sign * rng.uniform(0.01, 3.0, (300, 2))), np.sort(rng.uniform(-3.0, 3.0, (300, 2)))
+    found = atan2(Interval.from_bounds(*y.T), Interval.from_bounds(*x.T))
+    with mpmath.workdps(40):
+        for k in range(300):
+            angles = [mpmath.atan2(mpmath.mpf(float(b)), mpmath.mpf(float(a))) for a in x[k] for b in y[k]]
+            lo, hi = float(found.lo[k]), float(found.hi[k])
+            assert mpmath.mpf(lo) <= min(angles) < mpmath.mpf(math.nextafter(lo, math.inf))
+            assert mpmath.mpf(math.nextafter(hi, -math.inf)) < max(angles) <= mpmath.mpf(hi)
+
+
 def test_angle_at_the_cut():
     upper = atan2(Interval(0, 1), Interval(-2, -1))
     assert upper.guaranteed
