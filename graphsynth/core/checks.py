@@ -23,18 +23,18 @@ Size = float | complex | None
 SMALLEST, LARGEST = 1e-60, 1e60
 
 
-def finite(name: str, value: Any) -> float:
-    """Return ``value`` as a float; raise `GeometryError` if it is not a finite real number."""
+def finite(name: str, value: Any, error: type[GraphsynthError] = GeometryError) -> float:
+    """Return ``value`` as a float; raise the error if it is not a finite real number."""
     if isinstance(value, bool | str | bytes):
-        raise GeometryError(f"{name} = {value!r} is not a real number; give a finite one")
+        raise error(f"{name} = {value!r} is not a real number; give a finite one")
     try:
         number = float(value)
-    except OverflowError as error:  # an integer of any length: its digits help nobody
-        raise GeometryError(f"{name} is beyond the largest float, 1.8e308; give a finite number") from error
-    except (TypeError, ValueError) as error:
-        raise GeometryError(f"{name} = {value!r} is not a real number; give a finite one") from error
+    except OverflowError as cause:  # an integer of any length: its digits help nobody
+        raise error(f"{name} is beyond the largest float, 1.8e308; give a finite number") from cause
+    except (TypeError, ValueError) as cause:
+        raise error(f"{name} = {value!r} is not a real number; give a finite one") from cause
     if not math.isfinite(number):
-        raise GeometryError(f"{name} = {number} is not finite; give a finite number")
+        raise error(f"{name} = {number} is not finite; give a finite number")
     return number
 
 
@@ -71,12 +71,17 @@ def link_number(name: str, value: Any) -> int:
     return number
 
 
-def positive(name: str, value: Any, *, zero: bool = False) -> float:
-    """Return ``value`` as a float; raise `GeometryError` unless it is positive (or zero, if allowed)."""
-    number = finite(name, value)
-    if number < 0.0 or (number == 0.0 and not zero):
-        bound = "zero or more" if zero else "positive"
-        raise GeometryError(f"{name} = {number} must be {bound}; correct the value")
+def positive(name: str, value: Any, error: type[GraphsynthError] = GeometryError) -> float:
+    """Return ``value`` as a float; raise the error unless it is positive."""
+    if (number := finite(name, value, error)) <= 0.0:
+        raise error(f"{name} = {number} must be positive; correct the value")
+    return number
+
+
+def not_negative(name: str, value: Any, error: type[GraphsynthError] = GeometryError) -> float:
+    """Return ``value`` as a float; raise the error unless it is positive or zero."""
+    if (number := finite(name, value, error)) < 0.0:
+        raise error(f"{name} = {number} must be zero or more; correct the value")
     return number
 
 
@@ -110,23 +115,25 @@ def unit_vector(name: str, value: Any) -> tuple[float, float, float]:
     return (parts[0] / norm, parts[1] / norm, parts[2] / norm)
 
 
-def finite_array(name: str, values: ArrayLike, *, nan: bool = False) -> NDArray[np.float64]:
-    """Return ``values`` as a float array; raise `GeometryError` if an entry is NaN or infinite (unless ``nan``)."""
+def finite_array(
+    name: str, values: ArrayLike, error: type[GraphsynthError] = GeometryError, *, nan: bool = False
+) -> NDArray[np.float64]:
+    """Return ``values`` as a float array; raise the error if an entry is NaN or infinite (unless ``nan``)."""
     try:
         given = np.asarray(values)
         if given.dtype.kind in "cSU":
             kind = "complex numbers" if given.dtype.kind == "c" else "text"
-            raise GeometryError(f"{name} holds {kind}; give real numbers")
+            raise error(f"{name} holds {kind}; give real numbers")
         if given.dtype.kind == "O" and any(part is None for part in given.flat):
-            raise GeometryError(f"{name} holds None; give real numbers")
+            raise error(f"{name} holds None; give real numbers")
         array = given.astype(np.float64, copy=False)
-    except GeometryError:
+    except GraphsynthError:
         raise
-    except (TypeError, ValueError, OverflowError) as error:
-        raise GeometryError(f"{name} is not an array of real numbers: {error}") from error
+    except (TypeError, ValueError, OverflowError) as cause:
+        raise error(f"{name} is not an array of real numbers: {cause}") from cause
     bad = np.flatnonzero(~np.isfinite(array)) if not nan else np.empty(0)
     if bad.size:
-        raise GeometryError(f"{name} holds {array.flat[bad[0]]} at flat position {bad[0]}; give finite numbers only")
+        raise error(f"{name} holds {array.flat[bad[0]]} at flat position {bad[0]}; give finite numbers only")
     return array
 
 
@@ -158,11 +165,13 @@ def plane_point(name: str, value: Any) -> complex:
     return found
 
 
-def whole(name: str, value: Any, least: int, most: int = 10_000_000) -> int:
-    """Return a whole number between the bounds; raise `GeometryError` for anything else."""
+def whole(
+    name: str, value: Any, least: int, most: int = 10_000_000, error: type[GraphsynthError] = GeometryError
+) -> int:
+    """Return a whole number between the bounds; raise the error for anything else."""
     number = None if isinstance(value, bool) else index_of(value)
     if number is None or not least <= number <= most:
-        raise GeometryError(f"{name} = {shown(value)} must be a whole number from {least} to {most}")
+        raise error(f"{name} = {shown(value)} must be a whole number from {least} to {most}")
     return number
 
 

@@ -18,10 +18,11 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache, cached_property, update_wrapper
 from hashlib import sha1, sha256
+from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar
 
-from graphsynth.core.native.library import Native
+from graphsynth.core.native.library import Native, contents
 from graphsynth.core.native.sources import source_digest
 
 _VERSIONS = 8  # of one function for one machine that are kept beside each other
@@ -97,6 +98,32 @@ def kernel(
     if function is None:
         return lambda target: Kernel(target, signature, options)
     return Kernel(function, signature, options)
+
+
+class Deferred(Native):  # type: ignore[misc]  # of the library
+    """A kernel of the library, called without its module, which is imported where the library does not fit."""
+
+    def __init__(self, module: str, name: str) -> None:
+        super().__init__(f"{module}.{name}")
+        self._place = module, name
+
+    @property
+    def digest(self) -> str:
+        """Digest of the sources."""
+        return source_digest(Path(__file__).parents[2].joinpath(*self._place[0].split(".")).with_suffix(".py"))
+
+    @cached_property
+    def fallback(self) -> Callable[..., Any]:
+        """The kernel itself."""
+        function: Callable[..., Any] = getattr(import_module(self._place[0]), self._place[1])
+        self.set_fallback(function)
+        return function
+
+
+@cache
+def named(module: str, *names: str) -> Any:
+    """Return kernels of a module: from the library, if there is one, and the module is not imported for them."""
+    return tuple(Deferred(module, name) if contents() else getattr(import_module(module), name) for name in names)
 
 
 class Intrinsic:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import kernels
 from graphsynth.dynamics.forms.one_coordinate import OneCoordinateForm, one_coordinate_obstacle
-from graphsynth.dynamics.friction.problem import FrictionSolution
 from graphsynth.dynamics.model import Rack, Rigid
 from graphsynth.dynamics.reactions import reactions_from_multipliers, world
 from graphsynth.dynamics.result import FrictionHistory, MotorHistory, RunChecks
@@ -22,6 +21,9 @@ from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import Values, applied_loads, initial_slots
 from graphsynth.mechanism.joints import Cam, Gear, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
+
+if TYPE_CHECKING:
+    from graphsynth.dynamics.friction.problem import FrictionSolution
 
 Array = NDArray[np.float64]
 #: Part of the largest accelerations of a motion below which those of a state are no measure of an error.

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
-from graphsynth.core.checks import Point, finite, link_number, point, positive
+from graphsynth.core.checks import Point, finite, link_number, not_negative, point, positive
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.motors import (
     DCMotor,
@@ -28,14 +28,6 @@ from graphsynth.dynamics.motors import (
 ForceLaw = Callable[[float, Point, Point], Sequence[float]]
 #: (t, relative angle, relative speed) -> torque.
 TorqueLaw = Callable[[float, float, float], float]
-
-
-def not_negative(name: str, value: Any) -> float:
-    """Return ``value`` as a float that is 0 or more; `GeometryError` otherwise."""
-    number = finite(name, value)
-    if number < 0.0:
-        raise GeometryError(f"{name} = {number} must not be negative; correct the value")
-    return number
 
 
 def _pair(element: Any, what: str) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from time import perf_counter
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,12 +24,7 @@ from graphsynth.dynamics.checks import (
     second_accelerations,
     warnings_of,
 )
-from graphsynth.dynamics.forms.augmented import AugmentedForm
 from graphsynth.dynamics.forms.one_coordinate import OneCoordinateForm, one_coordinate_obstacle
-from graphsynth.dynamics.forms.partitioned import PartitionedForm
-from graphsynth.dynamics.friction.loads import FrictionRows
-from graphsynth.dynamics.friction.motion import DryMotion, friction_history
-from graphsynth.dynamics.friction.problem import FrictionProblem, FrictionSolution, Senses
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.motors import current_scale
 from graphsynth.dynamics.result import DynamicEvent, DynamicMotion
@@ -38,6 +33,10 @@ from graphsynth.dynamics.stepping import METHODS, Form, SolverStatistics, StepOp
 from graphsynth.dynamics.switching import integrate, with_starting_modes
 from graphsynth.dynamics.tables import Compiled, compile_model
 from graphsynth.dynamics.values import initial_slots
+
+if TYPE_CHECKING:
+    from graphsynth.dynamics.friction.loads import FrictionRows
+    from graphsynth.dynamics.friction.problem import FrictionSolution, Senses
 
 Array = NDArray[np.float64]
 FormName = Literal["auto", "one-coordinate", "partitioned", "augmented"]
@@ -188,7 +187,11 @@ def make_form(compiled: Compiled, report: StartReport, name: str, project: bool)
     if name == "one-coordinate":
         return OneCoordinateForm(compiled, report)
     if name == "partitioned":
+        from graphsynth.dynamics.forms.partitioned import PartitionedForm
+
         return PartitionedForm(compiled, report)
+    from graphsynth.dynamics.forms.augmented import AugmentedForm
+
     return AugmentedForm(compiled, report, project)
 
 
@@ -223,6 +226,9 @@ def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, option
     run = _Run(compiled, report, name, len(grid), options.project)
     with np.errstate(all="ignore"):
         if compiled.tables.friction.size:
+            from graphsynth.dynamics.friction.loads import FrictionRows
+            from graphsynth.dynamics.friction.motion import DryMotion
+
             run.rows = FrictionRows(compiled)
             make = partial(make_form, name=name, project=options.project)
             dry = DryMotion(run.rows, report, make, partial(scales, compiled, report), run.show)
@@ -269,6 +275,8 @@ def _result(
         slots = run.slots[k] if run.name == "augmented" else initial_slots(compiled, q)
         fit, senses = None, run.senses[k]
         if run.rows is not None and senses is not None:
+            from graphsynth.dynamics.friction.problem import FrictionProblem
+
             fit = FrictionProblem(run.rows, t, q, v, slots).at(senses)
         found = balance_at(compiled.with_modes(run.modes[k]), t, q, v, currents[k], slots, run.own[k], fit)
         a[k], lam[k], kinetic[k], potential[k] = found.a, found.multipliers, found.kinetic, found.potential
@@ -293,7 +301,11 @@ def _result(
     links = compiled.to_links(run.q, run.v, a)
     for array in links:
         array[done:] = np.nan
-    friction = None if run.rows is None else friction_history(run.rows, count, fits)
+    friction = None
+    if run.rows is not None:
+        from graphsynth.dynamics.friction.motion import friction_history
+
+        friction = friction_history(run.rows, count, fits)
     message = "completed"
     if done < count:
         why = run.stats.message if run.rows is not None and run.stats.message else run.form.why or run.stats.message

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from graphsynth.core.checks import Point, finite, link_number, point, positive
+from graphsynth.core.checks import Point, finite, link_number, not_negative, point, positive
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import (
     Element,
@@ -17,7 +17,6 @@ from graphsynth.dynamics.elements import (
     Torque,
     TorqueSource,
     TorsionSpring,
-    not_negative,
 )
 from graphsynth.mechanism.joints import JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver

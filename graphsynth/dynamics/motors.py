@@ -8,64 +8,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.checks import check_fields
+from graphsynth.core.checks import check_fields, finite, not_negative, positive, whole
 from graphsynth.core.errors import SpecError
 
 
-def number(name: str, value: float, *, least: float = -math.inf, above: bool = False, infinite: bool = False) -> float:
-    """Return a finite float not below ``least`` (or above it), or raise `SpecError` naming value, bound and remedy."""
-    try:
-        given = float(value)
-    except OverflowError:
-        raise SpecError(f"{name} is beyond the largest float, 1.8e308; give a number in SI units") from None
-    except (TypeError, ValueError):
-        raise SpecError(f"{name} = {value!r} is not a number; give a number in SI units") from None
-    if math.isnan(given) or (math.isinf(given) and not infinite):
-        raise SpecError(f"{name} = {given} is not finite; give a finite number in SI units")
-    if given < least or (above and given == least):
-        relation = "positive" if above and least == 0.0 else f"{'above' if above else 'at least'} {least:g}"
-        raise SpecError(f"{name} = {given:g} must be {relation}; check the sign and the unit")
-    return given
-
-
-def numbers(name: str, values: Any, unit: str = "SI units", *, finite: bool = True) -> NDArray[np.float64]:
-    """Return an array of floats (finite ones unless said otherwise), or raise `SpecError` naming what was given."""
-    try:
-        found = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        shown = repr(values)
-        raise SpecError(
-            f"{name} = {shown if len(shown) <= 60 else shown[:57] + '...'} are not real numbers; give them in {unit}"
-        ) from None
-    if finite and not np.isfinite(found).all():
-        raise SpecError(f"{name} of shape {found.shape} must be finite; remove what is not a finite number")
-    return found
-
-
-def whole(name: str, value: Any, advice: str) -> int:
-    """Return a whole number of at least 1, or raise `SpecError` with the advice."""
-    try:
-        given = float(value)
-    except (TypeError, ValueError, OverflowError):
-        given = math.nan
-    if not given >= 1.0 or math.isinf(given) or given != math.floor(given):
-        raise SpecError(f"{name} = {value!r} must be a whole number of at least 1; {advice}")
-    return int(given)
-
-
-def _check(motor: object, zero_or_more: tuple[str, ...], positive: tuple[str, ...] = ()) -> None:
+def _check(motor: object, zero_or_more: tuple[str, ...], above_zero: tuple[str, ...] = ()) -> None:
     for item in fields(motor):  # type: ignore[arg-type]
         name, value = item.name, getattr(motor, item.name)
         if name == "pole_pairs":
-            object.__setattr__(motor, name, whole(name, value, "count pairs, not poles"))
+            object.__setattr__(motor, name, whole(name, value, 1, error=SpecError))
             continue
-        low = 0.0 if name in zero_or_more or name in positive else -math.inf
-        checked = number(name, value, least=low, above=name in positive, infinite=name == "voltage_limit")
+        check = not_negative if name in zero_or_more else positive if name in above_zero else finite
+        endless = name == "voltage_limit" and value == math.inf
+        checked = math.inf if endless else check(name, value, SpecError)
         object.__setattr__(motor, name, checked)
         if math.isfinite(checked):
             check_fields(motor, (), SpecError, small=(name,))
@@ -105,7 +64,7 @@ class LinearCharacteristic:
 
     def torque(self, speed: float) -> float:
         """Torque at a shaft speed, N m."""
-        return self.stall - self.slope * number("speed", speed)
+        return self.stall - self.slope * finite("speed", speed, SpecError)
 
 
 @dataclass(frozen=True)
@@ -381,9 +340,9 @@ class Train:
     inertia: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "ratio", number("ratio", self.ratio, least=0.0, above=True))
-        object.__setattr__(self, "efficiency", number("efficiency", self.efficiency, least=0.0, above=True))
-        object.__setattr__(self, "inertia", number("inertia of the train", self.inertia, least=0.0))
+        object.__setattr__(self, "ratio", positive("ratio", self.ratio, SpecError))
+        object.__setattr__(self, "efficiency", positive("efficiency", self.efficiency, SpecError))
+        object.__setattr__(self, "inertia", not_negative("inertia of the train", self.inertia, SpecError))
         check_fields(self, ("ratio", "efficiency"), SpecError, small=("inertia",))
         if self.efficiency > 1.0:
             raise SpecError(f"efficiency = {self.efficiency:g} must be at most 1; give a fraction, not a percentage")
@@ -405,19 +364,19 @@ class Train:
             if not isinstance(stage, Sequence) or len(stage) != 2:
                 raise SpecError(f"stage {stage!r} of the train must be a pair; give (driving teeth, driven teeth)")
             for teeth in stage:
-                whole("teeth", teeth, "give (driving, driven)")
+                whole("teeth", teeth, 1, error=SpecError)
         if efficiency and len(efficiency) != len(stages):
             raise SpecError(f"{len(efficiency)} efficiencies for {len(stages)} stages; give one for each stage")
-        parts = [number("efficiency of a stage", part, least=0.0, above=True) for part in efficiency]
+        parts = [positive("efficiency of a stage", part, SpecError) for part in efficiency]
         driven_teeth, driving_teeth = math.prod(s[1] for s in stages), math.prod(s[0] for s in stages)
         return cls(driven_teeth / driving_teeth, math.prod(parts), inertia)
 
     def output_torque(self, torque: float, speed: float) -> float:
         """Torque at the output for a motor torque (N m) at a motor speed (rad/s): the sign of the power decides."""
-        torque, speed = number("torque", torque), number("speed", speed)
+        torque, speed = finite("torque", torque, SpecError), finite("speed", speed, SpecError)
         eta = self.efficiency if torque * speed >= 0.0 else 1.0 / self.efficiency
         return self.ratio * eta * torque
 
     def reflected(self, inertia: float) -> float:
         """Inertia at the output of a rotor inertia at the motor, plus the train's own, kg m^2."""
-        return self.ratio**2 * number("inertia", inertia) + self.inertia
+        return self.ratio**2 * finite("inertia", inertia, SpecError) + self.inertia

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,11 +14,13 @@ from graphsynth.core.checks import finite, finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import kernels
 from graphsynth.dynamics.model import DynamicModel
-from graphsynth.dynamics.singular import BranchTangents, PoseClass, classify_pose
 from graphsynth.dynamics.tables import Compiled, compile_model, coordinate_row
 from graphsynth.dynamics.values import Values, applied_loads, initial_slots
 from graphsynth.kinematics.engine import codes
 from graphsynth.mechanism.laws import Linear
+
+if TYPE_CHECKING:
+    from graphsynth.dynamics.singular import BranchTangents, PoseClass
 
 Array = NDArray[np.float64]
 
@@ -328,6 +330,8 @@ def classify(values: Values, report: StartReport) -> StartReport:
                 if other != k:
                     basis[other] -= basis[other, column] * basis[k]
         sets = tuple(tuple(name for name, part in zip(report.rows, row) if abs(part) > 1e-8) for row in basis)
+        from graphsynth.dynamics.singular import classify_pose
+
         pose_class, nearby, tangents = classify_pose(values, report.q, rank, left, Vt[rank:].T, RANK)
     return replace(
         report,

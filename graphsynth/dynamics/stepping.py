@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.core.extras import need
-from graphsynth.dynamics.friction.problem import NO_LOADS
 from graphsynth.dynamics.result import DynamicEvent
-from graphsynth.dynamics.singular import lock, stalled
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import initial_slots
 
@@ -30,6 +28,11 @@ _RUNGE_KUTTA = ("DOP853", "RK45", "RK23")
 _STALL, _STALLED = 1e-2, 200
 #: The same for steps shorter than this part of the whole time.
 _TINY = 1e-5
+#: What a formulation says where it finds no loads on the way.
+NO_LOADS = (
+    "there is no motion beyond: the load that friction makes returns to it with a factor that reaches 1, and the joint "
+    "jams; reduce the friction coefficient, or lengthen the guide"
+)
 
 
 @dataclass(frozen=True)
@@ -244,6 +247,8 @@ class Stepper:
             message = self._step(solver)
             stats.steps += 1
             if solver.status == "failed" or not np.isfinite(solver.y).all():
+                from graphsynth.dynamics.singular import lock
+
                 said = str(message or "the solver gave no finite state").rstrip(".")
                 stats.message = ": ".join(filter(None, (said, lock(self.form, before, y))))
                 return None
@@ -252,6 +257,8 @@ class Stepper:
             short = float(solver.t) - before < least and self.form.pivot < 0.05
             self.stalled = self.stalled + 1 if short else 0
             if self.stalled > _STALLED:
+                from graphsynth.dynamics.singular import stalled
+
                 stats.message = f"no way past t = {float(solver.t):.9g} s: {stalled(self.form, before, y)}"
                 return None
             if stats.steps >= self.options.max_steps:

@@ -7,17 +7,17 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from inspect import signature
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
+from graphsynth.core.checks import whole
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.run import run
-from graphsynth.dynamics.driven.setup import Plant, output_times, prepare
-from graphsynth.dynamics.motors import IdealSpeed, Motor, Train, whole
+from graphsynth.dynamics.driven.setup import DriveOptions, Plant, output_times, prepare
+from graphsynth.dynamics.motors import IdealSpeed, Motor, Train
 from graphsynth.evidence.choice import seconds_text
 from graphsynth.evidence.precise_drive import NAME, Shape, precise_drive, shape_of_series
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
@@ -43,13 +43,13 @@ class _Drive(NamedTuple):
     times: Array
 
     def run(self, rtol: float) -> Any:
-        return run(self.plant, self.motor, self.train, self.times, rtol=rtol, estimate=False)
+        return run(self.plant, self.motor, self.train, self.times, DriveOptions(rtol=rtol, estimate=False))
 
     def equations(self) -> tuple[Callable[[float, Array], Array], Array]:
         """Right-hand side of the form with inertia for scipy, and the start."""
         from graphsynth.dynamics.driven.kernels import systems as s
 
-        ready = prepare(self.plant, self.motor, self.train, self.times, 0.0, 0.0, None, regular=False)
+        ready = prepare(self.plant, self.motor, self.train, self.times, DriveOptions())
         scratch = np.zeros(16)
 
         def rhs(_t: float, y: Array) -> Array:
@@ -94,7 +94,7 @@ def work_precision(
     can follow, a run at 1e-13, and ``reference`` of the rows says so.
     """
     out = output_times(times)
-    whole("rounds", rounds, "the best of them is taken")
+    whole("rounds", rounds, 1, error=SpecError)
     if isinstance(motor, IdealSpeed) or train.efficiency < 1.0 or getattr(motor, "voltage_limit", math.inf) < math.inf:
         raise SpecError("the comparison is for motions without events: no ideal speed, voltage limit or efficiency")
     drive, effort = _Drive(plant, motor, train, out), Effort(rounds)
@@ -194,7 +194,7 @@ def drive_problem(
     (('graphsynth', 'scipy LSODA'), 'ok')
     """
     effort = effort or Effort()
-    default = signature(run).parameters["rtol"].default
+    default = DriveOptions().rtol
     times = np.linspace(0.0, end, 11)
     slow = (1e-4, 1e-6, 1e-8)
     tolerances = tuple(sorted({*slow, 1e-10, 1e-12, default} if not effort.quick else {1e-4, 1e-8, default}))[::-1]

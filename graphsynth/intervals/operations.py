@@ -20,9 +20,9 @@ Flags = NDArray[np.uint8]
 @cache
 def _loop(name: str) -> Callable[..., None]:
     """Return a compiled loop; it is loaded when the first operation asks."""
-    from graphsynth.intervals.kernels import loops
+    from graphsynth.core.compilation import named
 
-    found: Callable[..., None] = getattr(loops, name)
+    found: Callable[..., None] = named("graphsynth.intervals.kernels.loops", name)[0]
     return found
 
 

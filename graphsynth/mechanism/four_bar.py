@@ -13,6 +13,7 @@ from enum import IntEnum
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core import checks
 from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.rotatability import FullTurn, four_bar_rotation
-from graphsynth.structure.graph import MechanismGraph
+
+if TYPE_CHECKING:
+    from graphsynth.structure.graph import MechanismGraph
 
 Array = NDArray[np.float64]
 _BESIDE = 1e-140
@@ -151,8 +154,9 @@ class TiltedFourBar:
     convention: str = "spec"
 
     def __post_init__(self) -> None:
-        own = dict.fromkeys(("l1", "l2", "l3", "l4"), checks.positive) | {"k": checks.finite, "alpha": checks.finite}
-        for name, check in {**own, "sgn": checks.sign, "axis": checks.unit_vector}.items():
+        own: dict[str, Any] = dict.fromkeys(("l1", "l2", "l3", "l4"), checks.positive)
+        own |= {"k": checks.finite, "alpha": checks.finite, "sgn": checks.sign, "axis": checks.unit_vector}
+        for name, check in own.items():
             object.__setattr__(self, name, check(name, getattr(self, name)))
         checks.check_fields(self, ("l1", "l2", "l3", "l4"))
         checks.check_sizes("the tracing point", {"1 + |k|": 1.0 + abs(self.k)})
@@ -319,10 +323,10 @@ class TiltedFourBar:
         at, met = (tuple(sorted(sense * (angle - phase) % math.tau for angle in part)) for part in (limits, changes))
         texts = {
             "immovable": f"nothing moves: the linkage can only lie stretched, at {_degrees(at[:1])} degrees",
-            "limited": f"the crank cannot make a full rotation: dead centres at {_degrees(at)} degrees",
+            "limited": f"the crank cannot make a full turn: dead points at {_degrees(at)} degrees",
             "change point": "the crank passes every angle, but the branches meet at the change points "
             f"{_degrees(met)} degrees",
-            "full turn": "the crank makes a full rotation without dead centres or change points",
+            "full turn": "the crank makes a full turn without dead points or change points",
         }
         return FullTurn(kind, at, () if kind == "immovable" else met, "exact", texts[kind])
 
@@ -362,13 +366,13 @@ class TiltedFourBar:
             if v0 * v1 < 0.0
         )
         if limits:
-            text = f"the crank cannot make a full rotation: dead centres near {_degrees(limits)} degrees"
+            text = f"the crank cannot make a full turn: dead points near {_degrees(limits)} degrees"
             return FullTurn("limited", limits, (), "estimated", text)
         if worst <= rounding:
             touch = tuple(f for f, value in nodes if value == worst)
-            text = "the smallest margin is at the rounding level: change point or dead centre, not decided"
+            text = "the smallest margin is at the rounding level: change point or dead point, not decided"
             return FullTurn("change point", (), touch, "estimated", text)
-        text = f"the crank makes a full rotation; smallest relative margin {worst:.3g}"
+        text = f"the crank makes a full turn; smallest relative margin {worst:.3g}"
         return FullTurn("full turn", (), (), "estimated", text)
 
     def straightness(
@@ -416,6 +420,8 @@ class TiltedFourBar:
 
     def graph(self) -> MechanismGraph:
         """Structural graph: a four-bar chain with joints 0-1, 1-2, 2-3, 0-3 and link 0 as the frame."""
+        from graphsynth.structure.graph import MechanismGraph
+
         return MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
 
 

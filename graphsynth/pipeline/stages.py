@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from graphsynth.core.errors import SceneError
+from graphsynth.core.errors import GeometryError, SceneError, SpecError
 from graphsynth.evidence.rows import imported
 from graphsynth.pipeline.scene import Scene
 from graphsynth.pipeline.system import Stage, announced, system
@@ -42,7 +42,10 @@ def build(scene: Scene) -> Any:
         raise (scene.place / "mechanism").error(
             f"has many mechanisms, not one: module = {name!r} builds none by itself"
         )
-    return imported(builder, f"system {name!r}")(Context(scene))
+    try:
+        return imported(builder, f"system {name!r}")(Context(scene))
+    except (SpecError, GeometryError) as error:
+        raise (scene.place / "mechanism").error(f"cannot be built: {error}") from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +64,12 @@ class StageTime:
 class Report:
     """What a run gave."""
 
-    scene: Scene = field(repr=False)
-    products: Mapping[str, Any] = field(repr=False)  # the outputs asked for, and what became of the candidates
-    times: tuple[StageTime, ...] = field(repr=False)  # in the order of running
-    versions: Mapping[str, str] = field(default_factory=dict, repr=False)  # of Python and of loaded packages
+    scene: Scene
+    products: Mapping[str, Any]  # the outputs asked for, and what says what became of the candidates, by name
+    times: tuple[StageTime, ...]  # in the order of running
+    versions: Mapping[str, str] = field(default_factory=dict)  # of Python and of the packages that were loaded
     folder: Path | None = None  # where the report was written
-    stages: tuple[Stage, ...] = field(default=(), repr=False)  # that ran, in order
+    stages: tuple[Stage, ...] = ()  # that ran, in order
     notes: tuple[str, ...] = ()  # a budget that was used up, candidates taken over from an interrupted run
     seconds: float = 0.0  # wall clock; stages of candidates that several processes share take longer together
 

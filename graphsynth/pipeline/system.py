@@ -71,8 +71,8 @@ class System:
     stages: tuple[Stage, ...]  # what can be computed besides ``[structure]``: tables, charts and pictures among it
     structure: Literal["required", "optional", "none"] = "optional"  # whether a scene has a table ``[structure]``
     more: Callable[[Any], tuple[Stage, ...]] | None = None  # stages of parts that only some scenes have, by scene
-    #: ``"package.module:function"`` that makes the mechanism of a scene, called with a
-    #: `graphsynth.pipeline.stages.Context`; empty if a scene has many
+    #: ``"package.module:function"`` that makes the mechanism of a scene, for `graphsynth.pipeline.stages.build` and its
+    #: own stages, called with their `Context`; empty only if a scene has many
     build: str = ""
     evidence: tuple[Plan, ...] = ()  # problems on which error against run time is measured
     cases: tuple[str, ...] = ()  # its stress cases, by name or section, as ``graphsynth stress`` takes them

@@ -286,7 +286,7 @@ def test_effective_inertia_is_twice_the_kinetic_energy(theta, omega, m2, m3):
         (lambda: wheel(elements=[JointFriction(0, 1, 0.2)]), "radius of the pin"),
         (lambda: TorqueSource(0, 1, 1.0, ratio=0.0), "transmits nothing"),
         (lambda: TorqueSource(0, 1, 1.0, efficiency=1.2), "makes power from nothing"),
-        (lambda: Spring(0, 1, stiffness=-1.0), "must not be negative"),
+        (lambda: Spring(0, 1, stiffness=-1.0), "must be zero or more"),
         (lambda: Spring(1, 1), "between link 1 and itself"),
         (lambda: Pulse(0.0, 0.0, 1.0), "must be positive"),
         (lambda: wheel(elements=[Torque(0, 4, 1.0)]), "names link 4"),

@@ -116,7 +116,7 @@ def test_kept_link_coordinates():
 @pytest.mark.parametrize(
     ("make", "text"),
     [
-        (lambda: Body(-1.0, 1.0), "mass = -1.0 must not be negative"),
+        (lambda: Body(-1.0, 1.0), "mass = -1.0 must be zero or more"),
         (lambda: Body(1.0, float("nan")), "not finite"),
         (lambda: g1(bodies={1: bar(1.0, 0.2)}), r"links \[2, 3\] have no body"),
         (lambda: g1(bodies={k: bar(1.0, 0.2) for k in (0, 1, 2, 3)}), "frame"),

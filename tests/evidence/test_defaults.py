@@ -10,7 +10,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "accuracy.md"
 
 
 def _functions():
-    from graphsynth.dynamics.driven.run import run
+    from graphsynth.dynamics.driven.setup import DriveOptions
     from graphsynth.dynamics.integrate import simulate_dynamics
     from graphsynth.jamming.bearing.sweep import sweep_linkage
     from graphsynth.jamming.intersection.boxes import krawczyk_boxes
@@ -23,7 +23,7 @@ def _functions():
     named = (krawczyk_boxes, sweep_linkage, largest_scale, certify_direct, certify_full_turn, simulate_dynamics, embody)
     return {
         **{function.__name__: function for function in named}, "event_driven": Tribometer.event_driven,
-        "time_stepping": Tribometer.time_stepping, "regularised": Tribometer.regularised, "simulate": run,
+        "time_stepping": Tribometer.time_stepping, "regularised": Tribometer.regularised, "simulate": DriveOptions,
     }  # fmt: skip
 
 

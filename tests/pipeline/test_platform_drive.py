@@ -109,9 +109,9 @@ def test_a_run_that_fails_is_told(tables: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("place", "value", "said"),
     [
-        (("motor", "inductance_H"), -0.1, r"inductance = -0.1 must be at least 0"),
-        (("platform", "mass_kg"), -1, r"mass = -1 must be at least 0"),
-        (("resistances_ohm",), [-5.0], r"resistance = -5 must be at least 0"),
+        (("motor", "inductance_H"), -0.1, r"inductance = -0.1 must be zero or more"),
+        (("platform", "mass_kg"), -1, r"mass = -1.0 must be zero or more"),
+        (("resistances_ohm",), [-5.0], r"resistance = -5.0 must be zero or more"),
         (("resistances_ohm",), [], r"has 0 resistances_ohm"),
         (("samples",), 2, r"samples = 2; use 20"),
         (("end_s",), -1.0, r"end_s = -1"),
@@ -177,5 +177,5 @@ def test_the_real_machine_has_its_motor_in_its_own_scene() -> None:
     ripple = [np.ptp(item.run.speed[item.run.time >= 0.3]) for item in runs]
     torque = [np.ptp(item.run.motor_torque[item.run.time >= 0.3]) for item in runs]
     assert ripple[1] > 3 * ripple[0] and torque[1] < torque[0]
-    assert tables(Context(scene), runs)[0].title == "Inertia seen by the motor"
+    assert tables(Context(scene), runs)[0].title == "What the motor feels"
     assert drive_machine(Context(scene), ()) == ()

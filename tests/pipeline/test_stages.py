@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -83,6 +84,24 @@ def test_the_stress_cases_of_every_system_exist() -> None:
         assert stress_cases([case])
 
 
-def test_a_scene_of_many_mechanisms_builds_none_by_itself() -> None:
-    with pytest.raises(SceneError, match="has many mechanisms, not one: module = 'four_bar_survey'"):
-        build(load_scene("four_bar_survey"))
+ONE = {
+    "lambda": "LambdaLinkage", "didenko": "SingleMotorPlatform", "antenna": "PointingMechanism",
+    "tribometer": "Tribometer", "braider": "Braider",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", available_scenes())
+def test_the_system_of_a_scene_builds_its_mechanism_or_says_that_there_are_many(name: str) -> None:
+    scene = load_scene(name)
+    if name in ONE:
+        assert type(build(scene)).__name__ == ONE[name]
+        return
+    with pytest.raises(SceneError, match=f"has many mechanisms, not one: module = '{scene.mechanism.module}'"):
+        build(scene)
+
+
+def test_what_cannot_be_built_is_an_error_of_the_scene() -> None:
+    scene = load_scene("didenko")
+    broken = replace(scene, mechanism=replace(scene.mechanism, rocker=1e70))
+    with pytest.raises(SceneError, match=r"mechanism\] cannot be built: .*1e\+70"):
+        build(broken)

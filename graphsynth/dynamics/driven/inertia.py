@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import finite_array
+from graphsynth.core.checks import finite_array, not_negative
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.motors import number, numbers
 
 Array = NDArray[np.float64]
 
@@ -48,7 +47,7 @@ class EffectiveInertia:
     truncation: float = 0.0
 
     def __post_init__(self) -> None:
-        rows = np.atleast_2d(numbers("rows", self.rows))
+        rows = np.array(finite_array("rows", self.rows, SpecError), ndmin=2)
         if rows.ndim != 2 or rows.shape[1] % 2 == 0:
             raise SpecError(f"rows of shape {rows.shape} must have an odd number of columns; give a0, a1, b1, ...")
         rows.setflags(write=False)
@@ -63,7 +62,7 @@ class EffectiveInertia:
         SpecError
             Negative mass or amplitude.
         """
-        reach = math.sqrt(number("mass", mass, least=0.0)) * number("amplitude", amplitude, least=0.0)
+        reach = math.sqrt(not_negative("mass", mass, SpecError)) * not_negative("amplitude", amplitude, SpecError)
         dead = (-math.pi / 2, math.pi / 2) if reach else ()
         return cls(np.array([[0.0, reach, 0.0]]), dead)
 
@@ -76,7 +75,7 @@ class EffectiveInertia:
         SpecError
             If N samples do not resolve the velocities to ``tolerance`` (relative to the largest).
         """
-        values = np.atleast_2d(numbers("velocities", velocities))
+        values = np.atleast_2d(finite_array("velocities", velocities, SpecError))
         rows, tail = _series(values)
         if not tail <= tolerance:
             raise SpecError(

@@ -8,10 +8,11 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import finite
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.run import DriveRun, RunStatus, largest_defect
-from graphsynth.dynamics.driven.setup import Plant, output_times, prepare
-from graphsynth.dynamics.motors import IdealSpeed, LinearCharacteristic, Train, number
+from graphsynth.dynamics.driven.setup import FROM_REST, DriveOptions, Plant, output_times, prepare
+from graphsynth.dynamics.motors import IdealSpeed, LinearCharacteristic, Train
 
 Array = NDArray[np.float64]
 #: Largest angle of a panel of the quadrature that checks the energy, rad.
@@ -19,19 +20,20 @@ _PANEL = 0.2
 
 
 def prescribed_run(
-    plant: Plant, motor: IdealSpeed, train: Train, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0
+    plant: Plant, motor: IdealSpeed, train: Train, times: ArrayLike, options: DriveOptions = FROM_REST
 ) -> DriveRun:
     """Motion of an ideal speed source: constant crank speed, the motor torque by inverse dynamics, in closed form.
 
-    ``speed`` is 0 or that of the source.  ``energy_error`` compares the kinetic energy with a quadrature of the net
-    power ``J'(q) w^3 / 2``.  NaN from the first angle on at which the mechanism cannot be assembled.
+    Of the options count ``angle`` and ``speed``, 0 or that of the source.  ``energy_error`` compares the kinetic energy
+    with a quadrature of the net power ``J'(q) w^3 / 2``.  NaN from the first angle on at which the mechanism cannot be
+    assembled.
     """
     begin = perf_counter()
     out = output_times(times)
     w = motor.value / train.ratio
-    if number("speed", speed) not in (0.0, w):
+    if (speed := finite("speed", options.speed, SpecError)) not in (0.0, w):
         raise SpecError(f"speed = {speed:g} contradicts the ideal source, which turns the crank at {w:g}; leave it out")
-    q = number("angle", angle) + w * (out - out[0])
+    q = finite("angle", options.angle, SpecError) + w * (out - out[0])
     J, slope, load, friction = _terms(plant, motor, train, out, q)
     required = slope * w * w + friction * w - load
     eta = np.where(required * w >= 0.0, train.efficiency, 1.0 / train.efficiency)
@@ -74,7 +76,7 @@ def _terms(plant: Plant, motor: IdealSpeed, train: Train, out: Array, q: Array) 
     from graphsynth.dynamics.driven.kernels import systems as s
 
     idle = LinearCharacteristic(0.0, 0.0, motor.rotor_inertia, motor.friction)
-    ready = prepare(plant, idle, train, out, float(q[0]), 0.0, None, regular=False, singular=True)
+    ready = prepare(plant, idle, train, out, DriveOptions(float(q[0])), singular=True)
     table = np.zeros((q.size, 16))
     with np.errstate(invalid="ignore"):
         s.tabulate(ready.setup, np.ascontiguousarray(q), ready.values, ready.rows, table)

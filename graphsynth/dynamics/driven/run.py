@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from time import perf_counter
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import finite, whole
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.driven.setup import Plant, Prepared, output_times, prepare
-from graphsynth.dynamics.motors import Motor, Train, number, shaft_torque, whole
+from graphsynth.dynamics.driven.setup import FROM_REST, DriveOptions, Plant, Prepared, output_times, prepare
+from graphsynth.dynamics.motors import Motor, Train, shaft_torque
 
 Array = NDArray[np.float64]
 _EVENTS = {2: "dead centre", 3: "stall", 4: "voltage limit", 5: "direction of power flow"}
@@ -106,39 +107,27 @@ def run(
     motor: Motor,
     train: Train,
     times: ArrayLike,
-    *,
-    angle: float = 0.0,
-    speed: float = 0.0,
-    currents: tuple[float, ...] | None = None,
-    regular: bool = False,
-    rtol: float = 1e-10,
-    max_steps: int = 200_000,
-    max_events: int = 2_000,
-    estimate: bool = True,
+    options: DriveOptions = FROM_REST,
     notes: tuple[str, ...] = (),
 ) -> DriveRun:
     """Integrate a motor, its train and a mechanism from ``times[0]`` through all ``times`` (s, strictly increasing).
 
-    ``angle`` (rad), ``speed`` (rad/s) and ``currents`` (A; zero by default) are those of the start.  ``regular`` uses
-    the regularised form ``dt = sqrt(J) ds`` (theory/motor-drive 3), which passes dead centres without inertia.
-    ``rtol`` is the tolerance per step, 1e-13 to 1e-3; ``max_steps`` and ``max_events`` are guards: exceeding one is a
-    reported failure.  ``estimate`` also runs at ``100 rtol`` with every other output: the difference is the ``error``.
     `SpecError` for friction, no inductance or no rotor inertia where the form chosen cannot have it.
     """
-    begin, out = perf_counter(), output_times(times)
-    whole("max_steps", max_steps, "raise it for long runs")
-    whole("max_events", max_events, "raise it for many events")
-    if not 1e-13 <= number("rtol", rtol) <= 1e-3:
+    begin, out, rtol, regular = perf_counter(), output_times(times), options.rtol, options.regular
+    whole("max_steps", options.max_steps, 1, error=SpecError)
+    whole("max_events", options.max_events, 1, error=SpecError)
+    if not 1e-13 <= finite("rtol", rtol, SpecError) <= 1e-3:
         raise SpecError(f"rtol = {rtol:g} must be from 1e-13 to 1e-3; double precision gives no more")
-    ready = prepare(plant, motor, train, out, angle, speed, currents, regular)
-    found = _integrate(ready, out, rtol, max_steps, max_events)
+    ready = prepare(plant, motor, train, out, options)
+    found = _integrate(ready, out, options)
     status, Y, turns, balance, marks, counts, _ = found
     n = ready.start.size - int(regular)
     error = np.full(n, np.nan)
-    if estimate and status is RunStatus.DONE:
+    if options.estimate and status is RunStatus.DONE:
         # every other output: where the outputs limit the steps, the same outputs would hide the error
         shared = np.unique(np.concatenate([[0], np.arange(out.size - 1, 0, -2)]))
-        second = _integrate(ready, out[shared], min(100.0 * rtol, 1e-2), max_steps, max_events)
+        second = _integrate(ready, out[shared], replace(options, rtol=min(100.0 * rtol, 1e-2)))
         gap = np.abs(Y[shared] - second[1])
         gap[:, 0] = np.abs(Y[shared, 0] - second[1][:, 0] + math.tau * (turns[shared] - second[2]))
         gap[:, 1] /= (math.sqrt(plant.most_inertia) or 1.0) if regular else 1.0
@@ -183,16 +172,16 @@ def run(
     )
 
 
-def _integrate(ready: Prepared, out: Array, rtol: float, max_steps: int, max_events: int) -> _Raw:
+def _integrate(ready: Prepared, out: Array, options: DriveOptions) -> _Raw:
     """One run of the compiled integrator on copies of everything it changes."""
     from graphsynth.dynamics.driven.kernels import radau
 
     n = ready.start.size
     state, values, setup = ready.start.copy(), ready.values.copy(), ready.setup.copy()
     found = np.full((out.size, n), np.nan), np.zeros(out.size, np.int64), np.full((out.size, 6), np.nan)
-    marks, counts = np.full((int(max_events), 3 + n), np.nan), np.zeros(4, np.int64)
-    given = setup, values, ready.rows, ready.zeros, state, out, rtol, ready.scale, ready.first, int(max_steps)
-    status = radau.integrate(*given, *found, marks, counts)
+    marks, counts = np.full((int(options.max_events), 3 + n), np.nan), np.zeros(4, np.int64)
+    control = options.rtol, ready.scale, ready.first, int(options.max_steps)
+    status = radau.integrate(setup, values, ready.rows, ready.zeros, state, out, *control, *found, marks, counts)
     return RunStatus(status), *found, marks, counts, state
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import finite, finite_array
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.inertia import EffectiveInertia
 from graphsynth.dynamics.motors import (
@@ -19,8 +20,6 @@ from graphsynth.dynamics.motors import (
     SynchronousMotor,
     Train,
     electric,
-    number,
-    numbers,
     shaft_torque,
     starting_modes,
 )
@@ -51,6 +50,29 @@ class Plant:
         return float((np.abs(self.rows).sum(axis=1) ** 2).sum())
 
 
+@dataclass(frozen=True)
+class DriveOptions:
+    """State at the start of a run and how it is integrated.
+
+    ``angle`` (rad), ``speed`` (rad/s) and ``currents`` (A; zero by default) are those of the start.  ``regular`` uses
+    the regularised form ``dt = sqrt(J) ds`` (theory/motor-drive 3), which passes dead centres without inertia.
+    ``rtol`` is the tolerance per step, 1e-13 to 1e-3; ``max_steps`` and ``max_events`` are guards: exceeding one is a
+    reported failure.  ``estimate`` also runs at ``100 rtol`` with every other output: the difference is the ``error``.
+    """
+
+    angle: float = 0.0
+    speed: float = 0.0
+    currents: tuple[float, ...] | None = None
+    regular: bool = False
+    rtol: float = 1e-10
+    estimate: bool = True
+    max_steps: int = 200_000
+    max_events: int = 2_000
+
+
+FROM_REST = DriveOptions()
+
+
 class Prepared(NamedTuple):
     """Arrays of the integrator: setup, parameters, series, dead centres, start, natural scales, first step."""
 
@@ -65,23 +87,14 @@ class Prepared(NamedTuple):
 
 def output_times(times: ArrayLike) -> Array:
     """Return strictly increasing finite times as an array, or raise `SpecError`."""
-    out = numbers("times", times, "seconds")
+    out = np.array(finite_array("times", times, SpecError))
     if out.ndim != 1 or out.size < 2 or not (np.diff(out) > 0).all():
         raise SpecError(f"times of shape {out.shape} must be at least two strictly increasing numbers; give them in s")
     return out
 
 
 def prepare(
-    plant: Plant,
-    motor: Motor,
-    train: Train,
-    out: Array,
-    angle: float,
-    speed: float,
-    currents: tuple[float, ...] | None,
-    regular: bool,
-    *,
-    singular: bool = False,
+    plant: Plant, motor: Motor, train: Train, out: Array, options: DriveOptions, *, singular: bool = False
 ) -> Prepared:
     """Check everything and lay it out for the integrator; the arguments are those of `run`.
 
@@ -106,10 +119,16 @@ def prepare(
     count, width = plant.rows.shape
     rows = np.zeros((count + 1, max(width, load.size)))  # the series of the load is the last row
     rows[:-1, :width], rows[-1, : load.size] = plant.rows, load
-    given = (0.0,) * kind if currents is None else tuple(numbers("currents", currents, "A").ravel().tolist())
+    given = (0.0,) * kind
+    if options.currents is not None:
+        given = tuple(finite_array("currents", options.currents, SpecError).ravel().tolist())
     if len(given) != kind:
         raise SpecError(f"{len(given)} currents given for a motor with {kind}; leave them out or give {kind}")
-    q, w = number("angle", angle), number("speed", speed)
+    q, w, regular = (
+        finite("angle", options.angle, SpecError),
+        finite("speed", options.speed, SpecError),
+        options.regular,
+    )
     torque = float(shaft_torque(motor, np.array(train.ratio * w), np.array(given)))
     held, driving = starting_modes(motor, train.ratio * w, torque)
     setup = np.array([s.SERIES if plant.linkage is None else s.FOUR_BAR, kind, int(regular), held, driving])
@@ -143,7 +162,7 @@ def prepare(
 
 def load_coefficients(series: ArrayLike) -> Array:
     """Return the coefficients ``a0, a1, b1, ...`` of a load torque; `SpecError` for an even number of them."""
-    load = numbers("load_series", series, "N m")
+    load = np.array(finite_array("load_series", series, SpecError))
     if load.ndim != 1 or load.size % 2 == 0:
         raise SpecError(f"load_series of shape {load.shape} must be coefficients a0, a1, b1, ...; give an odd number")
     return load

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,16 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import checked
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import kernels
-from graphsynth.dynamics.friction.loads import FrictionRows
-from graphsynth.dynamics.friction.problem import NO_LOADS, FrictionProblem
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.start import StartReport
-from graphsynth.dynamics.stepping import ONE_STAGE, Form, Stages
+from graphsynth.dynamics.stepping import NO_LOADS, ONE_STAGE, Form, Stages
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import applied_loads, initial_slots, joint_coordinate
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.engine.start import started
 from graphsynth.mechanism.laws import Linear
+
+if TYPE_CHECKING:
+    from graphsynth.dynamics.friction.loads import FrictionRows
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -234,7 +235,11 @@ class OneCoordinateForm(Form):
         slots = initial_slots(self.compiled, q)
         if not T.lower.size:  # links without mass
             if self._rows is None:
+                from graphsynth.dynamics.friction.loads import FrictionRows
+
                 self._rows = FrictionRows(self.compiled)
+            from graphsynth.dynamics.friction.problem import FrictionProblem
+
             problem = FrictionProblem(self._rows, t, q, v, slots)
             fit = problem.at(tuple(int(s) if abs(s) <= 1.0 else 0 for s in T.friction_table[:, 6]))
             if fit is None:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.friction.guard import Guard
 from graphsynth.dynamics.friction.loads import FrictionRows, locked
-from graphsynth.dynamics.friction.problem import NO_LOADS, FrictionProblem, FrictionSolution, Senses
+from graphsynth.dynamics.friction.problem import FrictionProblem, FrictionSolution, Senses
 from graphsynth.dynamics.friction.state import Piece, decide, state_values
 from graphsynth.dynamics.result import DynamicEvent, FrictionHistory
 from graphsynth.dynamics.start import StartReport
-from graphsynth.dynamics.stepping import Form, SolverStatistics, StepOptions, Stepper
+from graphsynth.dynamics.stepping import NO_LOADS, Form, SolverStatistics, StepOptions, Stepper
 from graphsynth.dynamics.tables import BY_SPEED, Compiled
 
 Array = NDArray[np.float64]

@@ -22,11 +22,6 @@ from graphsynth.dynamics.values import applied_loads
 Array = NDArray[np.float64]
 Senses = tuple[int, ...]
 
-#: What a formulation says where it finds no loads on the way.
-NO_LOADS = (
-    "there is no motion beyond: the load that friction makes returns to it with a factor that reaches 1, and the joint "
-    "jams; reduce the friction coefficient, or lengthen the guide"
-)
 #: Rates below this part of the velocities that make them count as 0: rounding.
 AT_REST = 1e-12
 #: Joints at rest whose states are enumerated.

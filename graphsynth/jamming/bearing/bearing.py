@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import check_fields, choice, finite, finite_array, positive
+from graphsynth.core.checks import check_fields, choice, finite, finite_array, not_negative, positive
 from graphsynth.core.errors import GeometryError
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ class Bearing:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "Rb", positive("Rb", self.Rb))
-        object.__setattr__(self, "Hb", positive("Hb", self.Hb, zero=True))
+        object.__setattr__(self, "Hb", not_negative("Hb", self.Hb))
         object.__setattr__(self, "clearance", finite("clearance", self.clearance))
         if self.clearance <= -self.Rb:
             raise GeometryError(f"clearance = {self.clearance} mm leaves no hole; it must exceed -Rb = {-self.Rb} mm")

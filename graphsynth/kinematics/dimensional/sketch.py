@@ -194,23 +194,12 @@ class _Drawing:
 
         A step keeps a share of the area of every triangle, so it never gets stuck at a face that is small already.
         """
-        from graphsynth.kinematics.dimensional import kernels
+        from graphsynth.core.compilation import named
 
         x, y = self.z.real.copy(), self.z.imag.copy()
-        kernels.even_out(
-            x,
-            y,
-            self.joints,
-            self.sides,
-            self.stiffness,
-            self.triangles,
-            self.sense,
-            self.corners,
-            self.turned,
-            steps,
-            crowded,
-            _STRENGTHS,
-        )
+        (even_out,) = named("graphsynth.kinematics.dimensional.kernels", "even_out")
+        given = self.joints, self.sides, self.stiffness, self.triangles, self.sense, self.corners, self.turned
+        even_out(x, y, *given, steps, crowded, _STRENGTHS)
         self.z = x + 1j * y
 
     def room(self) -> float:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.compilation import named
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.inputs import coordinates
 from graphsynth.kinematics.engine.program import Program
@@ -260,11 +261,10 @@ def run_program(
     delivery: codes.Delivery = _KEPT,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Run the kernel for every dimension set; returns samples reached, and code and step of the stop."""
-    from graphsynth.kinematics.engine.kernels.running import run
-
     sets, sizes = len(program.tables.row_table), (program.Lc, program.far)
     done, why = np.zeros(sets, dtype=np.int64), np.zeros((sets, 2), dtype=np.int64)
     every = np.ones(program.mechanism.graph.links, dtype=np.bool_) if wanted is None else wanted
     q, u, state = trace.q, trace.u, trace.memory
+    (run,) = named("graphsynth.kinematics.engine.kernels.running", "run")
     run(program.tables, every, q, u, modes, state, delivery, done, why, first, sizes, derivs)
     return done, why

@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import check_fields, finite_array
+from graphsynth.core.checks import check_fields, finite_array, positive
 from graphsynth.core.errors import GeometryError, SpecError
-from graphsynth.dynamics.motors import number
 
 Array = NDArray[np.float64]
 
@@ -79,7 +78,7 @@ class FourBar:
     def __post_init__(self) -> None:
         for name in ("crank", "coupler", "rocker", "frame"):
             try:
-                object.__setattr__(self, name, number(name, getattr(self, name), least=0.0, above=True))
+                object.__setattr__(self, name, positive(name, getattr(self, name), SpecError))
             except SpecError as error:
                 raise GeometryError(str(error)) from None
         check_fields(self, ("crank", "coupler", "rocker", "frame"))

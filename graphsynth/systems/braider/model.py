@@ -10,23 +10,23 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import check_fields, check_sizes, checked, finite_array
+from graphsynth.core.checks import (
+    check_fields,
+    check_sizes,
+    checked,
+    finite,
+    finite_array,
+    not_negative,
+    positive,
+    whole,
+)
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.reduction import ReductionStudy, inductance_study, simulate_drive
 from graphsynth.dynamics.driven.run import DriveRun, RunStatus
-from graphsynth.dynamics.driven.setup import Plant
+from graphsynth.dynamics.driven.setup import DriveOptions, Plant
 from graphsynth.dynamics.elements import Element, Force, MotorDrive
 from graphsynth.dynamics.model import Body, DynamicModel
-from graphsynth.dynamics.motors import (
-    IdealSpeed,
-    LinearCharacteristic,
-    Motor,
-    SynchronousMotor,
-    Train,
-    check_motor,
-    number,
-    whole,
-)
+from graphsynth.dynamics.motors import IdealSpeed, LinearCharacteristic, Motor, SynchronousMotor, Train, check_motor
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism, TracePoint
@@ -72,12 +72,14 @@ class Thread:
 
     def __post_init__(self) -> None:
         for name in ("weight", "height", "gravity"):
-            object.__setattr__(self, name, number(name, getattr(self, name), least=0.0))
+            object.__setattr__(self, name, not_negative(name, getattr(self, name), SpecError))
         try:
             point = complex(self.guide)
         except (TypeError, ValueError, OverflowError):
             raise SpecError(f"guide = {self.guide!r} is no point; give x + 1j * y in metres") from None
-        object.__setattr__(self, "guide", complex(number("guide x", point.real), number("guide y", point.imag)))
+        object.__setattr__(
+            self, "guide", complex(finite("guide x", point.real, SpecError), finite("guide y", point.imag, SpecError))
+        )
         check_fields(self, (), SpecError, small=("weight", "height", "gravity", "guide"))
 
     @checked
@@ -155,9 +157,9 @@ class Braider:
     inertia: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "switch", number("switch", self.switch, least=0.0))
-        object.__setattr__(self, "switch_angle", number("switch_angle", self.switch_angle))
-        object.__setattr__(self, "inertia", number("inertia", self.inertia, least=0.0))
+        object.__setattr__(self, "switch", not_negative("switch", self.switch, SpecError))
+        object.__setattr__(self, "switch_angle", finite("switch_angle", self.switch_angle, SpecError))
+        object.__setattr__(self, "inertia", not_negative("inertia", self.inertia, SpecError))
         names = ("crank", "coupler", "rocker", "switch")
         if not isinstance(self.linkage, FourBar) or not isinstance(self.thread, Thread):
             raise SpecError("linkage and thread must be a FourBar and a Thread; make them first")
@@ -167,7 +169,7 @@ class Braider:
         masses = tuple(self.masses) if isinstance(self.masses, Iterable) else (self.masses,)
         if len(masses) != 4:
             raise SpecError(f"{len(masses)} masses given; give four: {', '.join(names)}")
-        checked = tuple(number(f"mass of the {n}", m, least=0.0) for n, m in zip(names, masses))
+        checked = tuple(not_negative(f"mass of the {n}", m, SpecError) for n, m in zip(names, masses))
         object.__setattr__(self, "masses", checked)
         check_fields(self, (), SpecError, small=("switch", "inertia"))
         check_sizes("Braider", {f"mass of the {n}": m for n, m in zip(names, checked)}, SpecError)
@@ -320,21 +322,10 @@ class Braider:
         SpecError
             Options or numbers that make no sense, L = 0 with the unreduced model, a start out of reach.
         """
-        if not math.isfinite(float(self.linkage.motion(number("angle", angle)).k3)):
+        if not math.isfinite(float(self.linkage.motion(finite("angle", angle, SpecError)).k3)):
             raise SpecError(f"the linkage cannot be assembled at angle = {angle:g} rad; start within linkage.reach()")
-        found = simulate_drive(
-            self.plant(),
-            self.motor,
-            self.train,
-            times,
-            reduce,
-            angle=angle,
-            speed=speed,
-            currents=currents,
-            rtol=rtol,
-            estimate=estimate,
-            max_steps=max_steps,
-        )
+        options = DriveOptions(angle, speed, currents, False, rtol, estimate, max_steps)
+        found = simulate_drive(self.plant(), self.motor, self.train, times, reduce, options)
         for point in self.linkage.change_points():
             turns = np.floor((found.angle - point.theta) / math.tau)
             beyond = np.flatnonzero((turns != turns[0]) & np.isfinite(found.angle))
@@ -410,10 +401,10 @@ class Braider:
         SpecError
             For ``target = 0``.
         """
-        number("band", band, least=0.0, above=True)
-        if number("target", target) == 0.0:
+        positive("band", band, SpecError)
+        if finite("target", target, SpecError) == 0.0:
             raise SpecError("target = 0 has no relative band; give the speed that is to be reached, rad/s")
-        count, last = whole("samples", samples, "give some hundreds"), number("end", end, least=0.0, above=True)
+        count, last = whole("samples", samples, 1, error=SpecError), positive("end", end, SpecError)
         times = np.linspace(0.0, last, count)
         found = self.simulate(times, rtol=rtol, estimate=False)
         outside = np.nonzero(~(np.abs(found.speed / target - 1.0) <= band))[0]

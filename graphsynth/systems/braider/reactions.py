@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import finite_array
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.motors import numbers
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.driven.run import DriveRun
@@ -60,7 +60,7 @@ def reactions(braider: Braider, theta: ArrayLike, speed: ArrayLike, acceleration
 
     given = {"theta": theta, "speed": speed, "acceleration": acceleration}
     # rows of a run that ended early are NaN
-    parts = [np.atleast_1d(numbers(name, value, finite=False)) for name, value in given.items()]
+    parts = [np.atleast_1d(finite_array(name, value, SpecError, nan=True)) for name, value in given.items()]
     try:
         theta, w, alpha = (x.copy() for x in np.broadcast_arrays(*parts))
     except ValueError:

@@ -117,6 +117,7 @@ SYSTEM = System(
     table=BraiderTable,
     cases=("instruments-9.16", "instruments-9.17"),
     structure="none",
+    build=f"{_HERE}.stages:braider_of",
     stages=(
         Stage("start up", f"{_HERE}.stages:start_up", (), ("start_up",)),
         Stage("sensors", f"{_HERE}.stages:sensors", (), ("sensors",)),

@@ -48,18 +48,25 @@ def recognise(context: Context, candidates: tuple[Candidate, ...]) -> tuple[Reco
 
 def kinematics(context: Context, recognised: tuple[Recognised, ...]) -> tuple[Attempt, ...]:
     """Move every recognised candidate through one rotation with the dimensions of the scene."""
-    return each((Attempt(r.candidate, r) for r in recognised if r.module), lambda _: _move(context.scene.mechanism))
+    return each((Attempt(r.candidate, r) for r in recognised if r.module), lambda _: _move(context))
 
 
-def _move(table: LambdaTable) -> LambdaMotion:
+def linkage_of(context: Context) -> TiltedFourBar:
+    """Build the linkage of the scene."""
+    from graphsynth.systems.lambda_linkage.model import LambdaLinkage
+
+    table: LambdaTable = context.scene.mechanism
+    frame, crank, coupler, rocker = astuple(table.lengths)
+    tilt = table.tilt
+    return LambdaLinkage(frame, crank, coupler, rocker, sgn=table.branch, alpha=tilt.alpha, axis=tilt.axis)
+
+
+def _move(context: Context) -> LambdaMotion:
     import numpy as np
 
     from graphsynth.core.errors import GeometryError
-    from graphsynth.systems.lambda_linkage.model import LambdaLinkage
 
-    frame, crank, coupler, rocker = astuple(table.lengths)
-    tilt = table.tilt
-    linkage = LambdaLinkage(frame, crank, coupler, rocker, sgn=table.branch, alpha=tilt.alpha, axis=tilt.axis)
+    table, linkage = context.scene.mechanism, linkage_of(context)
     f = np.linspace(0.0, math.tau, table.positions + 1)
     tilted = linkage.positions(f)
     if not tilted.assembled.any():
@@ -161,7 +168,7 @@ def _margins(
         ("clearance left at the worst crank angle", -report.worst_interference, "mm", proved.clearance_left),
         ("largest tilt", report.largest_tilt, "rad", proved.largest_tilt),
         ("critical tilt", report.critical_tilt, "rad", proved.critical_tilt),
-        ("share of the rotation that binds", part, "", (None, None)),
+        ("part of the rotation that binds", part, "", (None, None)),
     ]
     for name, limit, unit in (
         ("smallest clearance", report.smallest_clearance, "mm"),

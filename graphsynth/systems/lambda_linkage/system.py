@@ -42,6 +42,7 @@ SYSTEM = System(
     table=LambdaTable,
     cases=("lambda",),
     structure="required",
+    build=f"{_HERE}.stages:linkage_of",
     stages=(
         Stage("recognise", f"{_HERE}.stages:recognise", ("candidates",), ("recognised",)),
         Stage("kinematics", f"{_HERE}.stages:kinematics", ("recognised",), ("motions",)),

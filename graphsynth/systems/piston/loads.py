@@ -12,9 +12,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.checks import called, check_fields, finite, finite_array, positive
+from graphsynth.core.checks import called, check_fields, finite, finite_array, not_negative, positive
 from graphsynth.core.errors import GeometryError
-from graphsynth.dynamics.elements import not_negative
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import check_fields, check_sizes, finite, plane_point, positive, sign
+from graphsynth.core.checks import check_fields, check_sizes, finite, not_negative, plane_point, positive, sign
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.triad.leg import solve_leg
 from graphsynth.mechanism.rotatability import FourBarRotation, four_bar_rotation
@@ -71,14 +71,14 @@ class GearTrain:
 
     def wheels_clear(self, module: float = 1.0, addendum: float = 0.0) -> bool:
         """Tell whether neighbouring wheels stay apart, with ``addendum`` added to their pitch radii for ``module``."""
-        module, addendum = positive("module", module), positive("addendum", addendum, zero=True)
+        module, addendum = positive("module", module), not_negative("addendum", addendum)
         return 0.5 * math.sqrt(3.0) * module * (self.z1 + self.z2) > module * self.z2 + 2.0 * addendum
 
 
 class Event(NamedTuple):
     """Something that happens at one input angle.
 
-    ``kind`` is "drive lock", "change point", "rocker dead centre", "platform singular", "leg boundary" or
+    ``kind`` is "drive lock", "change point", "rocker dead point", "platform singular", "leg boundary" or
     "mode mismatch"; ``psi`` in radians; ``leg`` is 1 to 3, or 0 for the platform; ``ends_motion`` tells whether the
     motion stops there; ``pose`` is the last pose reached before a platform singularity.
     """
@@ -137,7 +137,7 @@ class FourBarDrive:
     def __post_init__(self) -> None:
         for name in ("axis", "pivot"):
             object.__setattr__(self, name, plane_point(name, getattr(self, name)))
-        object.__setattr__(self, "crank", positive("crank", self.crank, zero=True))
+        object.__setattr__(self, "crank", not_negative("crank", self.crank))
         for name in ("coupler", "rocker"):
             object.__setattr__(self, name, positive(name, getattr(self, name)))
         object.__setattr__(self, "phase", finite("phase", self.phase))

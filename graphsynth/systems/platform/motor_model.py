@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import check_fields, finite_array
+from graphsynth.core.checks import check_fields, finite, finite_array, not_negative
 from graphsynth.core.errors import GeometryError, SpecError
 from graphsynth.dynamics.driven.inertia import EffectiveInertia
 from graphsynth.dynamics.driven.reduction import ReductionStudy, inductance_study, reduction_error, simulate_drive
 from graphsynth.dynamics.driven.run import DriveRun
-from graphsynth.dynamics.driven.setup import Plant, load_coefficients
-from graphsynth.dynamics.motors import IdealSpeed, Motor, Train, check_motor, number
+from graphsynth.dynamics.driven.setup import DriveOptions, Plant, load_coefficients
+from graphsynth.dynamics.motors import IdealSpeed, Motor, Train, check_motor
 
 if TYPE_CHECKING:
     from graphsynth.systems.platform.motion import Sweep
@@ -75,8 +75,8 @@ class MotorDrivenPlatform:
 
     def __post_init__(self) -> None:
         for name in ("base_inertia", "friction"):
-            object.__setattr__(self, name, number(name, getattr(self, name), least=0.0))
-        object.__setattr__(self, "load", number("load", self.load))
+            object.__setattr__(self, name, not_negative(name, getattr(self, name), SpecError))
+        object.__setattr__(self, "load", finite("load", self.load, SpecError))
         check_fields(self, (), SpecError, small=("base_inertia", "friction", "load"))
         if not isinstance(self.inertia, EffectiveInertia):
             raise SpecError(f"inertia = {self.inertia!r} is no EffectiveInertia; use EffectiveInertia.of_slider(...)")
@@ -111,8 +111,8 @@ class MotorDrivenPlatform:
         """
         series = platform_inertia(machine, mass, gyration, mass_centre, length=length)
         ratio = machine.gears.z2 / machine.gears.z1
-        own = ratio**2 * number("pinion_inertia", pinion_inertia, least=0.0)
-        own += 3.0 * number("wheel_inertia", wheel_inertia, least=0.0)
+        own = ratio**2 * not_negative("pinion_inertia", pinion_inertia, SpecError)
+        own += 3.0 * not_negative("wheel_inertia", wheel_inertia, SpecError)
         return cls(series, motor, Train(ratio, inertia=own))
 
     @property
@@ -153,7 +153,7 @@ class MotorDrivenPlatform:
             Replace the motor by its limit L -> 0; "auto" does so for L = 0, and for a small L if the error of first
             order in L is below ``rtol`` (a note says so).
         rtol, estimate, max_steps
-            See `graphsynth.dynamics.driven.run.run`.
+            See `graphsynth.dynamics.driven.setup.DriveOptions`.
 
         Returns
         -------
@@ -169,25 +169,13 @@ class MotorDrivenPlatform:
         if not isinstance(model, str) or model not in ("auto", "J", "S"):
             raise SpecError(f"model = {model!r} is unknown; choose 'auto', 'J' or 'S'")
         regular = model == "S" or (model == "auto" and self.constant_inertia == 0.0 and bool(self.inertia.dead_centres))
-        return simulate_drive(
-            self.plant(),
-            self.motor,
-            self.train,
-            times,
-            reduce,
-            (_SPIKES,) if regular else (),
-            angle=angle,
-            speed=speed,
-            currents=currents,
-            regular=regular,
-            rtol=rtol,
-            estimate=estimate,
-            max_steps=max_steps,
-        )
+        options = DriveOptions(angle, speed, currents, regular, rtol, estimate, max_steps)
+        notes = (_SPIKES,) if regular else ()
+        return simulate_drive(self.plant(), self.motor, self.train, times, reduce, options, notes)
 
     def reduction_error(self, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0) -> float:
         """Largest error of the angle (rad) of the limit L -> 0 after the electrical transient; see `reduction`."""
-        return reduction_error(self.plant(), self.motor, self.train, times, angle=angle, speed=speed)
+        return reduction_error(self.plant(), self.motor, self.train, times, DriveOptions(angle, speed))
 
     def inductance_study(
         self,
@@ -199,9 +187,8 @@ class MotorDrivenPlatform:
         after: float | None = None,
     ) -> ReductionStudy:
         """Compare the full model at several inductances (H) with the limit L -> 0; see `reduction`."""
-        return inductance_study(
-            self.plant(), self.motor, self.train, times, inductances, angle=angle, speed=speed, after=after
-        )
+        start = DriveOptions(angle, speed)
+        return inductance_study(self.plant(), self.motor, self.train, times, inductances, start, after)
 
     def torque_at_speed(self, q: ArrayLike, speed: float) -> Array:
         """Torque at the crank that keeps a constant crank speed (rad/s): ``J'(q) w^2 / 2 + b w + load``, N m.
@@ -215,7 +202,7 @@ class MotorDrivenPlatform:
         >>> platform.torque_at_speed([0.0, 0.7], 20.0).round(6).tolist()
         [0.0, -0.98545]
         """
-        w, angle = number("speed", speed), finite_array("q", q, nan=True)
+        w, angle = finite("speed", speed, SpecError), finite_array("q", q, nan=True)
         load = np.full(angle.shape, self.load)
         if self.load_series is not None:
             load += EffectiveInertia(np.atleast_2d(self.load_series)).components(angle)[0][0]
@@ -241,8 +228,8 @@ def platform_inertia(
     `SpecError`: negative masses, or a motion that 4096 samples do not resolve. Raises `GeometryError` if the home
     branch does not make a whole turn.
     """
-    m, radius = number("mass", mass, least=0.0), number("gyration", gyration, least=0.0)
-    wheels = [number(f"rocker_inertia {k}", v, least=0.0) for k, v in enumerate(rocker_inertia, 1)]
+    m, radius = not_negative("mass", mass, SpecError), not_negative("gyration", gyration, SpecError)
+    wheels = [not_negative(f"rocker_inertia {k}", v, SpecError) for k, v in enumerate(rocker_inertia, 1)]
     for count in _SAMPLES:
         sweep = _closed_sweep(machine, count)
         dx, dy, turning = sweep.velocity[:-1].T

@@ -14,7 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import check_largest, finite_array, positive, three, three_points, together, triple, triples
+from graphsynth.core.checks import (
+    check_largest,
+    finite_array,
+    not_negative,
+    positive,
+    three,
+    three_points,
+    together,
+    triple,
+    triples,
+)
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.triad.assembly_modes import (
     AssemblyModeBatch,
@@ -79,7 +89,7 @@ def _lengths(name: str, values: Any) -> tuple[float, ...]:
     except ValueError:  # parts of different lengths: the rule of a number finds the one that is none
         alone = False
     given = (values,) * 3 if alone else three(name, values)
-    return tuple(positive(f"{name} of leg {leg}", value, zero=True) for leg, value in enumerate(given, 1))
+    return tuple(not_negative(f"{name} of leg {leg}", value) for leg, value in enumerate(given, 1))
 
 
 @dataclass(frozen=True)

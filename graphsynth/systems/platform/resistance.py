@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import finite_array, not_negative, whole
 from graphsynth.core.errors import SpecError
 from graphsynth.drawing.drive_pictures import COLOURS, STYLES, panel
 from graphsynth.drawing.palette import WHITE
 from graphsynth.drawing.plots import new_figure
-from graphsynth.dynamics.motors import DCMotor, number, numbers, whole
+from graphsynth.dynamics.motors import DCMotor
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ def resistance_effect(
             f"gain = {motor.gain:g}, speed = {motor.speed:g} and torque_constant = {motor.torque_constant:g} must not "
             "vanish: the machine would stand still; give what drives it"
         )
-    values = np.array([number("resistance", r, least=0.0) for r in resistances])
+    values = np.array([not_negative("resistance", r, SpecError) for r in resistances])
     if values.size == 0:
         raise SpecError("there is no resistance to try; give at least one, in ohm")
     ratio, feedback = drive.train.ratio, motor.gain + motor.emf_constant
@@ -180,7 +181,7 @@ def ripple_map(
     >>> (ripple_map(drive, [5.0, 20.0], [0.2, 0.01]).speed_slope < 0.0).tolist()
     [[True], [False]]
     """
-    r, L = numbers("resistances", resistances, "ohm"), numbers("inductances", inductances, "H")
+    r, L = finite_array("resistances", resistances, SpecError), finite_array("inductances", inductances, SpecError)
     if r.ndim != 1 or r.size < 2 or not (np.diff(r) > 0.0).all() or r[0] <= 0.0:
         raise SpecError(f"resistances of shape {r.shape} must be two or more increasing positive numbers; give ohm")
     motor = _armature(drive)
@@ -212,7 +213,7 @@ def steady_ripple(drive: MotorDrivenPlatform, revolutions: int = 40, rtol: float
     Raises `SpecError` for a motor that is no DCMotor.
     """
     motor = _armature(drive)
-    whole("revolutions", revolutions, "two halves of the run are compared")
+    whole("revolutions", revolutions, 1, error=SpecError)
     free = motor.gain * motor.speed
     if free == 0.0:
         raise SpecError(

@@ -9,12 +9,12 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import finite, finite_array, positive, sign, three, three_points, triple
+from graphsynth.core.checks import finite, finite_array, not_negative, positive, sign, three, three_points, triple
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.triad.leg import length_constants
 from graphsynth.systems.platform.drive import DriveTurn, Event, FourBarDrive, GearTrain, first_barrier
@@ -120,8 +120,8 @@ class SingleMotorPlatform:
     gears: GearTrain = field(default_factory=GearTrain)
 
     def __post_init__(self) -> None:
-        rules = {
-            "crank": lambda n, v: positive(n, v, zero=True),
+        rules: dict[str, Any] = {
+            "crank": not_negative,
             "coupler": positive,
             "rocker": positive,
             "phase": finite,

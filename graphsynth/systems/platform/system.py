@@ -47,6 +47,7 @@ SYSTEM = System(
     table=PlatformTable,
     cases=("platform",),
     structure="required",
+    build=f"{_HERE}.stages:platform_of",
     stages=(
         Stage("recognise", f"{_HERE}.stages:recognise", ("candidates",), ("recognised",)),
         Stage("kinematics", f"{_HERE}.stages:kinematics", ("recognised",), ("motions",)),

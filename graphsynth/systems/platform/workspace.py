@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import checked, finite, finite_array, positive, three
+from graphsynth.core.checks import checked, finite, finite_array, not_negative, three
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.platform.field import BoundaryCircle, Limits, leg_circles, meet, poses_at, working_mode
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
@@ -144,7 +144,7 @@ def constant_orientation_workspace(
     mode, bounds = _checked(platform, sigma, limits)
     circles = leg_circles(platform, alpha, mode, bounds)
     scale = max(max(c.radius for c in circles), max(abs(c.centre - circles[0].centre) for c in circles))
-    problem = _Problem(platform, circles, mode, bounds, positive("tolerance", tolerance, zero=True) * scale)
+    problem = _Problem(platform, circles, mode, bounds, not_negative("tolerance", tolerance) * scale)
     thin = problem.thin()
     arcs = problem.arcs() if thin is None else problem.curve(thin)
     isolated = problem.isolated(arcs)

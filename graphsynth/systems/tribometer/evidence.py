@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import SpecError
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
+from graphsynth.pipeline.stages import build
 from graphsynth.systems.tribometer.forms import model_error
 from graphsynth.systems.tribometer.model import Tribometer, general_model
 from graphsynth.systems.tribometer.motion import RunStatus, StickSlipMotion
@@ -35,7 +36,7 @@ def events(context: Any, effort: Effort) -> Problem:
     """Event-driven run against multiple precision, over the first seconds."""
     table = context.scene.mechanism
     duration = min(table.run.duration, 0.5 if effort.quick else _PRECISE_S)
-    return event_problem(table.tribometer(context.scene.place), duration, effort)
+    return event_problem(build(context.scene), duration, effort)
 
 
 def stick_slip(context: Any, effort: Effort) -> Problem:
@@ -43,7 +44,7 @@ def stick_slip(context: Any, effort: Effort) -> Problem:
     table = context.scene.mechanism
     duration = min(table.run.duration, 1.0) if effort.quick else table.run.duration
     m = table.methods
-    return stick_slip_problem(table.tribometer(context.scene.place), duration, m.steps, m.speeds, m.solvers, effort)
+    return stick_slip_problem(build(context.scene), duration, m.steps, m.speeds, m.solvers, effort)
 
 
 class _Truth(NamedTuple):

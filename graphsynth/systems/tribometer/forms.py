@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import finite, positive, whole
 from graphsynth.core.errors import SpecError, TooLargeError
 from graphsynth.systems.tribometer.motion import (
     RunStatus,
@@ -19,7 +20,7 @@ from graphsynth.systems.tribometer.motion import (
     motion_of,
     output_times,
 )
-from graphsynth.systems.tribometer.platforms import Platforms, StribeckLaw, TwoCoefficientLaw, finite, positive
+from graphsynth.systems.tribometer.platforms import Platforms, StribeckLaw, TwoCoefficientLaw
 
 Array = NDArray[np.float64]
 #: Solvers of scipy that the regularised form accepts.
@@ -48,8 +49,8 @@ def time_stepping(
     step.  Changes come at whole steps; errors are estimated by two runs with longer steps.  `SpecError` or
     `TooLargeError` if a number is out of its bounds, or the steps are too many.
     """
-    (duration, times), step = output_times(duration, times), positive("step", step)
-    if not 0.0 <= finite("weight of the step", weight) <= 1.0:
+    (duration, times), step = output_times(duration, times), positive("step", step, SpecError)
+    if not 0.0 <= finite("weight of the step", weight, SpecError) <= 1.0:
         raise SpecError(f"The weight of the step is {weight:g}; give a number from 0 to 1, best 0.5.")
     count = max(1, math.ceil(duration / step * (1.0 - 1e-12)))
     if count > _MOST_STEPS:
@@ -212,13 +213,11 @@ def regularised(
     `RunStatus.FAILED` if the solver stopped, `RunStatus.UNRELIABLE` if the cross-check objects; `SpecError` if the law
     has two coefficients, or a number is out of its bounds.
     """
-    from graphsynth.dynamics.motors import whole
-
     duration, times = output_times(duration, times)
-    if not 1e-13 <= finite("relative tolerance", rtol) <= 1e-2:
+    if not 1e-13 <= finite("relative tolerance", rtol, SpecError) <= 1e-2:
         raise SpecError(f"The relative tolerance is {rtol:g}; give a number from 1e-13 to 1e-2.")
-    calls = whole("most_calls", most_calls, "raise it for long runs")
-    how = _Solving(positive("smoothing velocity", speed), str(solver), rtol, jacobian, calls)
+    calls = whole("most_calls", most_calls, 1, error=SpecError)
+    how = _Solving(positive("smoothing velocity", speed, SpecError), str(solver), rtol, jacobian, calls)
     _refuse(self, how)
     found = _solve(self, duration, times, how)
     reference = event_driven(self, duration, times=times, estimate=False)

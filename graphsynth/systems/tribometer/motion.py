@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import finite, finite_array, not_negative, positive
 from graphsynth.core.errors import SpecError
-from graphsynth.systems.tribometer.platforms import Platforms, finite, positive
+from graphsynth.systems.tribometer.platforms import Platforms
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -86,8 +87,8 @@ class EventGuard:
     steps: int = 1_000_000
 
     def __post_init__(self) -> None:
-        positive("event rate bound", self.rate)
-        positive("shortest dwell", self.dwell, or_zero=True)
+        positive("event rate bound", self.rate, SpecError)
+        not_negative("shortest dwell", self.dwell, SpecError)
         for name in ("window", "steps"):
             if not isinstance(getattr(self, name), int) or getattr(self, name) < 1:
                 raise SpecError(f"The {name} of an event guard is {getattr(self, name)!r}; give a whole number from 1.")
@@ -263,12 +264,10 @@ def motion_of(
 
 def output_times(duration: float, times: ArrayLike | None) -> tuple[float, Array]:
     """Check the final time and the times of the curves, s; 1001 equal steps if these are not given."""
-    from graphsynth.dynamics.motors import numbers
-
-    duration = positive("duration", duration)
+    duration = positive("duration", duration, SpecError)
     if times is None:
         return duration, np.linspace(0.0, duration, 1001)
-    wanted = np.atleast_1d(numbers("times", times, "s", finite=False))
+    wanted = np.atleast_1d(finite_array("times", times, SpecError, nan=True))
     if wanted.ndim != 1 or not wanted.size or not ((wanted >= 0.0) & (wanted <= duration)).all():
         raise SpecError(f"The times asked for must be numbers between 0 and the duration {duration:g}.")
     if (np.diff(wanted) < 0.0).any():
@@ -292,7 +291,7 @@ def event_driven(
     `RunStatus.COMPLETE` the motion is that up to where the run stopped; `SpecError` if a number is out of its bounds.
     """
     duration, times = output_times(duration, times)
-    if not 1e-14 <= finite("relative tolerance", rtol) <= 1e-3:
+    if not 1e-14 <= finite("relative tolerance", rtol, SpecError) <= 1e-3:
         raise SpecError(f"The relative tolerance is {rtol:g}; give a number from 1e-14 to 1e-3.")
     guard = guard or EventGuard()
     data = self.data()

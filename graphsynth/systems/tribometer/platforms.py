@@ -10,32 +10,11 @@ from typing import NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import check_fields, finite_array
+from graphsynth.core.checks import check_fields, finite, finite_array, not_negative, positive
 from graphsynth.core.errors import GeometryError, SpecError
 
 Array = NDArray[np.float64]
 Speed = TypeVar("Speed", float, Array)
-
-
-def finite(name: str, value: float) -> float:
-    """Return a number as float; raise `SpecError` if it is not a finite one."""
-    try:
-        number = float(value)
-    except OverflowError:
-        raise SpecError(f"The {name} must be at most 1.8e308, the largest float.") from None
-    except (TypeError, ValueError):
-        raise SpecError(f"The {name} must be a number, not {value!r}.") from None
-    if not math.isfinite(number):
-        raise SpecError(f"The {name} must be finite, not {number}.")
-    return number
-
-
-def positive(name: str, value: float, *, or_zero: bool = False) -> float:
-    """Return a number above zero (``or_zero``: at least zero) as float; raise `SpecError` for any other."""
-    number = finite(name, value)
-    if number < 0.0 or (number == 0.0 and not or_zero):
-        raise SpecError(f"The {name} is {number:g}; it must be {'at least' if or_zero else 'greater than'} zero.")
-    return number
 
 
 class FrictionLaw(ABC):
@@ -47,8 +26,8 @@ class FrictionLaw(ABC):
 
     def _check(self, *more: str) -> None:
         """Check the coefficients, which all laws have; ``more`` are the names of further numbers above zero."""
-        for name, sizes in (("static", False), ("kinetic", True), ("viscous", True)):
-            value = positive(f"{name} friction coefficient", getattr(self, name), or_zero=sizes)
+        for name, check in (("static", positive), ("kinetic", not_negative), ("viscous", not_negative)):
+            value = check(f"{name} friction coefficient", getattr(self, name), SpecError)
             object.__setattr__(self, name, value)
         if self.kinetic > self.static:
             raise SpecError(
@@ -124,8 +103,8 @@ class StribeckLaw(FrictionLaw):
     viscous: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "velocity", positive("Stribeck velocity", self.velocity))
-        object.__setattr__(self, "exponent", finite("Stribeck exponent", self.exponent))
+        object.__setattr__(self, "velocity", positive("Stribeck velocity", self.velocity, SpecError))
+        object.__setattr__(self, "exponent", finite("Stribeck exponent", self.exponent, SpecError))
         if self.exponent < 1.0:
             raise SpecError(f"The Stribeck exponent is {self.exponent:g}; it must be at least 1.")
         self._check("velocity", "exponent")
@@ -161,8 +140,8 @@ class Drive(ABC):
     def _check(self, *lengths: tuple[str, str]) -> None:
         """Check lengths, pairs of field and name in messages, and the speed of a crank, which has to turn."""
         for field_name, name in lengths:
-            object.__setattr__(self, field_name, positive(name, getattr(self, field_name)))
-        object.__setattr__(self, "speed", finite("crank speed", self.speed))
+            object.__setattr__(self, field_name, positive(name, getattr(self, field_name), SpecError))
+        object.__setattr__(self, "speed", finite("crank speed", self.speed, SpecError))
         if self.speed == 0.0:
             raise GeometryError("The crank speed is 0; the drive has to turn, give a speed in rad/s other than zero.")
         check_fields(self, (*(name for name, _ in lengths), "speed"))
@@ -183,7 +162,7 @@ class BeltDrive(Drive):
     speed: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "speed", finite("belt speed", self.speed))
+        object.__setattr__(self, "speed", finite("belt speed", self.speed, SpecError))
         check_fields(self, (), small=("speed",))
 
     @property
@@ -291,13 +270,13 @@ class Platforms:
 
     def __post_init__(self) -> None:
         for name, value in (
-            ("mass", positive("mass", self.mass)),
-            ("stiffness", positive("spring stiffness", self.stiffness)),
-            ("damping", positive("damping", self.damping, or_zero=True)),
-            ("load", finite("load", self.load)),
-            ("gravity", positive("gravity", self.gravity, or_zero=True)),
-            ("x2", finite("initial position", self.x2)),
-            ("v2", None if self.v2 is None else finite("initial velocity", self.v2)),
+            ("mass", positive("mass", self.mass, SpecError)),
+            ("stiffness", positive("spring stiffness", self.stiffness, SpecError)),
+            ("damping", not_negative("damping", self.damping, SpecError)),
+            ("load", finite("load", self.load, SpecError)),
+            ("gravity", not_negative("gravity", self.gravity, SpecError)),
+            ("x2", finite("initial position", self.x2, SpecError)),
+            ("v2", None if self.v2 is None else finite("initial velocity", self.v2, SpecError)),
         ):
             object.__setattr__(self, name, value)
         check_fields(self, ("mass", "stiffness"), SpecError, small=("damping", "load", "gravity", "x2", "v2"))
@@ -333,7 +312,7 @@ class Platforms:
 
     def stiffened(self, factor: float, *, scaled_damping: bool = True) -> Self:
         """Return the same with the stiffness times ``factor``; with ``scaled_damping`` the damping ratio stays."""
-        factor = positive("factor on the stiffness", factor)
+        factor = positive("factor on the stiffness", factor, SpecError)
         damping = self.damping * math.sqrt(factor) if scaled_damping else self.damping
         return replace(self, stiffness=self.stiffness * factor, damping=damping)
 

@@ -17,7 +17,7 @@ from graphsynth.pipeline.display import quantity_table, table
 from graphsynth.pipeline.products import Quantity, Record, Table, exact
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.system import Stage, System
-from graphsynth.pipeline.tables import In, Place, require
+from graphsynth.pipeline.tables import In, require
 
 if TYPE_CHECKING:
     from graphsynth.evidence.rows import Problem
@@ -122,23 +122,25 @@ class TribometerTable:
     run: RunTable = field(default_factory=RunTable)
     methods: MethodsTable = field(default_factory=MethodsTable)
 
-    def tribometer(self, place: Place) -> Tribometer:
-        """Build the tribometer; a number that makes no sense is an error of the scene."""
-        from graphsynth.systems.tribometer.model import Tribometer
-
-        p, part = self.platform, "friction"
-        try:
-            law, part = self.friction.law(), "drive"
-            drive, part = self.drive.drive(), "platform"
-            return Tribometer(p.mass, p.stiffness, p.damping, p.load, p.gravity, law, drive, p.x2, p.v2)
-        except (SpecError, GeometryError) as error:
-            raise (place / "mechanism" / part).error(f"cannot be used: {error}") from error
-
 
 def _table(context: Context) -> TribometerTable:
     found = context.scene.mechanism
     assert isinstance(found, TribometerTable)  # the registry chose these stages by the module of the scene
     return found
+
+
+def tribometer_of(context: Context) -> Tribometer:
+    """Build the tribometer; a number that makes no sense is an error of the scene."""
+    from graphsynth.systems.tribometer.model import Tribometer
+
+    own, part = _table(context), "friction"
+    p = own.platform
+    try:
+        law, part = own.friction.law(), "drive"
+        drive, part = own.drive.drive(), "platform"
+        return Tribometer(p.mass, p.stiffness, p.damping, p.load, p.gravity, law, drive, p.x2, p.v2)
+    except (SpecError, GeometryError) as error:
+        raise (context.scene.place / "mechanism" / part).error(f"cannot be used: {error}") from error
 
 
 def move(context: Context) -> StickSlipMotion:
@@ -147,7 +149,7 @@ def move(context: Context) -> StickSlipMotion:
 
     run = _table(context).run
     times = np.linspace(0.0, run.duration, run.samples)
-    tribometer = _table(context).tribometer(context.scene.place)
+    tribometer = tribometer_of(context)
     try:
         return tribometer.event_driven(run.duration, times=times, rtol=run.tolerance)
     except SpecError as error:
@@ -158,7 +160,7 @@ def cycle(context: Context) -> LimitCycle:
     """Find the periodic motion to which the tribometer settles."""
     from graphsynth.systems.tribometer.cycles import limit_cycle
 
-    return limit_cycle(_table(context).tribometer(context.scene.place), most_turns=_table(context).run.most_turns)
+    return limit_cycle(tribometer_of(context), most_turns=_table(context).run.most_turns)
 
 
 def methods(context: Context, motion: StickSlipMotion, solvers: tuple[str, ...] = ()) -> Problem | None:
@@ -171,7 +173,7 @@ def methods(context: Context, motion: StickSlipMotion, solvers: tuple[str, ...] 
     settings: dict[str, Any] = {"tolerances": m.tolerances, "steps": m.steps, "speeds": m.speeds}
     settings["solvers"] = solvers or m.solvers
     try:
-        return method_study(scene.tribometer(context.scene.place), scene.run.duration, **settings)
+        return method_study(tribometer_of(context), scene.run.duration, **settings)
     except SpecError as error:
         raise (context.scene.place / "mechanism" / "methods").error(f"cannot be used: {error}") from error
 
@@ -193,9 +195,9 @@ def assess(
     """Give the verdict and the tables."""
     margins = _margins(motion, cycle)
     tables = [
-        quantity_table("Results", margins, motion.statement),
+        quantity_table("What the run gives", margins, motion.statement),
         _events_table(motion),
-        _cycle_table(_table(context).tribometer(context.scene.place), cycle),
+        _cycle_table(tribometer_of(context), cycle),
         _energy_table(motion),
     ]
     if study is not None:
@@ -251,7 +253,7 @@ def _margins(motion: StickSlipMotion, cycle: LimitCycle) -> tuple[Quantity, ...]
         found.append(Quantity("period of the cycle", cycle.period, "s", error=error))
         found.append(Quantity("largest multiplier of the cycle", max(map(abs, cycle.multipliers))))
     found.append(Quantity("largest estimated error of an event time", worst, "s"))
-    found.append(Quantity("relative error of the energy balance", motion.energy_residual))
+    found.append(Quantity("energy that does not balance, relative", motion.energy_residual))
     return tuple(found)
 
 
@@ -306,7 +308,7 @@ def _energy_table(motion: StickSlipMotion) -> Table:
     }
     rows = [(name, f"{energy:.12g} J") for name, energy in energies.items()]
     warned = "" if motion.energy_residual <= BALANCE else " (WARNING)"
-    rows.append(("largest relative error of the balance", f"{motion.energy_residual:.1e}{warned}"))
+    rows.append(("largest gap of the balance, relative", f"{motion.energy_residual:.1e}{warned}"))
     note = "Each is integrated by itself along the run; none is the remainder of the others."
     return table("Energy balance", ("", ""), rows, note)
 
@@ -336,6 +338,7 @@ SYSTEM = System(
     table=TribometerTable,
     cases=("instruments-3.8", *(f"instruments-9.{k}" for k in range(10, 16))),
     structure="none",
+    build=f"{_HERE}.system:tribometer_of",
     stages=(
         Stage("run", f"{_HERE}.system:move", (), ("motion",)),
         Stage("find limit cycle", f"{_HERE}.system:cycle", (), ("cycle",)),

@@ -7,8 +7,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import finite_array, not_negative
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.motors import DCMotor, Train, number, numbers
+from graphsynth.dynamics.motors import DCMotor, Train
 
 Array = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ def linear_response(
     [4.715860858, 17.915043449]
     """
     gear = train or Train()
-    total = number("inertia", inertia, least=0.0) + gear.reflected(motor.rotor_inertia)
+    total = not_negative("inertia", inertia, SpecError) + gear.reflected(motor.rotor_inertia)
     if total == 0.0 or motor.inductance == 0.0:
         raise SpecError(f"inertia = {total:g} and inductance = {motor.inductance:g} must both be positive here")
     if motor.torque_constant == 0.0 or motor.gain + motor.emf_constant == 0.0:
@@ -59,7 +60,7 @@ def linear_response(
         raise SpecError("the closed form has neither friction nor a voltage limit; use simulate")
     if gear.efficiency < 1.0:
         raise SpecError(f"efficiency = {gear.efficiency:g} changes with the power flow; use simulate, or efficiency 1")
-    t = numbers("times", times, "seconds")
+    t = finite_array("times", times, SpecError)
     feedback = motor.gain + motor.emf_constant
     a = motor.resistance / (2.0 * motor.inductance)
     square = gear.ratio**2 * motor.torque_constant * feedback / (motor.inductance * total)

@@ -10,7 +10,7 @@ import pytest
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.inertia import EffectiveInertia
 from graphsynth.dynamics.driven.run import run
-from graphsynth.dynamics.driven.setup import Plant
+from graphsynth.dynamics.driven.setup import DriveOptions, Plant
 from graphsynth.dynamics.motors import DCMotor, IdealSpeed, IdealTorque, LinearCharacteristic, SynchronousMotor, Train
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 from tests.dynamics.motors.linear_response import linear_response
@@ -44,7 +44,7 @@ def test_synchronous_motor_at_speed_obeys_its_equations():
     """A motor held at constant speed (huge inertia) settles at the solution of two linear equations."""
     motor = SynchronousMotor(3, 1.5, 2e-3, 4e-3, -0.4, 1.7)
     speed = 50.0
-    found = run(Plant(np.zeros((1, 1)), 1e9), motor, Train(), [0.0, 1.0], speed=speed, rtol=1e-12)
+    found = run(Plant(np.zeros((1, 1)), 1e9), motor, Train(), [0.0, 1.0], DriveOptions(speed=speed, rtol=1e-12))
     reactance = 3 * speed * 2e-3
     steady = np.linalg.solve([[1.5, -reactance], [reactance, 1.5]], [-0.4, 1.7 - 3 * speed * 4e-3])
     assert found.currents[-1] == pytest.approx(steady, rel=1e-10)
@@ -220,24 +220,26 @@ REFUSED = {
     "resistance and inductance are both zero": lambda: DCMotor(0.0, 0.0, **DC),
     "inductance = -0.1": lambda: DCMotor(1.0, -0.1, **DC),
     "resistance = nan": lambda: DCMotor(math.nan, 0.1, **DC),
-    "voltage_limit = 0 ": lambda: DCMotor(1.0, 0.1, **DC, voltage_limit=0.0),
+    "voltage_limit = 0.0 must be positive": lambda: DCMotor(1.0, 0.1, **DC, voltage_limit=0.0),
     "rotor_inertia = -1": lambda: IdealTorque(1.0, rotor_inertia=-1.0),
     "slope = -2": lambda: LinearCharacteristic(1.0, -2.0),
     "pole_pairs = 1.5": lambda: SynchronousMotor(1.5, 1.0, 0.0, 0.1, 0.0, 1.0),
-    "resistance = 0 must be positive": lambda: SynchronousMotor(1, 0.0, 0.1, 0.1, 0.0, 1.0),
+    "resistance = 0.0 must be positive": lambda: SynchronousMotor(1, 0.0, 0.1, 0.1, 0.0, 1.0),
     "no limit for L -> 0": lambda: DCMotor(0.0, 0.1, **DC).reduced(),
     "nonlinear": lambda: DCMotor(1.0, 0.1, **DC, voltage_limit=10.0).reduced(),
-    "ratio = 0 must be positive": lambda: Train(0.0),
+    "ratio = 0.0 must be positive": lambda: Train(0.0),
     "at most 1": lambda: Train(2.0, 90.0),
     "teeth = 0": lambda: Train.of_teeth([(0, 30)]),
     "2 efficiencies for 1 stages": lambda: Train.of_teeth([(10, 30)], (0.9, 0.9)),
-    "is not a number": lambda: DCMotor("one", 0.1, **DC),
+    "resistance = 'one' is not a real number": lambda: DCMotor("one", 0.1, **DC),
     "pole_pairs = 'two' must be a whole number": lambda: SynchronousMotor("two", 1.0, 0.1, 0.1, 0.0, 1.0),
     "stage 10 of the train must be a pair": lambda: Train.of_teeth([10]),
     "teeth = 'x'": lambda: Train.of_teeth([(10, "x")]),
     "'motor' is no motor": lambda: MotorDrivenPlatform.source("motor"),
     "is no EffectiveInertia": lambda: MotorDrivenPlatform(5, DCMotor(1.0, 0.1, **DC)),
-    "are not real numbers": lambda: MotorDrivenPlatform.source(DCMotor(1.0, 0.1, **DC)).simulate(["a", "b"]),
+    "times holds text; give real numbers": lambda: MotorDrivenPlatform.source(DCMotor(1.0, 0.1, **DC)).simulate(
+        ["a", "b"]
+    ),
     "at least two strictly increasing": lambda: MotorDrivenPlatform.source(DCMotor(1.0, 0.1, **DC)).simulate(5),
     "max_steps = -5": lambda: MotorDrivenPlatform.source(DCMotor(1.0, 0.1, **DC)).simulate([0, 1], max_steps=-5),
     "2 currents given": lambda: MotorDrivenPlatform.source(DCMotor(1.0, 0.1, **DC)).simulate([0, 1], currents=(1, 2)),
@@ -245,7 +247,7 @@ REFUSED = {
         DCMotor(1.0, 0.1, 0.0, 0.1, 20.0, 20.0), 0.1, [0, 1]
     ),
     "no inductance to try": lambda: MotorDrivenPlatform.source(DCMotor(1.0, 0.1, **DC)).inductance_study([0, 1], []),
-    "rows = 'abc' are not": lambda: EffectiveInertia("abc"),
+    "rows holds text": lambda: EffectiveInertia("abc"),
     "odd number of columns": lambda: EffectiveInertia([[1.0, 2.0]]),
     "load_series of shape": lambda: MotorDrivenPlatform(
         EffectiveInertia([[1.0]]), DCMotor(1.0, 0.1, **DC), load_series=[1, 2]

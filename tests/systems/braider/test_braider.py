@@ -335,7 +335,7 @@ REFUSED = {
     "3 masses given": lambda: Braider(masses=(1, 1, 1)),
     "weight = -1": lambda: Thread(weight=-1.0),
     "inertia = -1": lambda: Braider(inertia=-1.0),
-    "crank = 0 must be positive": lambda: FourBar(crank=0.0),
+    "crank = 0.0 must be positive": lambda: FourBar(crank=0.0),
     r"branch = 2 must be": lambda: FourBar(branch=2),
     "inductance = 0 with the unreduced": lambda: replace(
         Braider(), motor=replace(Braider().motor, inductance=0.0)
@@ -348,7 +348,7 @@ REFUSED = {
     "crank is beyond the largest float": lambda: FourBar(crank=10**400),
     "FourBar and a Thread": lambda: Braider(linkage="x"),
     "target = 0 has no relative band": lambda: Braider().settling(0.0),
-    "theta = 'x' are not": lambda: reactions(Braider(), "x", 1.0, 0.0),
+    "theta holds text": lambda: reactions(Braider(), "x", 1.0, 0.0),
     "do not fit": lambda: reactions(Braider(), [0.0, 1.0], [1.0, 2.0, 3.0], 0.0),
     "no inductance to take to zero": lambda: Braider(motor=IdealSpeed(1.0)).inductance_study([0, 1], (1e-3,)),
 }

@@ -359,7 +359,7 @@ def test_free_motion_of_the_model():
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda: PistonMasses(crank=-1.0), "crank = -1.0 must not be negative"),
+        (lambda: PistonMasses(crank=-1.0), "crank = -1.0 must be zero or more"),
         (lambda: PistonFriction(guide=-0.1), "friction guide"),
         (lambda: PistonFriction(smoothing_velocity=0.0), "smoothing_velocity"),
         (lambda: CompressorCycle(0.0, 1e5, 6e5), "bore of the compressor"),

@@ -3,10 +3,7 @@
 The angle is kept within a few turns beside a count of turns in the form with inertia, and every update is compensated,
 so that roundings do not add up over a long run.
 
-General integrators are scipy's business, and this one exists only because scipy's were measured and do not do: with
-the same compiled equations, Jacobian and output times, LSODA stays above 4e-12 at its tightest tolerance where this
-reaches 3e-15, and Radau and BDF take hundreds of times as long at equal error (docs/explanation/decisions.md, "One
-integrator of our own").
+Why not scipy's integrators: docs/explanation/decisions.md, "One integrator of our own, for drives".
 """
 
 import math
@@ -61,7 +58,7 @@ def attempt(setup, P, V, y, h, f0, jac, unit, kappa, Z, F, tmp):
     """Solve the stage equations for a step h from the guess Z; the scaled size of the error, or -1 for no success."""
     n = y.size
     m = STAGES * n
-    M = np.empty((m, m))
+    M = np.empty((m, m))  # I - h A x jac, of all stages together, is factorised once
     order = np.empty(m, np.int64)
     for i in range(STAGES):
         for j in range(STAGES):
@@ -74,7 +71,7 @@ def attempt(setup, P, V, y, h, f0, jac, unit, kappa, Z, F, tmp):
         return -1.0
     v, stage, f = np.empty(m), np.empty(n), np.empty(n)
     before, ratio, solved = 0.0, 1.0, False
-    for step in range(15):
+    for step in range(15):  # simplified Newton iteration: the residual -Z + h A f(y + Z) of all stages, then M dZ = v
         for i in range(STAGES):
             for a in range(n):
                 stage[a] = y[a] + Z[i, a]
@@ -96,7 +93,7 @@ def attempt(setup, P, V, y, h, f0, jac, unit, kappa, Z, F, tmp):
         size = math.sqrt(size / m)
         if not size < 1e200:
             return -1.0
-        if step > 0:
+        if step > 0:  # what is left is estimated from the rate of convergence ([Hairer & Wanner 1996], IV.8)
             ratio = size / before if before > 0.0 else 0.0
         if size <= 1e-3 * kappa or (step > 0 and ratio < 1.0 and ratio / (1.0 - ratio) * size <= kappa):
             solved = True
@@ -178,7 +175,7 @@ def locate(code, target, setup, P, V, y, h, last, f0, jac, unit, kappa, Z, F, tm
     """Step that just passes the event (Illinois method on exact steps); Z of that step; -1 if steps fail."""
     n = y.size
     end = np.empty(n)
-    low, high = 0.0, h
+    low, high = 0.0, h  # the event lies between them; ``best`` is the shortest step known to pass it
     at_low, at_high = min(passed(code, setup, P, y, y, target), 0.0), last
     kept = np.empty((STAGES, n))
     copy(Z, kept)
@@ -191,7 +188,7 @@ def locate(code, target, setup, P, V, y, h, last, f0, jac, unit, kappa, Z, F, tm
         middle = min(max(middle, low + 1e-16 * h), high)
         if middle <= low or middle >= high:
             break
-        clear(Z)
+        clear(Z)  # a whole step of its own, no interpolation: the event is met to the last digit
         if attempt(setup, P, V, y, middle, f0, jac, unit, kappa, Z, F, tmp) < 0.0:
             return -1.0
         for a in range(n):
@@ -201,7 +198,7 @@ def locate(code, target, setup, P, V, y, h, last, f0, jac, unit, kappa, Z, F, tm
             narrow = best - middle
             high, at_high, best = middle, value, middle
             copy(Z, kept)
-            if side == 1:
+            if side == 1:  # the same end moved twice: the value at the other one is halved
                 at_low *= 0.5
             side = 1
         else:
@@ -287,6 +284,7 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
     span = outs[-1] - outs[0]
     fresh = True
     while True:
+        # outputs that are reached: state, turns, balances and energies
         while target_index < outs.size and (y[n - 1] if regular else x) >= outs[target_index]:
             for a in range(n):
                 Y[target_index, a] = y[a]
@@ -300,7 +298,7 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
             return DONE
         if counts[0] + counts[1] >= most:
             return TOO_MANY_STEPS
-        goal = outs[target_index]
+        goal = outs[target_index]  # rates, Jacobian and tolerances at the start of the step
         field(setup, P, V, y, f0, tmp)
         jacobian(setup, P, V, y, f0, scale, jac, work, tmp)
         for a in range(n):
@@ -308,7 +306,7 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
                 return NOT_FINITE
             unit[a] = rtol * (abs(y[a]) + scale[a])
         h = wanted
-        while True:
+        while True:  # shorter until the error of the step is small enough; in the form with inertia it ends at outputs
             last_one = False
             if not regular and x + 1.0001 * h >= goal:
                 h = goal - x
@@ -328,7 +326,7 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
             h *= 0.3 if error < 0.0 else max(0.2, 0.9 * error ** (-1.0 / (STAGES + 1)))
             wanted = h
         grown = min(8.0, 0.9 * max(error, 1e-12) ** (-1.0 / (STAGES + 1)))
-        happened = NONE
+        happened = NONE  # the first event on the way shortens the step, one after the other
         trial = h
         for a in range(n):
             stage[a] = y[a] + guess[STAGES - 1, a]
@@ -351,7 +349,7 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
             wanted = 0.5 * h
             fresh = True
             continue
-        for i in range(STAGES):
+        for i in range(STAGES):  # balances by the quadrature of the stages
             for a in range(n):
                 stage[a] = y[a] + guess[i, a]
             field(setup, P, V, stage, work, tmp)
@@ -359,7 +357,7 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
                 sums[k] += h * A[STAGES - 1, i] * tmp[11 + k]
         copy(guess, Z)
         old, fresh = h, False
-        for a in range(n):
+        for a in range(n):  # the step is taken
             amount[a] = Z[STAGES - 1, a]
         advance(y, low, amount)
         x = goal if last_one else x + h
@@ -368,7 +366,7 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
         if happened == OUTPUT:
             y[n - 1] = goal
             low[n - 1] = 0.0
-        elif happened != NONE:
+        elif happened != NONE:  # the mode changes, the event is noted, and the next step starts without a guess
             if counts[2] == marks.shape[0]:
                 return TOO_MANY_EVENTS
             piece = react(happened, setup, P, y, zeros, piece)
@@ -380,7 +378,7 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
                 marks[row, 3 + a] = y[a]
             counts[2] += 1
             fresh = True
-        if not regular and abs(y[0]) > LEAST_ANGLE:
+        if not regular and abs(y[0]) > LEAST_ANGLE:  # whole turns go into the count, 2 pi in two parts
             whole = math.floor(y[0] / TURN + 0.5)
             wound += int(whole)
             for a in range(n):

@@ -58,6 +58,7 @@ def four_bar(theta, P, out):
     a, b, c, g = L[LA], L[LB], L[LC], L[LG]
     ct, st = math.cos(theta), math.sin(theta)
     half_s, half_c = math.sin(0.5 * theta), math.cos(0.5 * theta)
+    # the triangle over the diagonal d from the crank pin to the rocker's pivot, of height h, gives coupler and rocker
     d = math.sqrt((g - a) * (g - a) + 4.0 * a * g * half_s * half_s)
     far = L[FAR] * (b + c + a + g) + 4.0 * a * g * half_c * half_c
     near = L[NEAR] + 4.0 * a * g * half_s * half_s
@@ -66,12 +67,14 @@ def four_bar(theta, P, out):
     u = (b * b - c * c + d * d) / (2.0 * d)
     abx, aby = u * ex - h * ey, u * ey + h * ex
     obx, oby = -(d - u) * ex - h * ey, -(d - u) * ey + h * ex
+    # sines and cosines of differences of angles (2 coupler, 3 rocker, t crank) as products of vectors
     sin32 = h * d / (b * c)
     sin3t = (ct * oby - st * obx) / c
     sint2 = (st * abx - ct * aby) / b
     cos32 = (abx * obx + aby * oby) / (b * c)
     cos3t = (ct * obx + st * oby) / c
     cost2 = (ct * abx + st * aby) / b
+    # first and second transmission ratios, inertia and half its derivative from them
     k2 = -a * sin3t / (b * sin32)
     k3 = a * sint2 / (c * sin32)
     f2 = (a * cos3t + b * k2 * k2 * cos32 - c * k3 * k3) / (b * sin32)
@@ -89,6 +92,7 @@ def four_bar(theta, P, out):
         + i2 * k2 * f2
         + i3 * k3 * f3
     )
+    # the thread pulls the point r of the rocker towards G
     rx = L[RS] / c * (obx * L[COS_D] - oby * L[SIN_D])
     ry = L[RS] / c * (obx * L[SIN_D] + oby * L[COS_D])
     dx, dy = L[GX] - g - rx, L[GY] - ry
@@ -122,14 +126,14 @@ def field(setup, P, V, y, dy, tmp):
     """
     q, p = y[0], y[1]
     mechanism(setup, q, P, V, tmp)
-    g = 1.0
+    g = 1.0  # dt/ds; beyond the bounds of the piece it goes on smoothly with the other sign
     if setup[FORM] == REGULAR:
         g = math.sqrt(tmp[0])
         if q < P[LOW] or q > P[HIGH]:
             g = -g
     N = P[RATIO]
     E = P[ELECTRIC:]
-    torque, surplus, source = 0.0, 0.0, 0.0
+    torque, surplus, source = 0.0, 0.0, 0.0  # of the motor; rates of its currents go into dy
     if setup[MOTOR] == LINEAR:
         torque = E[0] - E[1] * N * p
     elif setup[MOTOR] == DIRECT:
@@ -149,6 +153,7 @@ def field(setup, P, V, y, dy, tmp):
         torque = 1.5 * E[2] * E[3] * i
         source = 1.5 * g * (E[4] * d + E[5] * i)
         surplus = source - 1.5 * g * E[1] * (d * d + i * i) - torque * N * p
+    # equation of motion J w' = drive - J'/2 w^2, which has p' = drive in the regularised form
     drive = transmitted(setup, P, torque) + tmp[2]
     dy[0] = p
     if setup[FORM] == REGULAR:

@@ -37,7 +37,7 @@ def triangular(l1, c1, r1, side1, s1, c2, r2, side2, s2, phi1, phi2, u, v, statu
         u[i] = v[i] = margin1[i] = margin2[i] = np.nan
         deficit[i] = 0.0
         close[i] = False
-        p, q, k = ball_joint(l1, c1, r1, side1, phi1[i])
+        p, q, k = ball_joint(l1, c1, r1, side1, phi1[i])  # first equation: P1 cos u + Q1 sin u = K1
         square = p * p + q * q
         rest = square - k * k
         close[i] = abs(rest) <= DOUBT * square
@@ -49,17 +49,17 @@ def triangular(l1, c1, r1, side1, s1, c2, r2, side2, s2, phi1, phi2, u, v, statu
             status[i] = FREE
             continue
         code = FOLD_FIRST if rest == 0.0 else OK
-        root = math.sqrt(rest)
+        root = math.sqrt(rest)  # sine and cosine of u, times P1^2 + Q1^2
         sine = q * k + s1 * p * root
         cosine = p * k - s1 * q * root
         u[i] = math.atan2(sine, cosine)
         margin1[i] = root / math.sqrt(square)
         p, q, k = ball_joint(l1, c2, r2, side2, phi2[i])
-        q *= cosine / square
+        q *= cosine / square  # second equation: its Q2 is seen at the angle u
         square = p * p + q * q
         rest = square - k * k
         close[i] |= abs(rest) <= DOUBT * square * (1.0 + 1.0 / margin1[i])
-        if rest < 0.0:
+        if rest < 0.0:  # without v there is no pose: u is taken back
             status[i] = OUT_SECOND
             deficit[i] = abs(k) - math.sqrt(square)
             u[i] = margin1[i] = np.nan

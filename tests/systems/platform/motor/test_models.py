@@ -11,7 +11,7 @@ import pytest
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.inertia import EffectiveInertia
 from graphsynth.dynamics.driven.run import RunStatus, run
-from graphsynth.dynamics.driven.setup import Plant
+from graphsynth.dynamics.driven.setup import DriveOptions, Plant
 from graphsynth.dynamics.motors import DCMotor, LinearCharacteristic, Train
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 
@@ -215,7 +215,8 @@ def test_regularised_form_of_any_inertia_agrees_with_the_form_with_inertia():
     inertia = EffectiveInertia(np.array([[0.08, 0.05, 0.01, 0.004, -0.01], [0.02, 0.0, 0.03, 0.01, 0.0]]))
     plant = Plant(inertia.rows, load_series=np.array([0.0, 0.02, -0.01]), load=-0.01)
     times = np.linspace(0.0, 1.0, 5)
-    one, two = (run(plant, motor(1.0, 0.1), Train(), times, speed=0.5, regular=r, rtol=1e-12) for r in (False, True))
+    forms = (DriveOptions(speed=0.5, regular=regular, rtol=1e-12) for regular in (False, True))
+    one, two = (run(plant, motor(1.0, 0.1), Train(), times, form) for form in forms)
     np.testing.assert_allclose(one.angle, two.angle, rtol=1e-12, atol=1e-13)
     np.testing.assert_allclose(one.speed, two.speed, rtol=1e-11)
     np.testing.assert_allclose(one.currents, two.currents, rtol=1e-10, atol=1e-11)
@@ -223,7 +224,9 @@ def test_regularised_form_of_any_inertia_agrees_with_the_form_with_inertia():
 
 def test_long_runs_keep_the_angle_within_a_turn():
     """A body that turns freely through 1e5 turns: one rounding of the whole angle, not one for every turn."""
-    found = run(Plant(np.zeros((1, 1)), 1.0), LinearCharacteristic(0.0), Train(), [0.0, 1e5], speed=2 * math.pi)
+    found = run(
+        Plant(np.zeros((1, 1)), 1.0), LinearCharacteristic(0.0), Train(), [0.0, 1e5], DriveOptions(speed=2 * math.pi)
+    )
     with mpmath.workdps(40):
         exact = mpmath.mpf(2 * math.pi) * 100000
         turns = mpmath.mpf(int(found.turns[-1])) * 2 * mpmath.pi
