@@ -95,6 +95,15 @@ def _without_chance_links(app: object, doctree: nodes.document) -> None:
             node.replace_self(node.children)
 
 
+def _whole_numbers(app: Any, tree: Any, name: str) -> None:
+    """Keep numbers such as 1e-6 in one line: browsers break lines behind the hyphen."""
+    for text in [text for entry in tree.findall(nodes.entry) for text in entry.findall(nodes.Text)]:
+        parts = re.split(r"(\d[\d.]*e-\d+)", text.astext())
+        if len(parts) > 1 and not isinstance(text.parent, nodes.math | nodes.literal):
+            numbers = [nodes.inline("", s, classes=["number"]) if k % 2 else nodes.Text(s) for k, s in enumerate(parts)]
+            text.parent.replace(text, numbers)
+
+
 def _note_other_names(app: Any, env: Any) -> None:
     """Enter the longer names of public objects in the inventory (``objects.inv``) too."""
     domain = env.domains.python_domain
@@ -117,6 +126,7 @@ def setup(app: Any) -> dict[str, bool]:
     app.connect("source-read", _read)
     app.connect("autodoc-process-docstring", _docstring)
     app.connect("doctree-read", _without_chance_links)
+    app.connect("doctree-resolved", _whole_numbers)
     app.connect("env-updated", _note_other_names)
     app.add_html_math_renderer("mathml", (_formula, None), (_formula, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

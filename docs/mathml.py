@@ -16,9 +16,14 @@ OVER = re.compile(rf"<mover[^>]*>\s*<mi>(\w)</mi>\s*{ACCENT}</mover>")
 OVER_INDEXED = re.compile(
     rf"<munderover>\s*<mi>(\w)</mi>\s*((?:(?!<munderover|</munderover).)*?){ACCENT}</munderover>", re.DOTALL
 )
-NAMES = "cos|sin|tan|arccos|arcsin|arctan|exp|ln|log|det|max|min|sup|atan2|cross|dot|seg|dseg|xms|sign|sgn|arg|diag"
+NAMES = (
+    "cos|sin|tan|cosh|sinh|tanh|arccos|arcsin|arctan|atanh|atan2|exp|ln|log|det|max|min|sup|hypot|cross|dot|seg|dseg|xms"
+    "|sign|sgn|arg|diag|rank|trace|Re|Im"
+)
 AFTER = re.compile(r"<mo>&ApplyFunction;</mo>\s*(?=(<mo stretchy=\"false\">[(\[])?)")
-BEFORE = re.compile(rf"(</m(?:i|n|sub|sup|subsup|sqrt)>\s*)(?=(?:<msup>\s*)?<mi>(?:{NAMES})</mi>)")
+BEFORE = re.compile(
+    rf"(</m(?:i|n|sub|sup|subsup|sqrt|frac)>\s*)(?=(?:<msup>\s*)?<mi(?: mathvariant=\"normal\")?>(?:{NAMES})</mi>)"
+)
 SPACE = '<mspace width="0.17em"/>'
 
 

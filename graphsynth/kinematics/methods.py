@@ -32,6 +32,14 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
+class GroupSamples(dict[int, Array]):
+    """Arrays by the number of a group, which show their ranges."""
+
+    def __repr__(self) -> str:
+        shown = (f"{k}: {np.nanmin(v):.4g} to {np.nanmax(v):.4g} in {len(v)} samples" for k, v in self.items())
+        return f"{{{', '.join(shown)}}}"
+
+
 class Polodes(NamedTuple):
     """Fixed polode (in the frame of the base) and moving polode (in the frame of the link), each (n, 2)."""
 
@@ -70,7 +78,7 @@ class MotionMethods(Shown):
         closure: Any
         residual: Any
 
-        def transmission_angle(self) -> dict[int, Array]: ...  # noqa: D102
+        def transmission_angle(self) -> GroupSamples: ...  # noqa: D102
 
     # --- instantaneous kinematics
 
@@ -135,13 +143,13 @@ class MotionMethods(Shown):
             across = 1j * a / turn[2] if second else a / turn[1] ** 2
             return Circles(_points(pole + 0.5 * across), np.abs(across), _points(pole))
 
-    def transmission_index(self) -> dict[int, Array]:
+    def transmission_index(self) -> GroupSamples:
         """Return the transmission index of every dyad with two modes, by group: the sine of its transmission angle.
 
         1 where force is handed on best, 0 in a dead-centre position [Sutherland & Roth, J. Eng. Ind. 95 (1973)
         589-597, for planar linkages].
         """
-        return {group: np.sin(angle) for group, angle in self.transmission_angle().items()}
+        return GroupSamples((group, np.sin(angle)) for group, angle in self.transmission_angle().items())
 
     def mechanical_advantage(self, link: int) -> Array:
         """Return effort on a link over effort of the driver, without losses, shape (n,) [Norton 2004, chapter 6].

@@ -323,10 +323,10 @@ class TiltedFourBar:
         at, met = (tuple(sorted(sense * (angle - phase) % math.tau for angle in part)) for part in (limits, changes))
         texts = {
             "immovable": f"nothing moves: the linkage can only lie stretched, at {_degrees(at[:1])} degrees",
-            "limited": f"the crank cannot make a full turn: dead points at {_degrees(at)} degrees",
+            "limited": f"the crank cannot make a full rotation: dead centres at {_degrees(at)} degrees",
             "change point": "the crank passes every angle, but the branches meet at the change points "
             f"{_degrees(met)} degrees",
-            "full turn": "the crank makes a full turn without dead points or change points",
+            "full turn": "the crank makes a full rotation without dead centres or change points",
         }
         return FullTurn(kind, at, () if kind == "immovable" else met, "exact", texts[kind])
 
@@ -366,13 +366,13 @@ class TiltedFourBar:
             if v0 * v1 < 0.0
         )
         if limits:
-            text = f"the crank cannot make a full turn: dead points near {_degrees(limits)} degrees"
+            text = f"the crank cannot make a full rotation: dead centres near {_degrees(limits)} degrees"
             return FullTurn("limited", limits, (), "estimated", text)
         if worst <= rounding:
             touch = tuple(f for f, value in nodes if value == worst)
-            text = "the smallest margin is at the rounding level: change point or dead point, not decided"
+            text = "the smallest margin is at the rounding level: change point or dead centre, not decided"
             return FullTurn("change point", (), touch, "estimated", text)
-        text = f"the crank makes a full turn; smallest relative margin {worst:.3g}"
+        text = f"the crank makes a full rotation; smallest relative margin {worst:.3g}"
         return FullTurn("full turn", (), (), "estimated", text)
 
     def straightness(

@@ -100,8 +100,7 @@ def chart(
 ) -> Picture:
     """Draw curves of SI values over one axis; what `graphsynth.drawing.plots.line_plot` takes more is passed on.
 
-    Lines, levels and bands are in SI; the labels `x`, `y` of the axes name their units in brackets; `place` is the one
-    on the page.
+    Lines, levels and bands are in SI; the labels `x`, `y` of the axes name their units in brackets.
     """
     import numpy as np
 

@@ -162,9 +162,12 @@ class Picture:
     """An inline SVG with a title and a caption, and the place it takes on the page: small ones stand in rows."""
 
     title: str
-    svg: str
+    svg: str = field(repr=False)
     caption: str = ""
     size: Literal["small", "normal", "wide"] = "normal"
+
+    def _repr_svg_(self) -> str:
+        return self.svg
 
 
 @dataclass(frozen=True, slots=True)

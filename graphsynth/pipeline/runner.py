@@ -59,8 +59,7 @@ def run(
     Raises
     ------
     SceneError, FormatError
-        If the scene cannot be read or asks for something no stage gives, or the folder cannot be written: this is tried
-        before anything is computed.
+        At once, if the scene cannot be read or asks for what no stage gives, or the folder cannot be written.
     SpecError
         If the structural question makes no sense.
     """
@@ -111,8 +110,7 @@ def execute(
 class Running:
     """Resolved stages, each behind all it needs, and what they have given so far.
 
-    Parameters are those of `execute`. `stages` are in the order of running; `seconds` is the wall clock of all
-    together.
+    Parameters are those of `execute`. `stages` are in the order of running; `seconds`: wall clock of all together.
     """
 
     def __init__(

@@ -64,12 +64,12 @@ class StageTime:
 class Report:
     """What a run gave."""
 
-    scene: Scene
-    products: Mapping[str, Any]  # the outputs asked for, and what says what became of the candidates, by name
-    times: tuple[StageTime, ...]  # in the order of running
-    versions: Mapping[str, str] = field(default_factory=dict)  # of Python and of the packages that were loaded
+    scene: Scene = field(repr=False)
+    products: Mapping[str, Any] = field(repr=False)  # the outputs asked for, and what became of the candidates
+    times: tuple[StageTime, ...] = field(repr=False)  # in the order of running
+    versions: Mapping[str, str] = field(default_factory=dict, repr=False)  # of Python and of loaded packages
     folder: Path | None = None  # where the report was written
-    stages: tuple[Stage, ...] = ()  # that ran, in order
+    stages: tuple[Stage, ...] = field(default=(), repr=False)  # that ran, in order
     notes: tuple[str, ...] = ()  # a budget that was used up, candidates taken over from an interrupted run
     seconds: float = 0.0  # wall clock; stages of candidates that several processes share take longer together
 

@@ -91,11 +91,11 @@ def _best(ranking: Ranking, records: Sequence[Record]) -> list[Finding]:
 def _one(ranking: Ranking, record: Record) -> str:
     """Describe a candidate: what it is, the values of the objectives with their places, its score, its verdict.
 
-    A place is how a value stands among all ranked ones: ``"least"``, ``"3rd greatest"``, ``"2nd nearest to 5"``.
+    A place is how a value stands among all ranked ones: ``"smallest"``, ``"3rd largest"``, ``"2nd nearest to 5"``.
     """
     place = ranking.numbers.index(record.number)
     units = {margin.name: f" {margin.unit}" for margin in record.margins if margin.unit}
-    words: dict[object, str] = {"min": "least", "max": "greatest"}
+    words: dict[object, str] = {"min": "smallest", "max": "largest"}
     told = []
     for objective, value, better in zip(ranking.objectives, ranking.values[place], ranking.places[place], strict=True):
         word = words.get(objective.goal) or f"nearest to {objective.goal:g}"
@@ -124,7 +124,8 @@ def _verdicts(records: Sequence[Record]) -> list[Finding]:
     counts = Counter((record.verdict, record.good) for record in assessed)
     found, rest = [], len(assessed)
     for (verdict, good), count in counts.most_common(_VERDICTS):
-        several = f"{count} of the {len(records)} candidates have the verdict: {verdict}."
+        those = "All" if count == len(records) else f"{count} of the"
+        several = f"{those} {len(records)} candidates have the verdict: {verdict}."
         found.append(Finding(several if len(assessed) > len(counts) else f"{verdict[:1].upper()}{verdict[1:]}.", good))
         rest -= count
     if len(counts) > _VERDICTS:

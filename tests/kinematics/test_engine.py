@@ -371,7 +371,7 @@ def test_single_motor_platform_over_a_turn(crank: tuple[float, ...], phase: tupl
         assert np.abs(own[:, 14] - closed).max() < 1e-10
     assert motion.residual < 1e-13 and np.nanmax(motion.errors) < 1e-11
     reversals = sorted(e.input for e in motion.events if e.kind == "dead centre")
-    known = sorted(e.psi for e in expected.events if e.kind == "rocker dead point" and crank[e.leg - 1] > 0.0)
+    known = sorted(e.psi for e in expected.events if e.kind == "rocker dead centre" and crank[e.leg - 1] > 0.0)
     np.testing.assert_allclose(reversals, known, atol=1e-9)
     np.testing.assert_allclose(motion.poses[:, 2, 2] - motion.poses[0, 2, 2], expected.psi, atol=1e-13)
     report = mechanism.mobility(motion.poses[7])

@@ -70,7 +70,9 @@ def test_table_of_conventions(report: Any) -> None:
     assert rows["crank of leg Y reversed"] == pytest.approx([0.01, 0.15, 0.74, 2.34, 11.81, 37.19], abs=6e-3)
     assert rows["crank of leg X reversed"] == pytest.approx([0.00, -0.02, -0.08, -0.27, -1.54, -5.62], abs=6e-3)
     assert rows["tilt of the normal as output"] == pytest.approx([0.12, 0.94, 3.14, 7.33, 23.50, 51.19], abs=6e-3)
-    assert rows["cardans farther by 0.5 mm"] == pytest.approx([-0.89, -1.78, -2.69, -3.64, -5.62, -7.75], abs=6e-3)
+    assert rows["universal joints farther out by 0.5 mm"] == pytest.approx(
+        [-0.89, -1.78, -2.69, -3.64, -5.62, -7.75], abs=6e-3
+    )
     assert rows["crank of leg Y longer by 0.5 mm"] == pytest.approx([0.75, 1.51, 2.27, 3.05, 4.65, 6.29], abs=6e-3)
 
 
@@ -107,7 +109,7 @@ def test_an_antenna_that_folds() -> None:
     assert last[1] == "nan"
     folds = [row for row in table(report, "Folds").rows if row[0] == "fold of leg Y"]
     assert any(row[1].startswith("69.394627605") and "2.8694330" in row[5] for row in folds)
-    bounds = [row[3] for row in table(report, "What tolerances").rows]
+    bounds = [row[3] for row in table(report, "Effect of the tolerances").rows]
     assert ".." in bounds[0] and "undecided" in bounds[2] and "undecided" in bounds[4]
     assert "folds" in report["animations"][0].caption
 

@@ -40,7 +40,7 @@ def test_start_up_has_the_printed_values(tables: dict[str, Any]) -> None:
         ("settling time, ±1 %", 0.1279, 5e-5),
         ("crank speed at 0.5 s", 1.8026624512378647, 1e-13),
         ("crank angle at 0.5 s", 0.85149709671523497, 1e-13),
-        ("least speed of the steady motion", 1.802654502, 1e-9),
+        ("smallest speed of the steady motion", 1.802654502, 1e-9),
         ("largest speed of the steady motion", 1.802779267, 1e-9),
         ("largest current i_q", 0.9915, 5e-5),
         ("time of the largest current", 0.00206, 5e-6),
@@ -58,11 +58,11 @@ def test_sensors_and_second_way(tables: dict[str, Any]) -> None:
     at = int(np.argmin(np.abs(turn.theta - math.radians(45))))
     assert turn.F01[at] == pytest.approx((-0.004839456837046956, -0.002393107550719340), rel=1e-12)
     assert turn.torque[at] == pytest.approx(3.459660339026256e-5, rel=1e-11)
-    (told,) = next(t for t in report["tables"] if t.title == "The four sensors over a turn").findings
+    (told,) = next(t for t in report["tables"] if t.title == "Sensors over one rotation").findings
     largest = [float(number) for number in told.text.split("at most ")[1].split(" mN")[0].split(", ")]
     sizes = [[1e3 * math.hypot(*force) for force in forces] for forces in turn.forces().swapaxes(0, 1)]
     assert largest == pytest.approx([max(joint) for joint in sizes], rel=6e-4)
-    second = next(t for t in report["tables"] if t.title == "Reactions found a second way")
+    second = next(t for t in report["tables"] if t.title == "Reactions, independent cross-check")
     assert float(second.rows[0][1]) < 1e-12
     limit = next(t for t in report["tables"] if t.title == "The limit L -> 0")
     assert [float(row[3]) for row in limit.rows[3:]] == pytest.approx([1.0] * 4, abs=0.02)

@@ -52,10 +52,10 @@ def test_the_best_is_named_with_its_measures_places_score_and_verdict(lambda_tab
     best, *rest = said(report_of(lambda_tables, records))
     # scores by hand: 1 is worst by mass, best by stroke: 1/3; 2: (2 * 1 + 1 * 0.2) / 3; 3: (2 * 0.5 + 0) / 3
     assert best == (
-        "Best of 3 ranked: no. 2, n2=2: mass 1 kg (least), stroke 5 mm (2nd greatest); score 0.73 of 1 with weights "
+        "Best of 3 ranked: no. 2, n2=2: mass 1 kg (smallest), stroke 5 mm (2nd largest); score 0.73 of 1 with weights "
         "2:1; holds (certified)."
     )
-    assert "3 of the 3 candidates have the verdict: holds (certified)." in rest
+    assert "All 3 candidates have the verdict: holds (certified)." in rest
     sure = "mass: estimated in floating point, not proved; stroke: certified (proved bounds)."
     assert rest[-1] == f"Guarantee of the objectives: {sure}"
 
@@ -105,7 +105,7 @@ def test_what_a_stage_says_itself_comes_behind_the_best(lambda_tables: dict[str,
     table = Table("T", ("a",), (), findings=(Finding("sets looked at", value="7"), Finding("All <agree>.")))
     report = report_of(lambda_tables, (record(1, 1.0, 1.0), record(2, 2.0, 3.0)), True, table)
     assert (
-        said(report)[1:3] == ["2 of the 2 candidates have the verdict: holds (certified).", "All <agree>."]
+        said(report)[1:3] == ["All 2 candidates have the verdict: holds (certified).", "All <agree>."]
         and facts(report)[0].value == "7"
     )
     many = tuple(record(number, 1.0, 1.0) for number in range(1, 6))
@@ -142,7 +142,7 @@ def test_the_best_is_the_first_of_the_ranking(rows: list[tuple[int, int, bool | 
         return
     best = records[ranking.numbers[0] - 1]
     assert f"no. {best.number}, " in told[0].text and told[0].good is best.good
-    assert ("(least)" in told[0].text) is (best.margins[0].value == min(mass for mass, _, _ in rows))
+    assert ("(smallest)" in told[0].text) is (best.margins[0].value == min(mass for mass, _, _ in rows))
     if any(r.good for r in records):
         first_good = next(n for n in ranking.numbers if records[n - 1].good)
         assert any(finding.good and f"no. {first_good}, " in finding.text for finding in told[:2])

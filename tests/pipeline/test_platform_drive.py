@@ -177,5 +177,5 @@ def test_the_real_machine_has_its_motor_in_its_own_scene() -> None:
     ripple = [np.ptp(item.run.speed[item.run.time >= 0.3]) for item in runs]
     torque = [np.ptp(item.run.motor_torque[item.run.time >= 0.3]) for item in runs]
     assert ripple[1] > 3 * ripple[0] and torque[1] < torque[0]
-    assert tables(Context(scene), runs)[0].title == "What the motor feels"
+    assert tables(Context(scene), runs)[0].title == "Inertia seen by the motor"
     assert drive_machine(Context(scene), ()) == ()

@@ -243,7 +243,7 @@ def test_a_crank_that_cannot_turn_fully_is_assessed_and_drawn(lambda_tables: dic
     (record,) = report["records"]
     assert record.status == "assessed"
     motion = next(t for t in report["tables"] if t.title == "Motion")
-    assert "cannot make a full turn" in motion.rows[0][1] and motion.rows[2][1].startswith("none")
+    assert "cannot make a full rotation" in motion.rows[0][1] and motion.rows[2][1].startswith("none")
     assert any("cannot be assembled" in picture.svg for picture in report["mechanism_pictures"])
     assert not any(re.search(r"\bnan\b", picture.svg) for picture in report["mechanism_pictures"])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from graphsynth import StructuralSpec, count_chains, count_mechanisms
-from graphsynth.synthesis import fractionated
+from graphsynth.synthesis import chunks, fractionated
 from graphsynth.synthesis.fractionated import count_fractionated, fractionated_chains
 from graphsynth.synthesis.problem import EnumerationProblem
 
@@ -53,3 +53,15 @@ def test_restricted_counts_are_those_of_the_listing():
         for item in EnumerationProblem.chains(9, 2, 3, None, True, None).work_items(listing=True)
         for chain in item.graphs()
     )
+
+
+def test_a_table_that_is_too_small_for_the_states_is_made_larger(monkeypatch):
+    workspace, words = chunks.workspace, []
+
+    def small(edge_labels, key_words):
+        words.append(key_words)
+        return workspace(edge_labels, key_words >> 14)
+
+    monkeypatch.setattr(chunks, "workspace", small)
+    assert (count_chains(10), count_chains(12)) == (230, 6856)
+    assert max(words) > min(words)

@@ -101,8 +101,7 @@ class _Place:
 class MechanismSystem:
     """Equations of a mechanism as a `MovingSystem` of the Krawczyk test.
 
-    `GeometryError` for a cam, and if equations and unknowns differ in number: the certificate is for mechanisms with
-    one driver per freedom.
+    `GeometryError` for a cam, and if equations and unknowns differ in number (one driver per freedom is needed).
     """
 
     def __init__(self, mechanism: Mechanism) -> None:

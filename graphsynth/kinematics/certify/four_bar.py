@@ -60,7 +60,7 @@ class CrankCertificate:
 
     @property
     def full_turn(self) -> bool:
-        """Whether the crank makes a full turn on one assembly mode."""
+        """Whether the crank makes a full rotation on one assembly mode."""
         return self.kind == "full turn"
 
 
@@ -200,7 +200,7 @@ def outward(value: Any) -> tuple[float, float]:
 def _certificate(kind: str, type_: str, limits: list[LimitAngle], changes: tuple[str, ...]) -> CrankCertificate:
     where = ", ".join(f"{limit.low:.12g} rad ({limit.place})" for limit in limits)
     text = {
-        "full turn": "the crank makes a full turn on one assembly mode",
+        "full turn": "the crank makes a full rotation on one assembly mode",
         "change point": f"the crank passes every angle, but assembly modes meet at {', '.join(changes)}",
         "limited": f"the crank stops at {where}",
         "immovable": f"nothing moves, the crank has one place: {where}",

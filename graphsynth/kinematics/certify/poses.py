@@ -41,8 +41,7 @@ class MotionCertificate:
         No other exact assembly has all link origins within ``unique_within * Lc`` and all angles within
         ``unique_within`` of the sample; NaN where nothing is proved.
     intervals : ndarray of bool, shape (n - 1,)
-        Intervals between samples for which one regular branch from sample to sample is proved; all False if
-        ``between`` is False.
+        Intervals between samples for which one regular branch is proved; all False if ``between`` is False.
     closed : bool
         The assembly after the full turn is proved to be the first one again.
     undecided : tuple of (float, float)

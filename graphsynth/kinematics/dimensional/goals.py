@@ -94,8 +94,7 @@ class PathGoal:
     points : iterable of (x, y)
         At least three, in the order of the motion.
     inputs : iterable of float, optional
-        Inputs at the points relative to the first, increasing, within the turn or range; timed path.  Without them
-        only the order counts.
+        Inputs at the points relative to the first, increasing, within the turn or range; else only the order counts.
     link : int, optional
         The link that carries the point; the one farthest from the frame by default.
     tolerance : float
@@ -298,8 +297,7 @@ class TargetFit(ABC):
 
     `inputs`: at which the target is sampled, relative to the first; `ranges`: of further unknowns, shape (extras, 2);
     `placed`: the target speaks of absolute coordinates; `angular`: continuous angles are needed; `smooth`: the errors
-    vanish smoothly at a perfect candidate, so that least squares help; `warped`: the target reads the motion at other
-    inputs by set.
+    vanish smoothly at a perfect candidate, so that least squares help; `warped`: every set has inputs of its own.
     """
 
     inputs: Array

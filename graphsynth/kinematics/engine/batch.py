@@ -62,8 +62,7 @@ class BatchMotion:
     def completed(self) -> NDArray[np.bool_]:
         """True for sets that reached every input.
 
-        Gaps narrower than a step, and pins that pass the pivot of their slot, are not looked for: confirm an accepted
-        set with `simulate`.
+        Gaps narrower than a step, and pins passing the pivot of their slot, are not looked for: confirm by `simulate`.
         """
         return np.asarray(self.reached == len(self.inputs))
 
@@ -125,14 +124,12 @@ def simulate_batch(
     Returns
     -------
     BatchMotion
-        Without step refinement and events: a set whose step is too long to be sure of the branch stops with that
-        reason.
+        Without step refinement and events: a set whose step is too long to be sure of the branch stops and says so.
 
     Raises
     ------
     GeometryError
-        Shapes that do not fit, numbers that are not finite, lengths and radii that no mechanism can have, modes that
-        do not exist.
+        Shapes that do not fit, numbers that are not finite, impossible lengths and radii, modes that do not exist.
 
     Examples
     --------

@@ -64,8 +64,7 @@ class Step:
     """What one step of a program places.
 
     `code`: see :mod:`.codes`; `group`: index of the Assur group, or -1 for a driver; `links` placed; `kind`:
-    "driver R", "driver P", "RRR", "RRP", "RPR", "PRP", "RPP", or a description of the group; `core`: links whose poses
-    are the unknowns.
+    "driver R", "driver P", "RRR", "RRP", "RPR", "PRP", "RPP", or what the group is; `core`: links with unknown poses.
     """
 
     code: int

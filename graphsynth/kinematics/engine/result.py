@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import link_number, point
 from graphsynth.core.errors import GeometryError
-from graphsynth.kinematics.methods import MotionMethods
+from graphsynth.kinematics.methods import GroupSamples, MotionMethods
 from graphsynth.mechanism.constraints import jacobian, residual
 from graphsynth.mechanism.joints import Prismatic
 
@@ -209,7 +209,7 @@ class Motion(MotionMethods):
         P2 = w[:, 0] + 1j * w[:, 1] + (1j * w[:, 2] - v[:, 2] ** 2) * arm
         return PointPath(*(np.column_stack([z.real, z.imag]) for z in (P, P1, P2)))
 
-    def transmission_angle(self) -> dict[int, Array]:
+    def transmission_angle(self) -> GroupSamples:
         """Transmission angle of every dyad with two modes, by group, radians in [0, pi/2].
 
         The sine of the angle is the square root of the margin: the angle at the inner joint of RRR; of RRP, RPR and
@@ -217,11 +217,11 @@ class Motion(MotionMethods):
         is stretched or folded.
         """
         groups = [step.group for step in self.steps if step.group >= 0 and step.has_two_modes]
-        return {group: np.arcsin(np.sqrt(np.clip(self.margins[:, group], 0.0, 1.0))) for group in groups}
+        return GroupSamples((group, np.arcsin(np.sqrt(np.clip(self.margins[:, group], 0, 1)))) for group in groups)
 
-    def pressure_angle(self) -> dict[int, Array]:
+    def pressure_angle(self) -> GroupSamples:
         """Pressure angle of every dyad with two modes, by group: the complement of the transmission angle."""
-        return {group: 0.5 * np.pi - angle for group, angle in self.transmission_angle().items()}
+        return GroupSamples((group, 0.5 * np.pi - angle) for group, angle in self.transmission_angle().items())
 
     def to_pandas(self) -> Any:
         """Return a table: input, pose, velocity and acceleration of every moving link, modes, residual, error."""

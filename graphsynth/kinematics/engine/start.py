@@ -198,6 +198,9 @@ class AssemblyMode(NamedTuple):
     modes: dict[int, int]
     pose: Array
 
+    def __repr__(self) -> str:
+        return f"AssemblyMode(modes={self.modes}, pose of {len(self.pose)} links)"
+
 
 def assembly_modes(mechanism: Mechanism, input: float | str | None = None) -> list[AssemblyMode]:
     """Find all assembly modes of a mechanism at one input.

@@ -1,8 +1,7 @@
 """The two-link leg (RRR dyad with a fixed pivot): angle of the arm for a given end point.
 
 Shared by the legs of the parallel platform and by the four-bar drives.  The three discriminants are differences of
-squares; they are evaluated as error-free sums of products, so that unequal lengths and poses on the boundary of the
-reach keep their digits.
+squares, evaluated as error-free sums of products: unequal lengths and poses on the boundary of the reach keep digits.
 """
 
 from __future__ import annotations
@@ -118,8 +117,7 @@ def solve_leg(u: ArrayLike, v: ArrayLike, l1: ArrayLike, l2: ArrayLike) -> LegSo
     """Reach and angles of a leg with arm ``l1`` and link ``l2`` that ends at (u, v) from its pivot.
 
     Absolute error of the angle at most about 4e-16 rad for the given double-precision numbers; the status is decided by
-    the sign of compensated sums, not by a tolerance (theory/platform-inverse 5 to 7).  Lengths are zero or more;
-    nothing is checked here.
+    the sign of compensated sums, not by a tolerance (theory/platform-inverse 5 to 7).  Nothing is checked here.
 
     Examples
     --------

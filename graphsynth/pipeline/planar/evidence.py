@@ -89,8 +89,7 @@ def path_dimensions(context: Any, effort: Effort) -> Problem:
 def _own(context: Any) -> tuple[Mechanism, str, float]:
     """Return a mechanism of the scene, its name, and the range of its input, radians.
 
-    Raises `GeometryError` if none of the first candidates gets dimensions and moves, or the 50-digit reference knows
-    none of their joints.
+    Raises `GeometryError` if none of the first candidates gets dimensions, moves, and has joints of the reference.
     """
     import numpy as np
 

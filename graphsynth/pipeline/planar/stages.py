@@ -55,8 +55,7 @@ def take(context: Context) -> Iterator[Candidate | FileCandidate]:
     """Return the candidates of ``[structure]``, or those of the files, in their order.
 
     All files are read, and all candidates counted, before work begins on the first. A `SceneError` refuses a file that
-    is no mechanism, goals that contradict themselves and a question without candidates, a `TooLargeError` more than the
-    limit.
+    is no mechanism, goals that contradict themselves, a question without candidates, a `TooLargeError` too many.
     """
     table: PlanarTable = context.scene.mechanism
     if table.files:
@@ -77,7 +76,6 @@ def _read(context: Context, place: int, name: str) -> FileCandidate:
     from graphsynth.core.textfiles import read_bytes
     from graphsynth.mechanism.files import JSON_MAX
     from graphsynth.mechanism.model import Mechanism
-    from graphsynth.pipeline.steps import assortment_text
 
     at = context.scene.place / "mechanism" / "files" / str(place)
     path = context.scene.folder / name
@@ -90,7 +88,7 @@ def _read(context: Context, place: int, name: str) -> FileCandidate:
     except GraphsynthError as error:  # FormatError: no mechanism as text; others: one that nobody can build
         raise at.error(f"names {name!r}, which is no mechanism: {error}") from error
     key = f"{mechanism.graph.key} {hashlib.sha256(data).hexdigest()[:12]}"
-    return FileCandidate(place + 1, path.stem, mechanism, key, assortment_text(mechanism.graph))
+    return FileCandidate(place + 1, path.stem, mechanism, key, f"file {path.stem}")
 
 
 def embody(context: Context, design: Candidate | FileCandidate) -> Built:
@@ -362,4 +360,4 @@ def _start_up(table: LoadsTable, motor: MotorTable, moved: Moved) -> tuple[str, 
         Quantity("ripple of the speed", float(np.ptp(late)) / abs(mean) if mean else math.inf),
     )
     turns = sense * mean > 0.0 and float(np.min(sense * late)) > 0.0
-    return ("the motor turns it" if turns else "the motor does not keep it turning"), turns, margins, ""
+    return ("the motor keeps it turning" if turns else "the motor does not keep it turning"), turns, margins, ""

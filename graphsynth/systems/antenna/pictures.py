@@ -277,7 +277,7 @@ def _singular_points(axes: Any, mechanism: PointingMechanism, grid: Array, s_y: 
                 continue
             folded += [(f.phi_x, f.phi_y) for f in folds if math.isfinite(f.a) and math.isfinite(f.b)]
             dead += [(p.phi_x, p.phi_y) for p in points if (p.s_y, p.s_x) == wanted]
-        for pairs, marker, size, kind in ((folded, "s", 2.2, "folds"), (dead, ".", 2.0, "dead points")):
+        for pairs, marker, size, kind in ((folded, "s", 2.2, "folds"), (dead, ".", 2.0, "dead centres")):
             if pairs:
                 shade = colour if kind == "folds" else (WHITE if leg == "Y" else "#ff66cc")
                 x, y = np.degrees(np.array(pairs)).T
@@ -329,8 +329,8 @@ def sketches(context: Context) -> tuple[Picture, ...]:
     pictures = []
     if (1, -1) in there:
         caption = (
-            "Leg Y (crank axis parallel to x) gives the elevation, leg X the azimuth. Squares are cardans, open "
-            "circles ball joints, dotted circles the paths of the crank pins."
+            "Leg Y (crank axis parallel to x) gives the elevation, leg X the azimuth. Squares are universal joints, "
+            "open circles ball joints, dotted circles the paths of the crank pins."
         )
         svg = themed_svg(pointing_picture(antenna, x, y))
         pictures.append(Picture(f"The mechanism in space, {at}", svg, caption, "wide"))
@@ -378,7 +378,7 @@ def plots(context: Context, motion: AntennaMotion, comparison: ModelComparison) 
         pictures.append(Picture("Map of the certified deviations", themed_svg(figure), words, "wide"))
     figure = fold_map_picture(antenna, nodes=61, size=(6.4, 6.2))
     words = "Of the mode of the rest pose."
-    pictures.append(Picture("Map of folds and dead points", themed_svg(figure), words, "wide"))
+    pictures.append(Picture("Map of folds and dead centres", themed_svg(figure), words, "wide"))
     return tuple(pictures)
 
 
@@ -403,6 +403,6 @@ def _curves(motion: AntennaMotion, comparison: ModelComparison) -> list[Picture]
     return [
         chart("Growth of the differences", growth, x, "difference [′]", "Equal cranks; a: elevation, b: azimuth."),
         chart("Velocity ratios", slopes, x, "velocity ratio", ratios),
-        chart("Passive angles of leg Y", leg_y, x, "angle [°]", "x1, x2: cardan; x3, x4, x5: ball joint."),
-        chart("Passive angles of leg X", leg_x, x, "angle [°]", "x7, x8: cardan; x9, x10, x11: ball joint."),
+        chart("Passive angles of leg Y", leg_y, x, "angle [°]", "x1, x2: universal joint; x3, x4, x5: ball joint."),
+        chart("Passive angles of leg X", leg_x, x, "angle [°]", "x7, x8: universal joint; x9, x10, x11: ball joint."),
     ]

@@ -276,7 +276,7 @@ def _conventions_table(context: Context) -> Table:
         ("leg Y on the other side", antenna, Convention(side_y=-1)),
         ("tilt of the normal as output", antenna, Convention(output="normal")),
         ("rod of leg Y longer by 1 mm", replace(antenna, l2=antenna.l2 + 1e-3), Convention()),
-        ("cardans farther by 0.5 mm", replace(antenna, l1=antenna.l1 + 5e-4), Convention()),
+        ("universal joints farther out by 0.5 mm", replace(antenna, l1=antenna.l1 + 5e-4), Convention()),
         ("crank of leg Y longer by 0.5 mm", replace(antenna, l3=antenna.l3 + 5e-4), Convention()),
     ]
     rows, here = [], antenna.poses(phi, phi)
@@ -289,8 +289,8 @@ def _conventions_table(context: Context) -> Table:
         rows.append((name, *minutes))
     columns = ("change", *(f"{math.degrees(x):g}° | 3 .3f" for x in phi))
     note = (
-        "Difference of the means of both angles, minutes of arc, closed form. Of reversed cranks the outputs are "
-        "reversed back. Conventions grow with the third power of the angle or faster; length errors show at once."
+        "Difference of the means of both angles, minutes of arc, closed form. Where a crank is reversed, its output is "
+        "reversed back. Conventions differ as the third power of the angle or a higher one; lengths may show at once."
     )
     return table("What makes two models disagree", columns, rows, note)
 
@@ -327,7 +327,7 @@ def _tolerance_table(context: Context, bounds: Bounds) -> Table:
         f"{widths}. Certified: mean-value form with outward rounding, for all lengths at once; corners: the extremes "
         "of the 32 corners (estimated, from inside); first order: sum of the derivatives."
     )
-    return table("What tolerances cost", columns, rows, note)
+    return table("Effect of the tolerances", columns, rows, note)
 
 
 def _modes_table(context: Context) -> Table:
@@ -391,8 +391,8 @@ def _check_table(check: CrossCheck) -> Table:
 
 def _unknowns_table(check: CrossCheck) -> Table:
     ends = (0, check.phi.size // 2, check.phi.size - 1)
-    named = {1: "cardan of leg Y", 3: "ball joint of leg Y", 6: "elevation"}
-    named |= {7: "cardan of leg X", 9: "ball joint of leg X", 12: "azimuth"}
+    named = {1: "universal joint of leg Y", 3: "ball joint of leg Y", 6: "elevation"}
+    named |= {7: "universal joint of leg X", 9: "ball joint of leg X", 12: "azimuth"}
     rows = ((f"x{i + 1} {named.get(i + 1, '')}".rstrip(), *(check.angles[k, i] for k in ends)) for i in range(12))
     columns = ("angle", *(f"at cranks {math.degrees(check.phi[k]):g}° [°] | 12 .12g" for k in ends))
     return table("The twelve unknowns", columns, rows, "Of the equations; the closed form gives the same.")

@@ -134,7 +134,7 @@ def _margins(context: Context, braider: Braider, run: DriveRun) -> tuple[Quantit
         Quantity(f"crank angle at {start.end:g} s", float(run.angle[-1]), "rad", "estimated", float(run.error[0])),
         Quantity("ripple of the steady speed, peak to peak", most - least, "rad/s", "estimated", ripple_error),
         Quantity("largest current i_q", peak.value, "A", "estimated", peak.error + float(run.error[-1])),
-        Quantity("least speed of the steady motion", least, "rad/s", "estimated", abs(least - rough[0])),
+        Quantity("smallest speed of the steady motion", least, "rad/s", "estimated", abs(least - rough[0])),
         Quantity("largest speed of the steady motion", most, "rad/s", "estimated", abs(most - rough[1])),
         Quantity("time of the largest current", peak.time, "s", "estimated", spacing / 200.0),
         Quantity("largest moment of the thread about O2", 0.0 if moment < 1e-15 else moment, "N m", "estimated", 1e-15),
@@ -187,7 +187,7 @@ def _sensor_table(braider: Braider, turn: JointForces) -> Table:
         f"{'; '.join(JOINTS)}. From the general dynamics; power balance to {turn.power_error:.0e}."
     )
     columns = ("crank [°] | g", *names, "torque [µN m] | .7g")
-    return table("The four sensors over a turn", columns, rows, note, *_largest(f"Over a turn at {speed}", turn))
+    return table("Sensors over one rotation", columns, rows, note, *_largest(f"Over one rotation at {speed}", turn))
 
 
 def _relative(braider: Braider, turn: JointForces) -> NDArray[np.float64]:
@@ -199,7 +199,7 @@ def _relative(braider: Braider, turn: JointForces) -> NDArray[np.float64]:
 
 def _second_way_table(braider: Braider, turn: JointForces) -> Table:
     """Say how far the reactions agree with the equilibrium of every body."""
-    title = "Reactions found a second way"
+    title = "Reactions, independent cross-check"
     if not math.isfinite(turn.second_way) or turn.second_way == 0.0:
         return Table(title, ("",), (), "The linkage cannot be assembled at any angle compared.")
     rows = (
@@ -207,7 +207,7 @@ def _second_way_table(braider: Braider, turn: JointForces) -> Table:
         ("power of torque and thread against the kinetic energy in closed form", f"{turn.power_error:.1e}"),
     )
     note = (
-        "The reactions are the multipliers of the planar model in nine absolute coordinates; the second way is the "
+        "The reactions are the multipliers of the planar model in nine absolute coordinates; the cross-check is the "
         "equilibrium of every body, at up to forty crank angles."
     )
     return Table(title, ("", ""), rows, note)
@@ -374,7 +374,7 @@ def _turn_pictures(braider: Braider, turn: JointForces) -> list[Picture]:
         ("Sensors: reactions", sizes, _CRANK, _SIZE, f"{at} {'; '.join(JOINTS)}.", over),
         ("Sensors: polar plot of the reactions", paths, "F_x [mN]", "F_y [mN]", vectors, polar),
         ("Sensors: torque on the crank", [Line(theta, turn.torque)], _CRANK, torque, at, over),
-        ("Phase portraits of coupler and rocker", swings, _ANGLE, _RATE, f"{at} Each closes after a turn.", {}),
+        ("Phase portraits of coupler and rocker", swings, _ANGLE, _RATE, f"{at} Each closes after one rotation.", {}),
         ("Inertia of the links at the crank", inertia, _CRANK, "inertia of the links [kg mm²]", constant, over),
         ("Load of the thread", both, _CRANK, "moment of the thread [mN m]", drives, over),
     ]

@@ -168,7 +168,7 @@ def _margins(
         ("clearance left at the worst crank angle", -report.worst_interference, "mm", proved.clearance_left),
         ("largest tilt", report.largest_tilt, "rad", proved.largest_tilt),
         ("critical tilt", report.critical_tilt, "rad", proved.critical_tilt),
-        ("part of the rotation that binds", part, "", (None, None)),
+        ("share of the rotation that binds", part, "", (None, None)),
     ]
     for name, limit, unit in (
         ("smallest clearance", report.smallest_clearance, "mm"),

@@ -152,7 +152,7 @@ def _record(number: int, own: Turn, spaces: LoopSpaces) -> Record:
         Quantity("largest load on the crosshead's guide", floating.peak_guide, "N"),
         Quantity("static friction of the slot", floating.peak_held, "N"),
         Quantity("friction loss over that of the plain piston", own.found.friction_ratio),
-        Quantity("balance of energy over a turn", max(floating.balance_error, plain.balance_error)),
+        Quantity("energy balance over one rotation", max(floating.balance_error, plain.balance_error)),
         Quantity("difference of the forces to a sliding slot", own.difference),
     )
     name = f"floating piston on a {own.name}"
@@ -197,7 +197,7 @@ def _assignment_table(assignments: tuple[Assignment, ...]) -> Table:
         "All 64 choices of revolute (R) and prismatic (P) joints were tried at random geometry; these have loops in "
         "spaces 3 and 2, W = 1, a crank and a piston that move. The joints are 0-1, 1-2, 2-3, 0-3, 3-4, 0-4."
     )
-    return table("Which joints make such a mechanism", ("joints", "full turn", "what it is"), rows, note)
+    return table("Which joints make such a mechanism", ("joints", "full rotation", "what it is"), rows, note)
 
 
 def _motion_table(turns: tuple[Turn, ...]) -> Table:
@@ -239,7 +239,7 @@ def _load_table(turns: tuple[Turn, ...]) -> Table:
             f" Where the slot does not slide, its static friction can hold up to {held:.4g} N across the cylinder, and "
             "the wall may carry so much more."
         )
-    return _of_pistons("Side loads over a turn", turns, columns, note)
+    return _of_pistons("Side loads over one rotation", turns, columns, note)
 
 
 def _square_table(turns: tuple[Turn, ...]) -> Table:
@@ -250,7 +250,7 @@ def _square_table(turns: tuple[Turn, ...]) -> Table:
             rows.append(("" if k else own.name, error, found.floating.peak_wall, share))
         if not math.isnan(own.found.squareness):
             angle = f"{math.degrees(own.found.squareness):.4g}"
-            rows.append(("", angle, "nothing is gained beyond, whatever the load", ""))
+            rows.append(("", angle, "no gain beyond this angle, whatever the load", ""))
     columns = (
         "mechanism",
         "slot out of square [°] | g",
@@ -259,9 +259,9 @@ def _square_table(turns: tuple[Turn, ...]) -> Table:
     )
     note = (
         "An axial force F becomes the side load F tan(error); the rod of a plain piston makes it F tan(slope). The "
-        "last angle is the steepest slope; where in the turn the load is large decides how much earlier the gain ends."
+        "last angle is the steepest slope of the rod; a load that is large elsewhere ends the gain at a smaller angle."
     )
-    return table("What the slot must keep", columns, rows, note)
+    return table("How square the slot must be", columns, rows, note)
 
 
 def _trust_table(turns: tuple[Turn, ...]) -> Table:
@@ -274,7 +274,7 @@ def _trust_table(turns: tuple[Turn, ...]) -> Table:
 
     columns: dict[str, Callable[..., object]] = {
         "machine": lambda own, floats, one: f"{own.name}, {'floating' if floats else 'plain'}",
-        "energy over a turn": lambda own, floats, one: (
+        "energy over one rotation": lambda own, floats, one: (
             f"{one.balance_error:.1e}" + ("" if one.balance_error <= 1e-9 else " (WARNING)")
         ),
         "gas work against p-V area": gas,
@@ -286,7 +286,7 @@ def _trust_table(turns: tuple[Turn, ...]) -> Table:
         "All relative. The reactions are the multipliers of all bodies at once; with the sliding slot of the source "
         "one constraint is redundant, and the same forces must come out."
     )
-    return _of_pistons("How far it can be trusted", turns, columns, note)
+    return _of_pistons("Checks", turns, columns, note)
 
 
 def sketches(context: Context) -> tuple[Picture, ...]:

@@ -78,7 +78,7 @@ class GearTrain:
 class Event(NamedTuple):
     """Something that happens at one input angle.
 
-    ``kind`` is "drive lock", "change point", "rocker dead point", "platform singular", "leg boundary" or
+    ``kind`` is "drive lock", "change point", "rocker dead centre", "platform singular", "leg boundary" or
     "mode mismatch"; ``psi`` in radians; ``leg`` is 1 to 3, or 0 for the platform; ``ends_motion`` tells whether the
     motion stops there; ``pose`` is the last pose reached before a platform singularity.
     """

@@ -294,7 +294,7 @@ def events(
         text = f"crank and coupler {number} in line: the rocker reverses"
         for angle in drive.dead_points():
             turns = range(math.ceil((start - angle) / math.tau), math.floor((end - angle) / math.tau) + 1)
-            found += [Event("rocker dead point", angle + turn * math.tau, number, False, text) for turn in turns]
+            found += [Event("rocker dead centre", angle + turn * math.tau, number, False, text) for turn in turns]
     for at, number in crossings:
         text = f"leg {number} passes its boundary: the working mode changes"
         found.append(Event("leg boundary", at, number, False, text))

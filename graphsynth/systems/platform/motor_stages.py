@@ -219,7 +219,7 @@ def _margins(item: LabelledRun) -> tuple[Quantity, ...]:
         ("speed at the end", run.speed[-1], "rad/s", w_error),
         ("torque at the end", run.motor_torque[-1], "N m", i_error),
     )
-    turns = Quantity("turns made", float(np.floor(run.angle[-1] / math.tau)), "", "exact", 0.0)
+    turns = Quantity("rotations completed", float(np.floor(run.angle[-1] / math.tau)), "", "exact", 0.0)
     return *(Quantity(name, float(value), unit, "estimated", error) for name, value, unit, error in rows), turns
 
 
@@ -333,7 +333,7 @@ def _bare_tables(context: Context, bare: WithoutInertia) -> tuple[Table, ...]:
         found.append(Finding(f"Without rotor inertia {unbounded}; {passes}."))
     return (
         table("Without inertia: dead centres and reversals", _EVENT_COLUMNS, events, note, *found),
-        table("The model without inertia is a limit", columns, rows, "Estimated; the largest speed at the samples."),
+        table("The model without inertia as a limit", columns, rows, "Estimated; the largest speed at the samples."),
         Table("Method and errors of the run without inertia", ("", ""), balance_rows(source)),
     )
 
@@ -393,7 +393,7 @@ def tables(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Table, ...]
     ]
     quantities += [
         Quantity("constant inertia of rotor, pinion and wheels", model.constant_inertia, "kg m^2", "exact"),
-        Quantity("dead centres of the platform in a turn", len(model.inertia.dead_centres), "", "estimated"),
+        Quantity("dead centres of the platform per rotation", len(model.inertia.dead_centres), "", "estimated"),
     ]
-    note = "Series of the real motion over a turn; its truncation is the error."
-    return (quantity_table("What the motor feels", quantities, note), *run_tables(runs, headline=True))
+    note = "Series of the real motion over one rotation; the error is that of its truncation."
+    return (quantity_table("Inertia seen by the motor", quantities, note), *run_tables(runs, headline=True))

@@ -29,7 +29,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlatformMotion:
-    """One turn of the wheels, with every joint for the pictures.
+    """One rotation of the wheels, with every joint for the pictures.
 
     * `motion`: what the module computed; shorter than asked for if the branch ends.
     * `O`, `D` (shape (3,), complex): wheel axes and rocker pivots, fixed frame, metres.
@@ -148,10 +148,10 @@ def _margins(motion: TurnMotion) -> tuple[Quantity, ...]:
         of_si("travel in y", travel[1], "mm", error=error),
         of_si("swing", travel[2], "rad", error=turned),
         of_si("distance to the nearest other assembly mode", motion.gap.min() * motion.Lc, "mm"),
-        of_si("least |det JX| of the turn over that at its start", least),
+        of_si("smallest |det JX|, relative to the start", least),
         exact("wheel positions computed", len(motion.psi)),
         of_si("least |leg Jacobian|", np.abs(motion.leg).min(), "mm^2"),
-        of_si("closure of the turn", closure, "mm"),
+        of_si("closure error after one rotation", closure, "mm"),
         of_si("relative closure residual", motion.residual),
     )
 
@@ -167,7 +167,7 @@ def _tables(moved: PlatformMotion) -> tuple[Table, ...]:
         ("branch at the start", branch, "estimated"),
         ("the working mode is kept", motion.working_mode_constant, "estimated, at the samples"),
         *((q.name, q, q.guarantee) for q in _margins(motion)),
-        ("time of the turn", f"{motion.seconds:.3f} s", "measured once"),
+        ("time to compute the rotation", f"{motion.seconds:.3f} s", "measured once"),
     ]
     eighths = sorted({round(i * (len(motion.psi) - 1) / 8) for i in range(9)})
     modes = ("/".join("1" if value > 0 else "-1" for value in motion.leg[i]) for i in eighths)
@@ -175,9 +175,9 @@ def _tables(moved: PlatformMotion) -> tuple[Table, ...]:
     found = [(event.psi, event.kind, event.statement) for event in motion.events]
     how = "Estimated: Newton iteration in double precision."
     return (
-        table("The full rotation", ("quantity", "value", "method"), rows, f"Method: {motion.method}."),
-        table("Poses over the turn", _POSE_COLUMNS, poses, how),
-        table(f"Events of the turn: {len(found)}", ("wheel [°] | .6f", "event", "what it means"), found),
+        table("Full rotation", ("quantity", "value", "method"), rows, f"Method: {motion.method}."),
+        table("Poses during the rotation", _POSE_COLUMNS, poses, how),
+        table(f"Events during the rotation: {len(found)}", ("wheel [°] | .6f", "event", "what it means"), found),
     )
 
 
@@ -286,7 +286,7 @@ def animations(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture,
     _surroundings(sketch, motion, 1.6)
     plates = [("F0", "F1", "F2"), *((f"C{k}", f"D{k}", f"A{k}") for k in range(3))]
     svg = linkage_animation(sketch, tracks, bars=bars, plates=plates, joints=list(tracks))
-    return (Picture("One turn of the wheels", svg, "The motor turns them; the curves are the corners' paths.", "wide"),)
+    return (Picture("One rotation of the wheels", svg, "The curves are the paths of the corners.", "wide"),)
 
 
 def _box(motion: PlatformMotion) -> tuple[complex, complex]:

@@ -195,7 +195,7 @@ def assess(
     """Give the verdict and the tables."""
     margins = _margins(motion, cycle)
     tables = [
-        quantity_table("What the run gives", margins, motion.statement),
+        quantity_table("Results", margins, motion.statement),
         _events_table(motion),
         _cycle_table(tribometer_of(context), cycle),
         _energy_table(motion),
@@ -253,7 +253,7 @@ def _margins(motion: StickSlipMotion, cycle: LimitCycle) -> tuple[Quantity, ...]
         found.append(Quantity("period of the cycle", cycle.period, "s", error=error))
         found.append(Quantity("largest multiplier of the cycle", max(map(abs, cycle.multipliers))))
     found.append(Quantity("largest estimated error of an event time", worst, "s"))
-    found.append(Quantity("energy that does not balance, relative", motion.energy_residual))
+    found.append(Quantity("relative error of the energy balance", motion.energy_residual))
     return tuple(found)
 
 
@@ -308,7 +308,7 @@ def _energy_table(motion: StickSlipMotion) -> Table:
     }
     rows = [(name, f"{energy:.12g} J") for name, energy in energies.items()]
     warned = "" if motion.energy_residual <= BALANCE else " (WARNING)"
-    rows.append(("largest gap of the balance, relative", f"{motion.energy_residual:.1e}{warned}"))
+    rows.append(("largest relative error of the balance", f"{motion.energy_residual:.1e}{warned}"))
     note = "Each is integrated by itself along the run; none is the remainder of the others."
     return table("Energy balance", ("", ""), rows, note)
 

@@ -84,7 +84,7 @@ def test_derivatives_of_the_turn():
 def test_pure_rotation_between_dead_points():
     motion = SingleMotorPlatform(crank=(10,) * 3, phase=LEG_PHASES).full_turn()
     assert np.abs(motion.pose[:, :2]).max() < 1e-12
-    dead = [event.psi for event in motion.events if event.kind == "rocker dead point" and event.leg == 1]
+    dead = [event.psi for event in motion.events if event.kind == "rocker dead centre" and event.leg == 1]
     assert len(dead) == 2
     extremes = (
         SingleMotorPlatform(crank=(10,) * 3, phase=LEG_PHASES).full_turn(samples=[0.0, *sorted(dead)]).pose[1:, 2]
@@ -267,6 +267,6 @@ def test_starts_that_are_none_are_refused() -> None:
 def test_dead_points_of_every_turn_are_events() -> None:
     """Crank and coupler are in line twice a turn, drive by drive: 3 x 2 x 3 in three turns."""
     motion = SingleMotorPlatform().full_turn(np.linspace(0.1, 0.1 + 3.0 * math.tau, 361))
-    at = [event.psi for event in motion.events if event.kind == "rocker dead point"]
+    at = [event.psi for event in motion.events if event.kind == "rocker dead centre"]
     assert len(at) == 18
     assert np.allclose(np.array(at[6:]) - np.array(at[:-6]), math.tau)

@@ -1,8 +1,7 @@
 """All assembly modes of a 3-RPR platform: sampled real roots of the sextic with a guarantee, poses, polish, checks.
 
-See theory/platform-direct 1 to 4.  ``G(alpha) = g0 + 2 Re(g1 z + g2 z^2 + g3 z^3)`` is sampled at
-the ends and middles of 32 intervals; on each, ``|G''| <= |G''(middle)| + (half width) max|G'''|`` decides between no
-root, exactly one, and bisection.
+See theory/platform-direct 1 to 4.  ``G(alpha) = g0 + 2 Re(g1 z + g2 z^2 + g3 z^3)`` is sampled at ends and middles of
+32 intervals; on each, ``|G''| <= |G''(middle)| + (half width) max|G'''|`` decides: no root, one, or bisection.
 """
 
 import math
