@@ -26,9 +26,6 @@ def measured(stage: Stage, context: Context, needs: Sequence[Any]) -> tuple[Any,
     return result, StageTime(stage.name, imported - start, seconds, memory_in_use("VmHWM"), new_modules(before))
 
 
-_MB = 1e6
-
-
 def reset_peak() -> None:
     """Forget the largest memory so far, where the system can (Linux); elsewhere the peak is that of the process."""
     with suppress(OSError):
@@ -43,13 +40,13 @@ def memory_in_use(field: str = "VmRSS") -> float:
     with suppress(OSError):
         for line in Path("/proc/self/status").read_text().splitlines():
             if line.startswith(field + ":"):
-                return int(line.split()[1]) * 1024 / _MB
+                return int(line.split()[1]) * 1024 / 1e6
     try:
         import resource
     except ImportError:
         return math.nan
     scale = 1 if sys.platform == "darwin" else 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * scale / _MB
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * scale / 1e6
 
 
 def new_modules(before: frozenset[str]) -> tuple[str, ...]:
@@ -109,21 +106,14 @@ def costs(time: StageTime) -> dict[str, Any]:
 
 
 def explain_json(report: Report) -> dict[str, Any]:
-    """Return the stages that ran, with their costs in the process that ran them, and those that did not.
-
-    Ready for JSON; `explain` gives the same as a text.
-    """
+    """Return what `explain` tells, ready for JSON; costs are those in the process that ran a stage."""
     times = {time.stage: time for time in report.times}
     wanted = report.scene.outputs.products
     ran = []
     for stage in report.stages:
-        about = {
-            "stage": stage.name,
-            "function": stage.function,
-            "needs": list(stage.needs),
-            "gives": list(stage.gives),
-        }
-        ran.append(about | {"why": why_run(stage, report.stages, wanted)} | costs(times[stage.name]))
+        about = {"stage": stage.name, "function": stage.function}
+        links = {"needs": list(stage.needs), "gives": list(stage.gives)}
+        ran.append(about | links | {"why": why_run(stage, report.stages, wanted)} | costs(times[stage.name]))
     left = [stage for stage in report.scene.stages() if stage not in report.stages]
     left_out = [{"stage": stage.name, "function": stage.function, "why": why_not(stage)} for stage in left]
     return {"outputs": list(wanted), "ran": ran, "left_out": left_out}

@@ -10,9 +10,12 @@ the stage that gives them to the stages that need them, and each product has one
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from graphsynth.evidence.rows import Plan, imported
@@ -84,6 +87,13 @@ def announced(kind: str) -> EntryPoints:
     Of ``systems``: ``name = "package.module"`` or ``"package.module:SYSTEM"``; of ``stages``: ``product =
     "package.module:STAGE"``; of ``evidence``: ``system = "package.module:PLANS"``, a sequence of further `Plan`.
     """
+    folders = [Path(folder) for folder in sys.path]
+    return _announced(kind, tuple((at, at.stat().st_mtime_ns if at.exists() else 0) for at in folders))
+
+
+@cache
+def _announced(kind: str, folders: tuple[tuple[Path, int], ...]) -> EntryPoints:
+    """Read what all packages announce, again when a folder of packages has changed."""
     from importlib.metadata import entry_points
 
     return entry_points(group=f"graphsynth.{kind}")

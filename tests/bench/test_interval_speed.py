@@ -132,6 +132,7 @@ def system(x):
     return [x[0] ** 2 + x[1] ** 2 - 1, x[0] - x[1] ** 2]
 
 
+@pytest.mark.slow  # compiled for five seconds; statuses are checked in tests/intervals/test_compiled.py
 def test_krawczyk_compiled(benchmark):
     """Two-dimensional boxes per second, one core, a compiled system."""
     from graphsynth.intervals.kernels import arithmetic as ia, krawczyk as compiled

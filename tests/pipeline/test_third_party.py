@@ -7,6 +7,7 @@ import io
 import math
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -16,6 +17,7 @@ import mpmath
 import pytest
 
 from graphsynth.pipeline.runner import execute
+from graphsynth.pipeline.system import system_names
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "write-a-scene.md"
 BLOCK = re.compile(r"^```(python|toml)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -57,6 +59,21 @@ def scene(tmp_path: Path) -> Path:
     path = tmp_path / "long_pendulum.toml"
     path.write_text(block("toml", "[scene]"), encoding="utf-8")
     return path
+
+
+def test_packages_that_come_and_go_while_python_runs_are_noticed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    before = system_names()
+    assert "planar" in before and "late" not in before
+    info = tmp_path / "late-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: late\nVersion: 1.0\n", encoding="utf-8")
+    (info / "entry_points.txt").write_text("[graphsynth.systems]\nlate = late:SYSTEM\n", encoding="utf-8")
+    assert set(system_names()) == {*before, "late"}
+    shutil.rmtree(info)
+    assert system_names() == before
 
 
 def test_the_family_of_another_package_runs_from_the_command_line(site: Path, scene: Path, tmp_path: Path) -> None:
