@@ -316,7 +316,7 @@ def animations(context: Context) -> tuple[Picture, ...]:
 
     caption = "Symbols of ISO 3952; the small slider on the piston is its slot in the crosshead."
     return tuple(
-        Picture(f"One turn: {_KINDS[kind]}", piston_animated_svg(machine.mechanism), caption)
+        Picture(f"One rotation: {_KINDS[kind]}", piston_animated_svg(machine.mechanism), caption)
         for kind, machine in machines_of(context)
     )
 
@@ -337,7 +337,7 @@ def plots(context: Context) -> tuple[Picture, ...]:
                 ("Reactions", charts.reaction_chart(machine), "Path of the tip of every force."),
                 *zip(("Displacement", "Velocity", "Acceleration"), moved, ("", "", "")),
                 ("Torque of the motor", charts.torque_chart(machine), ""),
-                ("Gas force", charts.indicator_chart(machine), "Its area is the work of a turn."),
+                ("Gas force", charts.indicator_chart(machine), "Its area is the work of one rotation."),
             )
         ]
     return tuple(pictures)

@@ -88,10 +88,10 @@ def animations(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Picture
     motion = shown_motion(mechanism, q, poses, closed=True)
     svg = animated_svg(motion, title=title, seconds=seconds, width=460, height=400)
     caption = (
-        f"The last turn of the run with {item.label}, {slow:g} times slower than real: the crank hurries through the "
-        "dead centres, where it has hardly any inertia to move."
+        f"The last rotation of the run with {item.label}, {slow:g} times slower than real: the crank hurries through "
+        "the dead centres, where it has hardly any inertia to move."
     )
-    return (Picture("A turn with the real speed", svg, caption, "wide"),)
+    return (Picture("One rotation at the real speed", svg, caption, "wide"),)
 
 
 def plots(
