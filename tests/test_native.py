@@ -9,7 +9,6 @@ import shutil
 import subprocess
 import sys
 import threading
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -22,15 +21,10 @@ from graphsynth.core.native import library
 from graphsynth.core.native.record import united
 from graphsynth.core.native.signatures import Signature, parse, read_list, text_of, write_list
 
-from .kernel_calls import duplicate
+from .kernel_bits import LEAST, Compared, agree_on, calls_of, kernel_of, same_bits, same_results, table
 
 needs_library = pytest.mark.skipif(not library.contents(), reason=library.reason)
 ROOT = Path(__file__).parents[1]
-
-
-def kernel_of(name: str) -> Any:
-    module, _, function = name.rpartition(".")
-    return getattr(import_module(module), function)
 
 
 def python(code: str, **environment: str) -> str:
@@ -168,11 +162,6 @@ print(out[0][0], library.reason)
 # -- as numba calls --------------------------------------------------------------------------------------------------
 
 
-def calls_of(kernel: Any) -> int:
-    entry = kernel.entry()
-    return sum(calls for _, calls in entry[2]) if entry else 0
-
-
 @needs_library
 @pytest.mark.parametrize(
     ("change", "taken"),
@@ -286,75 +275,16 @@ def test_many_threads_call_at_once() -> None:
 
 # -- the same bits as numba --------------------------------------------------------------------------------------------
 
-#: Results that hold memory as it was found.
-UNSET = {"graphsynth.structure.kernels.canon_workspace"}
 #: Kernels of one operation after another on flat arrays: any number may come.
 FLAT = ("graphsynth.intervals.kernels.loops.",)
 SPECIAL = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 5e-324, -5e-324, 2.2e-308, 1.8e308, -1.8e308, 1.0, -1.0])
 
 
-def flattened(value: Any) -> list[np.ndarray]:
-    if isinstance(value, tuple):
-        return [part for item in value for part in flattened(item)]
-    return [] if value is None else [np.asarray(value)]
-
-
-def same(ours: Any, theirs: Any) -> bool:
-    """Whether two results have the same types, shapes and bits; any NaN equals any other."""
-    a, b = flattened(ours), flattened(theirs)
-    if [(x.dtype, x.shape) for x in a] != [(x.dtype, x.shape) for x in b]:
-        return False
-    pairs = [
-        (x.ravel().view(np.float64), y.ravel().view(np.float64)) if x.dtype.kind in "fc" and x.itemsize != 4 else (x, y)
-        for x, y in zip(a, b, strict=True)
-    ]
-    return all(
-        bool(np.all((x.view(np.int64) == y.view(np.int64)) | (np.isnan(x) & np.isnan(y))))
-        if x.dtype == np.float64
-        else np.array_equal(x, y)
-        for x, y in pairs
-    )
-
-
-def moved(value: Any, rng: np.random.Generator) -> Any:
-    """Copy arguments; floats are changed a little, some by nothing, numbers of things and choices stay."""
-    if isinstance(value, tuple):
-        parts = [moved(part, rng) for part in value]
-        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
-    if isinstance(value, np.ndarray) and value.dtype.kind in "fc":
-        size = 10.0 ** rng.uniform(-15, -1) * (rng.random(value.shape) < rng.random())
-        with np.errstate(all="ignore"):  # of results that nobody has written yet
-            found = (value * (1.0 + size * rng.standard_normal(value.shape))).astype(value.dtype)
-        found.flags.writeable = value.flags.writeable
-        return found
-    return duplicate(value)
-
-
-def differing(kernel: Any, args: tuple[Any, ...]) -> bool:
-    """Call the library, in every version of its code, and numba."""
-    theirs = duplicate(args)
-    expected = kernel.dispatcher(*theirs)
-    levels = range(len(library.LEVELS["x86_64"]))
-    for level in levels if library.target().startswith("x86_64") and library.reason == "x86-64-v3" else [None]:
-        ours = duplicate(args)
-        if level is not None:
-            library._library.set_level(level)
-        before = calls_of(kernel)
-        found = kernel(*ours)
-        assert calls_of(kernel) == before + 1, "the library was not used"
-        results = (
-            (ours, theirs)
-            if f"{kernel.__module__}.{kernel.__qualname__}" in UNSET
-            else ((ours, found), (theirs, expected))
-        )
-        if not same(*results):
-            return True
-    return False
-
-
 @pytest.fixture(scope="session")
 def real_calls(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[Signature, list[Any]]:
-    """Arguments of calls that the examples of the documentation make."""
+    """Arguments of calls that the examples of the documentation make; GRAPHSYNTH_BITS_CALLS names earlier ones."""
+    if earlier := os.environ.get("GRAPHSYNTH_BITS_CALLS"):
+        return pickle.loads(Path(earlier).read_bytes())
     path = tmp_path_factory.mktemp("calls") / "calls.pickle"
     command = [sys.executable, str(Path(__file__).with_name("kernel_calls.py")), str(path)]
     if "slow" in request.config.getoption("-m") and "not slow" not in request.config.getoption("-m"):
@@ -362,32 +292,6 @@ def real_calls(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
     environment = os.environ | {"GRAPHSYNTH_NATIVE": "0", "PYTHONPATH": str(ROOT)}
     subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL)
     return pickle.loads(path.read_bytes())
-
-
-def check_bits(calls: dict[Signature, list[Any]], each: int) -> int:
-    """Compare each listed kernel with numba, on real arguments and on changed ones; return how many calls."""
-    rng = np.random.default_rng(20)
-    total, wrong = 0, []
-    for kind, kept in calls.items():
-        kernel = kernel_of(kind.kernel)
-        floats = any(array.dtype.kind in "fc" for array in flattened(kept[0]))
-        for k in range(each if floats else len(kept)):
-            args = kept[k % len(kept)]
-            args = args if k < len(kept) else moved(args, rng)
-            total += 1
-            if differing(kernel, args):
-                wrong.append((kind.kernel, k))
-    assert not wrong
-    return total
-
-
-@pytest.mark.slow  # numba compiles every kernel of the library: minutes
-@needs_library
-def test_the_library_gives_the_bits_of_numba(real_calls: dict[Signature, list[Any]]) -> None:
-    listed = set(read_list())
-    calls = {kind: kept for kind, kept in real_calls.items() if united({kind, *listed}) == united(listed)}
-    assert len(calls) > 30
-    check_bits(calls, 300)
 
 
 @needs_library
@@ -407,15 +311,58 @@ def test_interval_loops_give_the_bits_of_numba_for_any_numbers(signature: Signat
         values[k : k + 2] = np.sort(values[k : k + 2], axis=0)
     arrays = iter(values)
     args = [int(rng.integers(-5, 9)) if kind == "i8" else next(arrays, None) for kind in types]
-    assert not differing(kernel, tuple(np.empty(each) if value is None else value for value in args))
+    assert agree_on(kernel, tuple(np.empty(each) if value is None else value for value in args))
 
 
-@pytest.mark.slow
 @needs_library
-def test_the_library_gives_the_bits_of_numba_on_a_million_calls(real_calls: dict[Signature, list[Any]]) -> None:
+@pytest.mark.parametrize("wrong", [0, 1])
+def test_one_wrong_bit_in_one_changed_call_is_found(monkeypatch: pytest.MonkeyPatch, wrong: int) -> None:
+    from graphsynth.intervals.kernels import loops
+
+    met = []
+
+    def other(*args: np.ndarray) -> None:
+        loops.add(*args)
+        met.append(args[0].copy())
+        if len(met) == 20:
+            args[4].view(np.int64)[1] ^= wrong
+
+    monkeypatch.setattr(loops.add, "dispatcher", other)
+    values = np.random.default_rng(1).normal(size=(4, 3))
+    values[:, 0] = np.nan
+    kept = [(*values, np.zeros(3), np.zeros(3))]
+    compared = Compared(Signature("graphsynth.intervals.kernels.loops.add", ""), kept, np.random.default_rng(2))
+    compared.run(0.2, most=100)
+    assert compared.calls == len(met) >= LEAST
+    assert len({values.tobytes() for values in met}) > 0.5 * len(met)
+    assert len(compared.wrong) == wrong
+
+
+def test_bits_that_differ_are_told_apart() -> None:
+    a = np.array([0.0, np.nan, 1.0])
+    assert same_bits(a, np.array([0.0, -np.nan, 1.0])) and same_bits(a[:0], a[:0])
+    assert not same_bits(a, np.array([-0.0, np.nan, 1.0])) and not same_bits(a, a.astype(np.float32))
+    assert same_results([(1.0, a)], [(1.0, a)]) and not same_results([(1.0, a)], [(1, a)])
+    assert not same_results([1.0, ValueError], [1.0, TypeError]) and not same_results([a], [a[:2]])
+
+
+@pytest.mark.slow  # numba compiles every kernel of the library: minutes; then GRAPHSYNTH_BITS_SECONDS for each
+@needs_library
+def test_the_library_gives_the_bits_of_numba(real_calls: dict[Signature, list[Any]]) -> None:
     listed = set(read_list())
     assert united(set(real_calls) | listed) == united(listed)
-    for signature in listed:
-        if signature.kernel.startswith(FLAT):
-            test_interval_loops_give_the_bits_of_numba_for_any_numbers(signature, 1_000_000)
-    check_bits(real_calls, 2000)
+    flat = {signature for signature in listed if signature.kernel.startswith(FLAT)}
+    assert {kind.kernel for kind in listed - flat} <= {kind.kernel for kind in real_calls}
+    for signature in flat:
+        test_interval_loops_give_the_bits_of_numba_for_any_numbers(signature, 1_000_000)
+    seconds, rng = float(os.environ.get("GRAPHSYNTH_BITS_SECONDS", "20")), np.random.default_rng(20)
+    found, wrong = {}, []
+    for kind, kept in sorted(real_calls.items()):
+        compared = Compared(kind, kept, rng)
+        compared.run(seconds)
+        found[kind] = compared.calls
+        wrong += compared.wrong
+        print(f"{compared.calls:>9}  {kind.kernel}", flush=True)
+    print(table(found))
+    assert not wrong
+    assert min(found.values()) >= LEAST
