@@ -294,10 +294,16 @@ def real_calls(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
     return pickle.loads(path.read_bytes())
 
 
+def loop(signature: Signature) -> Any:
+    """One loop over intervals as a case; most are for the slow run, since numba compiles each for a second or two."""
+    name = signature.kernel.removeprefix(FLAT[0])
+    return pytest.param(
+        signature, id=name, marks=() if name in ("add", "multiply", "sin", "atan2") else pytest.mark.slow
+    )
+
+
 @needs_library
-@pytest.mark.parametrize(
-    "signature", [s for s in read_list() if s.kernel.startswith(FLAT)], ids=lambda s: s.kernel[31:]
-)
+@pytest.mark.parametrize("signature", [loop(s) for s in read_list() if s.kernel.startswith(FLAT)])
 def test_interval_loops_give_the_bits_of_numba_for_any_numbers(signature: Signature, each: int = 2000) -> None:
     rng = np.random.default_rng(5)
     kernel = kernel_of(signature.kernel)
