@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from graphsynth.jamming.bearing.certify import JamCertificate
     from graphsynth.jamming.joints.assess import CoupledReport
+    from graphsynth.jamming.joints.drawing import Tolerances
     from graphsynth.jamming.joints.limits import Misalignment
     from graphsynth.jamming.joints.program import Bearings
     from graphsynth.kinematics.engine.result import Motion
@@ -214,10 +215,10 @@ def assess_jamming(
     subject: Motion,
     *,
     tilt: Misalignment | Iterable[Misalignment] | float | str,
-    joints: Bearings | float | str,
+    joints: Bearings | float | str | None = None,
     condition: Condition = "A",
     certify: bool = True,
-    length_tolerance: float = 0.0,
+    tolerances: Tolerances = 0.0,
     seconds: float = 20.0,
 ) -> CoupledReport:
     """Assess all joints of a mechanism over its motion (model L1)."""
@@ -252,7 +253,8 @@ def assess_jamming(
         L1: ``tilt``, the misaligned axes (`Misalignment` or several), or the tilt of the first driver's axis in radians
         or as text, "0.5 deg".  ``joints``, what the joints allow: a `Bearing`, `JointLimits` or `SlideLimits` for all,
         a mapping of pairs of links to these, or the tilt that every joint allows, radians or text.
-        ``length_tolerance``, relative tolerance of all lengths (0); ``seconds``, the time of the proof (20).
+        ``tolerances``, one relative number for all lengths (0), or tolerances of parts (`graphsynth.tolerances`), where
+        fits may stand for ``joints``; ``seconds``, the time of the proof (20).
 
     Returns
     -------
@@ -308,11 +310,11 @@ def _of_a_motion(
         raise GeometryError(
             f"subject = {motion!r} is neither a Motion (simulate) nor a TiltedFourBar or ToleranceBox; give one"
         )
-    if unknown := set(options) - {"condition", "certify", "length_tolerance", "seconds"}:
-        raise GeometryError(f"{unknown.pop()} is no argument of an assessment; give tilt, joints, length_tolerance")
+    if unknown := set(options) - {"condition", "certify", "tolerances", "seconds"}:
+        raise GeometryError(f"{unknown.pop()} is no argument of an assessment; give tilt, joints, tolerances")
     if tilt is None:
         raise GeometryError('no axis is misaligned; give tilt="0.5 deg" or tilt=Misalignment(base, link, alpha)')
-    if joints is None:
+    if joints is None and not isinstance(options.get("tolerances", 0.0), Iterable):
         raise GeometryError('the joints have no limits; give joints="1 deg", a Bearing or JointLimits, or a mapping')
     if isinstance(tilt, float | int | str):
         driver = motion.mechanism.drivers[0]

@@ -16,11 +16,10 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "graphsynth"
 #: Rooms from the lowest to the highest; those in one line do not import each other.
 ORDER = (
-    ("core",), ("intervals", "structure"), ("synthesis", "mechanism"), ("kinematics",), ("jamming", "dynamics"),
-    ("drawing", "formats"), ("evidence",), ("pipeline",), ("systems",), ("atlas",), ("cli", "testing"),
+    ("core",), ("intervals", "structure"), ("synthesis", "mechanism"), ("tolerances",), ("kinematics",),
+    ("jamming", "dynamics"), ("drawing", "formats"), ("evidence",), ("pipeline",), ("systems",), ("atlas",),
+    ("cli", "testing"),
 )  # fmt: skip
-#: Folders of a room with a budget of their own, beside those of ``systems``.
-SUBROOMS = {"jamming/chance"}
 #: Modules whose methods are written down elsewhere and looked up on first use.
 FACADES = {"graphsynth.structure.graph", "graphsynth.mechanism.model"}
 
@@ -176,8 +175,9 @@ def sizes() -> dict[str, tuple[int, int]]:
     found: dict[str, tuple[int, int]] = defaultdict(lambda: (0, 0))
     for path in [*PACKAGE.rglob("*.py"), *PACKAGE.rglob("*.pyi")]:
         parts = path.relative_to(PACKAGE).parts
-        deep = len(parts) > 2 and (parts[0] == "systems" or "/".join(parts[:2]) in SUBROOMS)
-        own = "graphsynth" if len(parts) == 1 else "/".join(parts[: 2 if deep else 1])
+        own = (
+            "graphsynth" if len(parts) == 1 else "/".join(parts[: 2 if parts[0] == "systems" and len(parts) > 2 else 1])
+        )
         lines, files = found[own]
         found[own] = (lines + len(path.read_text(encoding="utf-8").splitlines()), files + 1)
     return dict(found)

@@ -337,7 +337,7 @@ def test_arguments_of_the_other_model_are_refused():
         ("have no limits", (motion,), {"tilt": tilt}),
         ("pieces is no argument", (motion,), {"tilt": tilt, "joints": Bearing(), "pieces": 5}),
         ("tilt does not go", (DECK,), {"tilt": tilt}),
-        ("length_tolerance does not go", (DECK,), {"length_tolerance": 1e-3}),
+        ("tolerances does not go", (DECK,), {"tolerances": 1e-3}),
         ("no Bearing", (DECK, {(0, 1): Bearing()}), {}),
         ("neither a Motion", ("shutter",), {"tilt": tilt, "joints": Bearing()}),
         ("neither a Motion", (math.nan,), {}),

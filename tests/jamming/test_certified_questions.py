@@ -34,7 +34,7 @@ from graphsynth.jamming import (
     tightest_free_fit,
     wedging,
 )
-from graphsynth.jamming.bearing import branch_and_bound, fits
+from graphsynth.jamming.bearing import branch_and_bound
 from graphsynth.jamming.bearing.arcs import Span, complement, contains, covers, merge_outer, subtract
 from graphsynth.jamming.bearing.sweep import PieceInterference
 
@@ -124,36 +124,6 @@ def test_limit_deviations(name, diameter, hole, shaft):
     assert fit.clearance.lower == F(hole[0] - shaft[1], 2000)
 
 
-def test_table_agrees_with_the_formulas_of_the_standard():
-    """Tolerance unit and fundamental deviations at the geometric mean of each range of sizes (ISO 286-1).
-
-    The standard rounds the results, coarsely below 3 mm, and its shafts c of 10 to 40 mm do not follow the formula.
-    """
-
-    def means(sizes):
-        return [math.sqrt(a * b) for a, b in zip((1, *sizes), sizes)]
-
-    for grade, units in zip(range(5, 12), (7, 10, 16, 25, 40, 64, 100)):
-        for k, (d, value) in enumerate(zip(means(fits._SIZES), fits._GRADES[grade], strict=True)):
-            exact = units * (0.45 * d ** (1 / 3) + 0.001 * d)
-            assert abs(value - exact) <= max(0.16 * exact if k == 0 else 0.03 * exact, 0.8), (grade, k)
-    coarse = {"d": (16, 0.44), "e": (11, 0.41), "f": (5.5, 0.41), "g": (2.5, 0.34), "h": (0, 1)}
-    assert set(coarse) == set(fits._BELOW)
-    for letter, (factor, exponent) in coarse.items():
-        for d, value in zip(means(fits._SIZES), fits._BELOW[letter], strict=True):
-            assert abs(value - factor * d**exponent) <= max(0.024 * value, 1.1), (letter, d)
-    fine = {
-        "a": lambda d: 265 + 1.3 * d if d <= 120 else 3.5 * d,
-        "b": lambda d: 140 + 0.85 * d if d <= 160 else 1.8 * d,
-        "c": lambda d: 52 * d**0.2 if d <= 40 else 95 + 0.8 * d,
-    }
-    assert set(fine) == set(fits._FINE_BELOW)
-    for letter, formula in fine.items():
-        for d, size, value in zip(means(fits._FINE_SIZES), fits._FINE_SIZES, fits._FINE_BELOW[letter], strict=True):
-            known = letter == "c" and 10 < size <= 40
-            assert abs(value / formula(d) - 1) <= (0.14 if known else 0.05), (letter, size)
-
-
 def test_shafts_a_and_b_do_not_exist_up_to_one_millimetre():
     assert Fit.read("H7/g6", 1).clearance.lower == F(1, 1000)
     for name in ("H11/a11", "H11/b11"):
@@ -174,7 +144,7 @@ def test_fits_of_a_small_tilt():
     assert tightest_free_fit(deck, fits=("H7/g6", "H11/c11")) is None
     assert assess_fits(box)[0].row()["verdict"] == "CERTIFIED_JAMMED"
     with pytest.raises(GeometryError, match="not in the table"):
-        Fit.read("H7/z6", 35)
+        Fit.read("H7/q6", 35)
     with pytest.raises(GeometryError, match="500"):
         Fit.read("H7/g6", 501)
 

@@ -157,6 +157,57 @@ def test_certified_bearings_free_jammed_and_out_of_budget(tmp_path: Path) -> Non
     assert rejected.status == "rejected" and rejected.cause == "jamming: the bearings jam"
 
 
+PARTS = [
+    {"kind": "length", "link": 1, "ends": [0, 2], "plus_mm": 0.02, "minus": "10 um"},
+    {"kind": "hole", "link": 2, "to": 3, "diameter_mm": 0.05},
+    {"kind": "temperature", "low_kelvin": -20, "high_kelvin": 40, "per_kelvin": [1.2e-5, 2.3e-5, 2.3e-5, 1.2e-5]},
+    {"kind": "fit", "joint": [1, 2], "fit": "35 H8/e8", "height_mm": 10},
+    {"kind": "end float", "joint": [0, 3], "least_mm": 0.1, "most_mm": 0.2},
+    {"kind": "parallelism", "link": 2, "to": 3, "diameter_mm": 0.002, "over_mm": 20},
+]
+
+
+def test_tolerances_of_parts_are_those_of_python(tmp_path: Path) -> None:
+    from graphsynth.jamming.joints import Misalignment, bearing_limits, certify_coupled
+    from graphsynth.kinematics import simulate
+    from graphsynth.tolerances import (
+        EndFloat,
+        FitClearance,
+        HolePosition,
+        LengthTolerance,
+        Parallelism,
+        ThermalExpansion,
+    )  # fmt: skip
+
+    parts = [
+        LengthTolerance(1, (0, 2), 2e-5, 1e-5), HolePosition(2, 3, 5e-5),
+        ThermalExpansion(-20.0, 40.0, {0: 1.2e-5, 1: 2.3e-5, 2: 2.3e-5, 3: 1.2e-5}),
+        FitClearance((1, 2), "35 H8/e8", 10.0), EndFloat((0, 3), 1e-4, 2e-4), Parallelism(2, 3, 2e-6, 0.02),
+    ]  # fmt: skip
+    tables = {**BEARINGS, "alpha_deg": 0.1, "certify": True}
+    read = scene(tmp_path, ["records"], bearings={**tables, "tolerances": PARTS})
+    assert [stages.part_of(own) for own in read.mechanism.bearings.tolerances] == parts
+    (record,) = execute(read)["records"]
+    motion = simulate(linkage(), np.linspace(0.0, 2 * np.pi, 73))
+    tilt = Misalignment(0, 1, math.radians(0.1))
+    proof = certify_coupled(motion, bearing_limits(Bearing(17.5, 10, 0.03)), tilt, tolerances=parts)
+    assert record.verdict.endswith(proof.verdict.value) and proof.verdict.name == "CERTIFIED_FREE"
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"tolerances": [{"kind": "length", "link": 1}]}, "gives no ends and no plus_mm|gives no ends and no plus"),
+        ({"tolerances": [{"kind": "length", "link": 1, "ends": [0, 2], "plus_mm": -1}]}, "plus_mm = -1"),
+        ({"tolerances": [{"kind": "size"}]}, "must be one of 'length'"),
+        ({"tolerances": PARTS[:1], "length_tolerance": "1 %"}, "one number for all"),
+    ],
+)
+def test_tolerances_that_a_scene_cannot_mean(tmp_path: Path, table: dict[str, Any], message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        scene(tmp_path, ["records"], bearings={**BEARINGS, "alpha_deg": 0.1, **table})
+
+
 def question(products: list[str], **mechanism: Any) -> dict[str, Any]:
     return {
         "scene": {"name": "six", "title": "Six links"},

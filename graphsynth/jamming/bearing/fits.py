@@ -1,16 +1,13 @@
 """Standard fits: which ISO 286 fit leaves every bearing free, proved for all parts inside their tolerances.
 
-The table holds the tolerance grades IT5 to IT11 and the fundamental deviations of the shafts a to h for nominal
-diameters up to 500 mm (ISO 286-1:2010, tables 1 and 4), for the hole-basis system (holes H).
+The limits of holes and shafts are those of `graphsynth.tolerances`: all letters and grades, sizes up to 500 mm.
 """
 
 from __future__ import annotations
 
-import re
-from bisect import bisect_left
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, Literal
 
 from graphsynth.core.checks import checked
 from graphsynth.core.errors import GeometryError
@@ -18,35 +15,7 @@ from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.bearing.certify import certify_jamming
 from graphsynth.jamming.bearing.parameters import Given, Range, ToleranceBox
 from graphsynth.jamming.verdict import Verdict
-
-
-def _numbers(row: str) -> tuple[int, ...]:
-    return tuple(map(int, row.split()))
-
-
-_SIZES = _numbers("3 6 10 18 30 50 80 120 180 250 315 400 500")  # upper ends, mm
-_GRADES = {  # micrometres
-    5: _numbers("4 5 6 8 9 11 13 15 18 20 23 25 27"),
-    6: _numbers("6 8 9 11 13 16 19 22 25 29 32 36 40"),
-    7: _numbers("10 12 15 18 21 25 30 35 40 46 52 57 63"),
-    8: _numbers("14 18 22 27 33 39 46 54 63 72 81 89 97"),
-    9: _numbers("25 30 36 43 52 62 74 87 100 115 130 140 155"),
-    10: _numbers("40 48 58 70 84 100 120 140 160 185 210 230 250"),
-    11: _numbers("60 75 90 110 130 160 190 220 250 290 320 360 400"),
-}
-_BELOW = {  # distance of the upper limit of the shaft below the nominal size, micrometres
-    "d": _numbers("20 30 40 50 65 80 100 120 145 170 190 210 230"),
-    "e": _numbers("14 20 25 32 40 50 60 72 85 100 110 125 135"),
-    "f": _numbers("6 10 13 16 20 25 30 36 43 50 56 62 68"),
-    "g": _numbers("2 4 5 6 7 9 10 12 14 15 17 18 20"),
-    "h": (0,) * 13,
-}
-_FINE_SIZES = _numbers("3 6 10 18 30 40 50 65 80 100 120 140 160 180 200 225 250 280 315 355 400 450 500")
-_FINE_BELOW = {
-    "a": _numbers("270 270 280 290 300 310 320 340 360 380 410 460 520 580 660 740 820 920 1050 1200 1350 1500 1650"),
-    "b": _numbers("140 140 150 150 160 170 180 190 200 220 240 260 280 310 340 380 420 480 540 600 680 760 840"),
-    "c": _numbers("60 70 80 95 110 120 130 140 150 170 180 200 210 230 240 260 280 300 330 360 400 440 480"),
-}
+from graphsynth.tolerances.iso286 import read_fit
 
 _COMMON = "H6/h5 H7/h6 H7/g6 H8/h7 H7/f7 H8/f7 H8/e8 H9/e9 H9/d9 H10/d10 H11/d11 H11/c11 H11/b11 H11/a11"
 #: Common clearance fits of the hole-basis system, from tight to loose.
@@ -62,6 +31,9 @@ class Fit:
 
     Examples
     --------
+    >>> fit = Fit.read("25 H7/g6")
+    >>> fit.kind, float(fit.smallest_clearance), float(fit.largest_clearance)
+    ('clearance', 0.007, 0.041)
     >>> str(Fit.read("H7/g6", 35).clearance)
     '[0.0045, 0.025]'
     """
@@ -72,28 +44,37 @@ class Fit:
     shaft: Range
 
     @classmethod
-    def read(cls, name: str, diameter: Given) -> Fit:
-        """Look up a fit ``H<grade>/<letter><grade>``; `GeometryError` if it is not in the table, up to 500 mm."""
-        if not isinstance(name, str):
-            raise GeometryError(f"fit {name!r} is no text; give a name such as H7/g6")
-        parts = re.fullmatch(r"H(\d+)/([a-h])(\d+)", name.strip())
-        if not parts or int(parts[1]) not in _GRADES or int(parts[3]) not in _GRADES:
-            raise GeometryError(
-                f"fit {name!r} is not in the table; use H5..H11 with a..h and a grade 5..11, as in H7/g6"
-            )
-        size = Range.read("diameter", diameter)
-        if not size.is_point or not 0 < size.lower <= 500:
-            raise GeometryError(f"nominal diameter {size} mm is outside the table; give one number up to 500 mm")
-        at = bisect_left(_SIZES, size.lower)
-        letter = parts[2]
-        if letter in "ab" and size.lower <= 1:
-            raise GeometryError(f"shaft {letter} is not standardised up to 1 mm; diameter {size} mm needs c to h")
-        fine = bisect_left(_FINE_SIZES, size.lower)
-        below = _FINE_BELOW[letter][fine] if letter in _FINE_BELOW else _BELOW[letter][at]
-        micro = Fraction(1, 1000)
-        wide, narrow = _GRADES[int(parts[1])][at], _GRADES[int(parts[3])][at]
-        hole = Range(Fraction(0), wide * micro, size.exact)
-        return cls(name.strip(), size.lower, hole, Range(-(below + narrow) * micro, -below * micro, size.exact))
+    def read(cls, name: str, diameter: Given | None = None) -> Fit:
+        """Look up a fit of ISO 286, ``"H7/g6"`` with a diameter (mm) or ``"25 H7/g6"``.
+
+        `GeometryError` if it is not in the tables: letters a to zc, holes A to ZC, grades 01 to 18, up to 500 mm.
+        """
+        exact = True
+        if diameter is not None:
+            size = Range.read("diameter", diameter)
+            if not size.is_point or not 0 < size.lower <= 500:
+                raise GeometryError(f"nominal diameter {size} mm is outside the table; give one number up to 500 mm")
+            diameter, exact = size.lower, size.exact
+        found, nominal, *limits = read_fit(name, diameter)
+        hole, shaft = (Range(own.lower, own.upper, exact) for own in limits)
+        return cls(found, nominal, hole, shaft)
+
+    @property
+    def smallest_clearance(self) -> Fraction:
+        """Smallest hole less largest shaft (diameters), mm; negative for an interference."""
+        return self.hole.lower - self.shaft.upper
+
+    @property
+    def largest_clearance(self) -> Fraction:
+        """Largest hole less smallest shaft (diameters), mm; negative if every pair interferes."""
+        return self.hole.upper - self.shaft.lower
+
+    @property
+    def kind(self) -> Literal["clearance", "transition", "interference"]:
+        """Clearance: no pair interferes.  Interference: every pair does, or just touches.  Transition: some do."""
+        if self.smallest_clearance >= 0:
+            return "clearance"
+        return "transition" if self.largest_clearance > 0 else "interference"
 
     @property
     def clearance(self) -> Range:
@@ -121,7 +102,8 @@ class FitVerdict:
     """One fit and what is proved about it.
 
     ``verdict``: ``CERTIFIED_FREE``, every pair of parts is free; ``CERTIFIED_JAMMED``, every pair binds;
-    ``CERTIFIED_JAMMED_FOR_SOME``, the tightest pair binds, others may not; else ``UNDECIDED``.  ``clearance_left`` is a
+    ``CERTIFIED_JAMMED_FOR_SOME``, the tightest pair binds, others may not; ``CANNOT_ASSEMBLE``, an interference fit;
+    else ``UNDECIDED``.  ``clearance_left`` is a
     lower bound for the worst pair (mm), negative if something is missing.
     """
 
@@ -136,6 +118,7 @@ class FitVerdict:
             Verdict.CERTIFIED_FREE: "every pair is free",
             Verdict.CERTIFIED_JAMMED: "every pair binds",
             Verdict.CERTIFIED_JAMMED_FOR_SOME: "the tightest pair binds",
+            Verdict.CANNOT_ASSEMBLE: "an interference fit: no pair turns",
         }.get(self.verdict, "undecided")
 
     def row(self) -> dict[str, Any]:
@@ -182,7 +165,11 @@ def assess_fits(
         # radius and clearance taken as independent: more pairs than there are, so freedom holds a fortiori
         every = certify_jamming(box.replace(Rb=fit.radius, clearance=fit.clearance), condition)
         verdict = every.verdict
-        if verdict not in (Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED):
+        if fit.kind == "interference":
+            verdict = Verdict.CANNOT_ASSEMBLE
+        elif fit.kind == "transition":
+            verdict = Verdict.CERTIFIED_JAMMED_FOR_SOME  # the tightest pair interferes before it tilts
+        elif verdict not in (Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED):
             radius, clearance = fit.pair(loosest=False)  # parts that exist: the largest shaft in the smallest hole
             tightest = certify_jamming(box.replace(Rb=radius, clearance=clearance), condition).verdict
             verdict = Verdict.CERTIFIED_JAMMED_FOR_SOME if tightest.is_jammed else Verdict.UNDECIDED

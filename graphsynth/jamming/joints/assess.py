@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.checks import checked
 from graphsynth.jamming.bearing.bearing import Condition
+from graphsynth.jamming.joints.drawing import Tolerances, drawn
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.program import Bearings, JointProblem, check_motion, problem
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, Assessment, Verdict
@@ -157,12 +158,12 @@ _TOUCH = 1e-12
 @checked
 def assess_coupled(
     motion: Motion,
-    bearings: Bearings,
+    bearings: Bearings | None,
     tilts: Misalignment | Iterable[Misalignment],
     *,
     condition: Condition = "A",
     certify: bool = False,
-    length_tolerance: float = 0.0,
+    tolerances: Tolerances = 0.0,
     seconds: float = 20.0,
 ) -> CoupledReport:
     """Assess whether all joints together can take up misaligned axes at every pose of a motion (model L1).
@@ -180,8 +181,11 @@ def assess_coupled(
     condition, certify : {"A", "B", "general"}, bool
         Contact condition of every `Bearing`; whether to prove the verdict between the samples too (`certify_coupled`),
         over the tolerance boxes.
-    length_tolerance, seconds : float
-        For the proof: relative tolerance of lengths, and its time.
+    tolerances : float or iterable of PartTolerance
+        For the proof: one relative tolerance of lengths, or tolerances of parts (`graphsynth.tolerances`); a fit or an
+        end float among them also gives its joint the limits.
+    seconds : float
+        Time of the proof.
 
     Returns
     -------
@@ -200,7 +204,10 @@ def assess_coupled(
     """
     begin = perf_counter()
     check_motion(motion)
-    report = _report(problem(motion.mechanism, bearings, tilts, condition), motion, condition, begin)
+    tilts = tuple(tilts) if isinstance(tilts, Iterable) else (tilts,)
+    tolerances = tuple(tolerances) if isinstance(tolerances, Iterable) else tolerances
+    limits, axes, _ = drawn(motion.mechanism, bearings, tilts, tolerances)
+    report = _report(problem(motion.mechanism, limits, axes, condition), motion, condition, begin)
     if not certify or not motion.assembled.any():
         return report
     if int(motion.assembled.sum()) == 1:
@@ -208,8 +215,8 @@ def assess_coupled(
         return replace(report, verdict=Verdict.UNDECIDED, reason=reason, notes=(*report.notes, report.reason))
     from graphsynth.jamming.joints.certify import certify_coupled
 
-    options: Any = {"condition": condition, "length_tolerance": length_tolerance, "seconds": seconds}
-    proof = certify_coupled(motion, bearings, report.misalignments, **options)
+    options: Any = {"condition": condition, "tolerances": tolerances, "seconds": seconds}
+    proof = certify_coupled(motion, bearings, tilts, **options)
     # where nothing is proved, what the samples say is still worth reading
     notes = (*report.notes, f"at the samples: {report.reason}") if proof.verdict is Verdict.UNDECIDED else report.notes
     changes: Any = {"verdict": proof.verdict, "reason": proof.reason, "notes": notes, "certificate": proof}

@@ -9,7 +9,7 @@ verdict counts only pieces for which the terms of second order, which that model
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals.reading import shortened
 from graphsynth.jamming.bearing.bearing import Condition
+from graphsynth.jamming.joints.branch import of_the_motion
+from graphsynth.jamming.joints.drawing import Tolerances, drawn
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.pieces import Found, Work, check_range
 from graphsynth.jamming.joints.positions import Unsupported
@@ -115,6 +117,8 @@ class TurnCertificate:
     lower, upper : ndarray, shape (pieces,)
         Proved bounds of the factor on limits and plays together (the inverse of the allowed scale), in the small-tilt
         model (first order), which neglects terms of second order; ``small_tilts`` is the verdict in that model.
+    decided : float
+        Share of all inputs and dimensions together (by volume of the boxes) for which free or jammed is proved.
     one_branch : bool
         All pieces are proved to belong to one continuous branch.
     """
@@ -132,6 +136,7 @@ class TurnCertificate:
     seconds: float
     small_tilts: Verdict = Verdict.UNDECIDED
     model: str = MODEL
+    decided: float = 0.0
 
     @property
     def certified(self) -> bool:
@@ -163,6 +168,7 @@ class TurnCertificate:
             "free": self.arcs(1),
             "jammed": self.arcs(-1),
             "undecided": self.arcs(0),
+            "decided": self.decided,
             "one_branch": self.one_branch,
             "witness": None if self.witness is None else self.witness.summary(),
             "evaluated": self.evaluated,
@@ -179,11 +185,11 @@ class TurnCertificate:
 
 def certify_coupled(
     motion: Motion,
-    bearings: Bearings,
+    bearings: Bearings | None,
     tilts: Misalignment | Iterable[Misalignment],
     *,
     condition: Condition = "A",
-    length_tolerance: float = 0.0,
+    tolerances: Tolerances = 0.0,
     resolution: float = 1e-4,
     max_pieces: int = 20_000,
     seconds: float = 20.0,
@@ -199,9 +205,11 @@ def certify_coupled(
     bearings, tilts, condition
         As for `graphsynth.jamming.joints.assess_coupled`; the ranges they carry are tolerance boxes, and the verdict
         holds for every value in them.
-    length_tolerance, resolution : float
-        Relative half width of every coordinate of a joint on its links; width of a piece, over the range, below which
-        it is left undecided.
+    tolerances : float or iterable of PartTolerance
+        Relative half width of every coordinate of a joint on its links; or tolerances of parts, as on a drawing
+        (`graphsynth.tolerances`).
+    resolution : float
+        Width of a piece, over the range, below which it is left undecided.
     max_pieces, seconds : optional
         Limits of the work; what is not decided within them stays undecided.  A binding member is sought after it.
 
@@ -220,10 +228,11 @@ def certify_coupled(
     'CERTIFIED_FREE'
     """
     begin = perf_counter()
-    check_range(motion, length_tolerance, resolution=resolution, max_pieces=max_pieces, seconds=seconds)
-    given = problem(motion.mechanism, bearings, tilts, condition)
+    check_range(motion, resolution=resolution, max_pieces=max_pieces, seconds=seconds)
+    limits, axes, box = drawn(motion.mechanism, bearings, tilts, tolerances)
+    given = problem(motion.mechanism, limits, axes, condition)
     try:
-        work = Work(given, motion, length_tolerance)
+        work = Work(given, motion, box)
         budget = Budget(resolution * (work.high - work.low), max_pieces, seconds, begin)
         return _proved(work, budget, *search(work, budget))
     except Unsupported as error:
@@ -235,9 +244,7 @@ def certify_coupled(
 
 def _proved(work: Work, budget: Budget, pieces: Found, stopped: str) -> TurnCertificate:
     """Keep what is proved to be on the branch of the motion; give the verdict."""
-    links = work.links(pieces)
-    own = work.on_branch(pieces, links)
-    branch = bool(own.all() and links.all())
+    own, branch = of_the_motion(work, pieces)
     lost = np.flatnonzero(pieces.proved & ~own)
     # of another branch, perhaps: nothing is said about the motion
     pieces = pieces._replace(
@@ -249,12 +256,23 @@ def _proved(work: Work, budget: Budget, pieces: Found, stopped: str) -> TurnCert
         stopped = (
             f"the pose near the input {float(pieces.lo[lost[0]])!r} is not proved to be on the branch of the motion"
         )
-    state = pieces.sure
+    shown = pieces.by_input()
+    state = shown.sure
     witness = None if (state == -1).any() or (state == 1).all() else jamming_member(work, pieces, own)
     proved = witness if witness is not None and witness.exact else None
-    verdict, reason = verdict_of(work, pieces, state, stopped, branch, proved)
-    small, first_order = verdict_of(work, pieces, states(pieces), stopped, branch, witness)
+    verdict, reason = verdict_of(work, shown, state, stopped, branch, proved)
+    small, first_order = verdict_of(work, shown, states(shown), stopped, branch, witness)
     if small.is_certified and small is not verdict:
         reason = f"{reason}; with small tilts (first order): {first_order}"
-    columns, seconds = (pieces.lo, pieces.hi, state, pieces.lower, pieces.upper), perf_counter() - budget.begin
-    return TurnCertificate(verdict, reason, *columns, branch, witness, work.evaluated, seconds, small)
+    shares = {s: float(pieces.volume[pieces.sure == s].sum()) for s in (1, -1, 0)}
+    if work.box.size and verdict is not Verdict.CERTIFIED_FREE:
+        reason = f"{reason}; {_shares_told(shares)}"
+    columns, seconds = (shown.lo, shown.hi, state, shown.lower, shown.upper), perf_counter() - budget.begin
+    found = TurnCertificate(verdict, reason, *columns, branch, witness, work.evaluated, seconds, small)
+    return replace(found, decided=1.0 - shares[0])
+
+
+def _shares_told(shares: dict[int, float]) -> str:
+    """Say how much of the inputs and dimensions together is decided, rounded so that no share is promised too high."""
+    free, binds = (f"{shortened(100.0 * shares[s], -1, 3)} %" for s in (1, -1))
+    return f"of all inputs and dimensions together {free} are proved free and {binds} are proved to bind"

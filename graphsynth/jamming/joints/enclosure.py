@@ -26,13 +26,16 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+#: Share in which a joint that is used up may still tilt further in a correction.
+_STIFF = 1e-3
 #: x and y of every joint, intervals or duals of shape (N,).
 Columns: TypeAlias = list[tuple[Any, Any]]
 
 
 class Moving(NamedTuple):
-    """The same at the middle of each piece, their derivatives by the input over it, and the input less its middle.
+    """The same at the middle of each piece, their derivatives over it, and the input and parameters less their middle.
 
+    ``r_slope``, ``e_slope``, ``d_slope`` (K, N, joints, 2) are by the input and by every parameter, ``steps`` (K, N).
     Lets the closure be bounded by the mean value theorem: joints that move together do not count as if each moved
     alone.  ``sound`` (N,) tells where all of it is proved; elsewhere it is not used.
     """
@@ -43,8 +46,14 @@ class Moving(NamedTuple):
     r_slope: Interval
     e_slope: Interval
     d_slope: Interval
-    step: Interval
+    steps: Interval
     sound: Mask
+
+    def take(self, rows: NDArray[np.intp]) -> Moving:
+        """Return some of the pieces."""
+        r, e, d, r_slope, e_slope, d_slope, steps, sound = self
+        slopes = r_slope[:, rows], e_slope[:, rows], d_slope[:, rows]
+        return Moving(r[rows], e[rows], d[rows], *slopes, steps[:, rows], sound[rows])
 
 
 class Pieces(NamedTuple):
@@ -102,9 +111,9 @@ def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglect
         columns.append(total)
     wrench = Interval.stack(columns, axis=1)
     m = (wrench[:, :, 0] - wrench[:, :, 2] * r[:, :, 1], wrench[:, :, 1] + wrench[:, :, 2] * r[:, :, 0])
-    work = Interval.zeros((len(found.y),))
-    for place, _, _ in layout.misalignments:
-        work = work + m[0][:, place] * at.d[:, place, 0] + m[1][:, place] * at.d[:, place, 1]
+    work = _work(layout, wrench, _columns(r), _columns(at.d))
+    if at.moving is not None and exact is None:
+        work = _straight_work(layout, wrench, at.moving, found.units, work)
     cost = Interval.zeros((len(found.y),))
     limits = np.broadcast_to(layout.limit_range[1], (len(y), len(layout.limit))) if exact is None else exact.wide
     for block, place in enumerate(layout.block_joint.tolist()):
@@ -185,50 +194,204 @@ def start_tilts(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array,
     return _fill_free(layout, (at.r.mid - found.units.centre) / length, at, (tau, zeta), length)
 
 
+def _work(layout: Layout, wrench: Interval, r: Columns, d: Columns) -> Any:
+    """Work of the misalignments by the wrenches of the joints, ``sum m_j . d_j``; intervals or duals."""
+    work: Any = Interval.zeros((len(wrench),))
+    for place, _, _ in layout.misalignments:
+        x, y, force = (wrench[:, place, k] for k in range(3))
+        work = work + (x - force * r[place][1]) * d[place][0] + (y + force * r[place][0]) * d[place][1]
+    return work
+
+
+def _straight_work(layout: Layout, wrench: Interval, moving: Moving, units: Units, whole: Interval) -> Interval:
+    """Narrow the work by the mean value theorem: wrenches are in equilibrium whatever the positions."""
+    middle = _work(layout, wrench, _columns((moving.r - Interval(units.centre)) / units.length), _columns(moving.d))
+    r = (moving.r_slope / units.length, moving.r + (moving.r_slope * _spread(moving)).sum(0))
+    d = (moving.d_slope, moving.d + (moving.d_slope * _spread(moving)).sum(0))
+    values = (_duals((r[1] - Interval(units.centre)) / units.length, r[0]), _duals(d[1], d[0]))
+    found = _work(layout, wrench, *values)
+    if not isinstance(found, Dual):
+        return whole
+    straight = (middle + (found.grad * moving.steps).sum(0)).intersect(whole)
+    use = moving.sound & ~straight.is_empty
+    return Interval.from_bounds(np.where(use, straight.lo, whole.lo), np.where(use, straight.hi, whole.hi))
+
+
+def _spread(moving: Moving) -> Interval:
+    return moving.steps.reshape(*moving.steps.shape, 1, 1)
+
+
+def _duals(values: Interval, slopes: Interval) -> Columns:
+    """Pair values (N, joints, 2) with their derivatives (K, N, joints, 2)."""
+    return [tuple(Dual(values[:, k, i], slopes[:, :, k, i]) for i in (0, 1)) for k in range(values.shape[1])]  # type: ignore[misc]
+
+
+class Rule(NamedTuple):
+    """How a sharing of the tilts follows the input and the parameters, to first order; any numbers give valid bounds.
+
+    ``tau`` (N, blocks, 2) and ``zeta`` (N, joints) at the middle, ``by`` (K, N, blocks, 2) and ``slip`` (K, N, joints)
+    what one unit of each parameter adds; ``rates`` (N, K): relative change of the factor (estimated).
+    """
+
+    tau: Array
+    zeta: Array
+    by: Array
+    slip: Array
+    rates: Array
+
+
 @np.errstate(all="ignore")
 def upper_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglected | None = None) -> Array:
-    """Upper bounds as `lower_bounds`, or infinity; with ``exact`` below 1 only where exact tilts are free too."""
+    """Upper bounds as `lower_bounds`, or infinity; with ``exact`` below 1 only where exact tilts are free too.
+
+    The tilts are ``tau + sum of by_k step_k`` plus what closes the loops exactly for every member: an enclosed linear
+    solve of a remainder of second order.
+    """
     if layout.loops == 0:
         return np.zeros(len(at.r))
     length = found.units.length
-    r = (at.r - Interval(found.units.centre)) / length
+    r, e = (at.r - Interval(found.units.centre)) / length, at.e
     tau, zeta = start_tilts(layout, at, found)
-    tilts, slips = _directions(layout, r.mid, at.e.mid, found, length)
+    tilts, slips = _directions(layout, r.mid, e.mid, (tau, zeta), length)
+    rule, closes = _rule(layout, at, found, (tau, zeta), (tilts, slips))
     off = _off(layout, at, r, points(tau), points(zeta), found.units)
-    e = at.e
     if exact is not None:
         rest = _disturbed(layout, r, at, tau, length, exact)
         off = off + Interval.from_bounds(-rest, rest)
         r, e = _around(r, (points(exact.r) / length).hi), _around(e, exact.e)
-    columns = tilts.shape[-1]
+    off = _remainder(layout, at, found.units, rule, closes, (off, r, e, exact))
     places, guides = _columns(r), _columns(e)
+    columns = tilts.shape[-1]
     parts = []
     for c in range(columns):
         sums = _closure(layout, places, guides, points(tilts[..., c]), points(slips[..., c]), length)
         parts.append(Interval.stack(sums, axis=-1))
     matrix = Interval.stack(parts, axis=-1)
     step, fine = enclosed_solve(matrix, -off)
-    tau_all = points(tau) + (points(tilts) * step.reshape(len(step), 1, 1, columns)).sum(-1)
-    zeta_all = points(zeta) + (points(slips) * step.reshape(len(step), 1, columns)).sum(-1)
-    worst = np.zeros(len(step))
-    limits, plays = layout.limit_range[:1], layout.end_float_range[:1]
-    if exact is not None:
-        limits, plays = exact.narrow, exact.end_float
-    for block in range(len(layout.limit)):
-        if layout.limit[block] == 0.0 or np.isinf(limits[:, block]).any():
-            continue
-        if layout.block_axis[block] == ROUND:
-            size = (tau_all[:, block, 0].sqr() + tau_all[:, block, 1].sqr()).sqrt()
-        else:
-            size = abs(tau_all[:, block, 0])
-        worst = np.maximum(worst, _ratio(size.hi, limits[:, block]))
-    for place in range(len(layout.joints)):
-        if layout.end_float[place] > 0.0 and np.isfinite(layout.end_float_range[0, place]):
-            worst = np.maximum(worst, _ratio(zeta_all[:, place].mag, plays[:, place]))
+    steps = Interval.zeros((0, len(step))) if at.moving is None else at.moving.steps
+    worst = _largest_ratio(layout, rule, (tilts, slips), (steps, step), exact)
     sound = fine & ~np.isnan(worst)
     if exact is not None:
         sound &= exact.sound
     return np.where(sound, worst, np.inf)
+
+
+def estimated_range(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array, Array]:
+    """Estimate the range of the factor over pieces, to first order."""
+    if layout.loops == 0 or at.moving is None:
+        return np.zeros(len(at.r)), np.zeros(len(at.r))
+    start = start_tilts(layout, at, found)
+    length = found.units.length
+    ways = _directions(layout, (at.r.mid - found.units.centre) / length, at.e.mid, start, length)
+    rates = _rule(layout, at, found, start, ways)[0].rates
+    change = (np.abs(rates) * at.moving.steps.mag.T).sum(axis=1)
+    return found.lower * np.maximum(1.0 - change, 0.0), found.lower * (1.0 + change)
+
+
+def _rule(
+    layout: Layout, at: Pieces, found: PoseSolution, start: tuple[Array, Array], ways: tuple[Array, Array]
+) -> tuple[Rule, Interval | None]:
+    """Choose the rule, in floats, and enclose how the closure of the tilts at the middle changes, (K, N, 3 loops).
+
+    The optimal factor changes by ``g = - (y . C) / (y . closure(tau))`` for a change C of the closure, y the wrenches
+    of the dual program.  All tilts in proportion take that part; what is left needs no more of the joints that bind.
+    """
+    moving, (tau, zeta) = at.moving, start
+    if moving is None:
+        none = np.zeros((0, *tau.shape)), np.zeros((0, *zeta.shape)), np.zeros((len(tau), 0))
+        return Rule(tau, zeta, *none), None
+    length, centre = found.units.length, Interval(found.units.centre)
+    own = (at.r - centre) / length, moving.r_slope / length
+    values = _duals(*own), _duals(at.e, moving.e_slope), _duals(at.d, moving.d_slope)
+    sums = _closure(layout, values[0], values[1], points(tau), points(zeta), length, values[2])
+    zero = Interval.zeros(moving.steps.shape)
+    change = Interval.stack([v.grad + zero if isinstance(v, Dual) else zero for v in sums], axis=-1)
+    middle = _columns((moving.r - centre) / length), _columns(moving.e)
+    sums = _closure(layout, *middle, points(tau), points(zeta), length)
+    held = np.nan_to_num(np.stack([value.mid for value in sums], axis=-1))
+    C, y = np.nan_to_num(change.mid), np.nan_to_num(found.y)
+    given = (held * y).sum(axis=-1)
+    rates = np.where(given != 0.0, -(C * y).sum(axis=-1) / np.where(given != 0.0, given, 1.0), 0.0)
+    rates = np.where(moving.sound & (np.abs(rates) * moving.steps.mag < 1.0), rates, 0.0)
+    left = np.where(moving.sound[:, None], -(C + rates[..., None] * held), 0.0)
+    by = rates[..., None, None] * tau + np.einsum("nbic,knc->knbi", ways[0], left)
+    slip = rates[..., None] * zeta + np.einsum("njc,knc->knj", ways[1], left)
+    return Rule(tau, zeta, np.nan_to_num(by), np.nan_to_num(slip), rates.T), change
+
+
+def _remainder(
+    layout: Layout,
+    at: Pieces,
+    units: Units,
+    rule: Rule,
+    change: Interval | None,
+    given: tuple[Interval, Interval, Interval, Neglected | None],
+) -> Interval:
+    """Enclose what is missing from the closure of the tilts of the rule, (N, 3 loops)."""
+    off, r, e, exact = given
+    moving = at.moving
+    if moving is None or change is None:
+        return off
+    kinds, count = moving.steps.shape
+    many = [Interval.from_bounds(np.tile(v.lo, (kinds, 1, 1)), np.tile(v.hi, (kinds, 1, 1))) for v in (r, e)]
+    tau, zeta = rule.by.reshape(-1, *rule.tau.shape[1:]), rule.slip.reshape(-1, rule.zeta.shape[1])
+    sums = _closure(layout, _columns(many[0]), _columns(many[1]), points(tau), points(zeta), units.length)
+    follows = Interval.stack(sums, axis=-1).reshape(kinds, count, -1)
+    steps = moving.steps.reshape(kinds, count, 1)
+    plain = off + (follows * steps).sum(0)
+    centre = Interval(units.centre)
+    middle = (_columns((moving.r - centre) / units.length), _columns(moving.e))
+    sums = _closure(layout, *middle, points(rule.tau), points(rule.zeta), units.length, _columns(moving.d))
+    straight = Interval.stack(sums, axis=-1) + ((change + follows) * steps).sum(0)
+    if exact is not None:
+        rest = _disturbed(layout, (at.r - centre) / units.length, at, rule.tau, units.length, exact)
+        straight = straight + Interval.from_bounds(-rest, rest)
+    better = plain.intersect(straight)
+    use = moving.sound[:, None] & ~better.is_empty
+    return Interval.from_bounds(np.where(use, better.lo, plain.lo), np.where(use, better.hi, plain.hi))
+
+
+def _largest_ratio(
+    layout: Layout,
+    rule: Rule,
+    ways: tuple[Array, Array],
+    moved: tuple[Interval, Interval],
+    exact: Neglected | None,
+) -> Array:
+    """Upper bound of the largest tilt or slip over its limit, (N,)."""
+    (tilts, slips), (steps, step) = ways, moved
+    worst = np.zeros(len(rule.tau))
+    limits, plays = layout.limit_range[:1], layout.end_float_range[:1]
+    if exact is not None:
+        limits, plays = exact.narrow, exact.end_float
+    across = step.reshape(len(step), 1, -1)
+    ahead = steps.reshape(*steps.shape, 1)
+
+    def along(way: Array) -> Interval:
+        """Component of all tilts along plane vectors (N, blocks, 2)."""
+        x, y = points(way[..., 0]), points(way[..., 1])
+        start = points(rule.tau[..., 0]) * x + points(rule.tau[..., 1]) * y
+        first = ((points(rule.by[..., 0]) * x + points(rule.by[..., 1]) * y) * ahead).sum(0)
+        wide = x.reshape(*x.shape, 1), y.reshape(*y.shape, 1)
+        second = (points(tilts[:, :, 0]) * wide[0] + points(tilts[:, :, 1]) * wide[1]) * across
+        return start + first + second.sum(-1)
+
+    size = np.hypot(rule.tau[..., 0], rule.tau[..., 1])[..., None]
+    unit = np.where(size > 0.0, rule.tau / np.where(size > 0.0, size, 1.0), (1.0, 0.0))
+    unit[:, layout.block_axis != ROUND] = 1.0, 0.0
+    turned = np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
+    turned[:, layout.block_axis != ROUND] = 0.0
+    square = points(unit[..., 0]).sqr() + points(unit[..., 1]).sqr()
+    sizes = ((along(unit).sqr() + along(turned).sqr()) / square).sqrt()
+    for block in range(len(layout.limit)):
+        if layout.limit[block] == 0.0 or np.isinf(limits[:, block]).any():
+            continue
+        worst = np.maximum(worst, _ratio(sizes[:, block].hi, limits[:, block]))
+    zeta = points(rule.zeta) + (points(rule.slip) * ahead).sum(0) + (points(slips) * across).sum(-1)
+    for place in range(len(layout.joints)):
+        if layout.end_float[place] > 0.0 and np.isfinite(layout.end_float_range[0, place]):
+            worst = np.maximum(worst, _ratio(zeta[:, place].mag, plays[:, place]))
+    return worst
 
 
 def _disturbed(layout: Layout, r: Interval, at: Pieces, tau: Array, length: float, exact: Neglected) -> Array:
@@ -261,17 +424,24 @@ def _ratio(size: Array, limit: Array) -> Array:
     return np.where(positive, quotient, np.where(size > 0.0, np.inf, 0.0))
 
 
-def _directions(layout: Layout, r: Array, e: Array, found: PoseSolution, length: float) -> tuple[Array, Array]:
+def _directions(layout: Layout, r: Array, e: Array, start: tuple[Array, Array], length: float) -> tuple[Array, Array]:
     """Return changes of tilts (N, blocks, 2, 3 loops) and slips (N, joints, 3 loops) that may correct the closure.
 
     In proportion to the squares of the limits: the least change measured by what each joint has; joints without limit
-    take most.  Column k changes nearly the sum k of the closure alone, so no bound is lost in a change of basis.
+    take most, and joints near their share of the factor turn rather than tilt further.  Column k changes nearly the sum
+    k of the closure alone, so no bound is lost in a change of basis.
     """
     loops = layout.loops
     rows = moment_rows(layout, r, e)
     finite = layout.limit[np.isfinite(layout.limit)].max(initial=0.0) or 1.0
     weight = np.where(np.isinf(layout.limit), 100.0, (layout.limit / finite) ** 2)
     tilts = rows * weight[:, None, None]
+    size = np.hypot(start[0][..., 0], start[0][..., 1])
+    use = size / np.where((layout.limit > 0.0) & np.isfinite(layout.limit), layout.limit, np.inf)
+    slack = 1.0 - use / np.maximum(use.max(axis=1, keepdims=True, initial=0.0), 1e-300)
+    unit = start[0] / np.where(size > 0.0, size, 1.0)[..., None]
+    unit = unit * np.sqrt(1.0 - np.clip(4.0 * slack, _STIFF, 1.0))[..., None]
+    tilts -= unit[..., None] * (unit[..., None] * tilts).sum(axis=2, keepdims=True)
     play = np.where(
         np.isinf(layout.end_float), 10.0 * finite * length, np.minimum(layout.end_float, 10.0 * finite * length)
     )
@@ -344,27 +514,5 @@ def _columns(values: Interval) -> Columns:
 
 def _off(layout: Layout, at: Pieces, scaled: Interval, tau: Interval, zeta: Interval, units: Units) -> Interval:
     """Enclose what is missing from the closure of given tilts over a piece, (N, 3 loops)."""
-    length = units.length
-    sums = _closure(layout, _columns(scaled), _columns(at.e), tau, zeta, length, _columns(at.d))
-    off, moving = Interval.stack(sums, axis=-1), at.moving
-    if moving is None:
-        return off
-    centre = Interval(units.centre)
-    at_middle = _closure(
-        layout, _columns((moving.r - centre) / length), _columns(moving.e), tau, zeta, length, _columns(moving.d)
-    )
-    own = (scaled, moving.r_slope / length), (at.e, moving.e_slope), (at.d, moving.d_slope)
-    places, guides, shift = (
-        [
-            (Dual(a, c.reshape(1, -1)), Dual(b, d.reshape(1, -1)))
-            for (a, b), (c, d) in zip(_columns(values), _columns(rates))
-        ]
-        for values, rates in own
-    )
-    sums = _closure(layout, places, guides, tau, zeta, length, shift)
-    zero = Interval.zeros((len(tau),))
-    slopes = [value.grad[0] if isinstance(value, Dual) else zero for value in sums]
-    straight = Interval.stack([m + slope * moving.step for m, slope in zip(at_middle, slopes)], axis=-1)
-    better = off.intersect(straight)
-    use = moving.sound[:, None] & ~better.is_empty
-    return Interval.from_bounds(np.where(use, better.lo, off.lo), np.where(use, better.hi, off.hi))
+    sums = _closure(layout, _columns(scaled), _columns(at.e), tau, zeta, units.length, _columns(at.d))
+    return Interval.stack(sums, axis=-1)

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.intervals import Dual, Interval, Status, image, variables
+from graphsynth.intervals import Dual, Interval, variables
 from graphsynth.intervals.dual import jacobian_of
 from graphsynth.jamming.joints.closure import ROUND, Layout
 from graphsynth.jamming.joints.limits import bounds
@@ -31,7 +31,7 @@ from graphsynth.mechanism.equations import Pair
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 
 if TYPE_CHECKING:
-    from graphsynth.jamming.joints.positions import Tubes
+    from graphsynth.jamming.joints.tubes import Tubes
 
 
 Array = NDArray[np.float64]
@@ -148,10 +148,9 @@ def _lengths(system: Positions, tubes: Tubes, u: Interval) -> Array:
     mechanism, count = system.mechanism, len(tubes.r)
     found = np.zeros((count, mechanism.graph.links))
     for link in range(mechanism.graph.links):
-        ends = [complex(*(j.at_a if j.a == link else j.at_b)) for j in mechanism.joints if link in j.pair]
+        ends = [both[j.a != link] for j, both in zip(mechanism.joints, system.local) if link in j.pair]
         for p, q in combinations(ends, 2):
-            own = abs(p - q) + 2.0 * system.tolerance * (abs(p) + abs(q))
-            found[:, link] = np.maximum(found[:, link], own)
+            found[:, link] = np.maximum(found[:, link], PLANE.length(p - q).hi)
     at = system.place([tubes.tight[:, k] for k in range(system.size)], system.driven(u))
     for k, joint in enumerate(mechanism.joints):
         if isinstance(joint, Prismatic | PinSlot):
@@ -207,8 +206,8 @@ def _movements(
 ) -> tuple[Array, Array, Mask]:
     """Bound how far joints move (N, joints) and links turn (N, links) in the plane; whether one assembly is proved.
 
-    For every disturbance p the box has exactly one assembly; with ``F(x0, 0) = F(x, p) = 0`` the mean value theorem
-    gives ``F_x (x - x0) = - F_p p``.
+    For every disturbance p the box has exactly one assembly: as the disturbance grows from 0, ``F_x x' = - F_p p``,
+    and ``x'`` over the box is too small to lead out of it.
     """
     count, n = len(tubes.r), system.size
     amounts = np.concatenate([offset, offset, twist], axis=1)
@@ -226,12 +225,10 @@ def _movements(
     unknowns, rate = variables(_beside(tubes.tight, around)), Interval.zeros((count, 0))
     with np.errstate(all="ignore"):
         if n:
+            # a disturbance that grows from nothing leads the assembly no further than its rate over the box
             reach = _ROOM * rates(tubes.tight)[1].mag + 1e-12 * system.weights
-            box = tubes.tight + Interval.from_bounds(-reach, reach)
-            constants = _moved([around[:, k] for k in range(width - n)])
-            status = image(lambda x: system.equations(x, q, counted, constants), box).status
-            unknowns, rate, fine = rates(box)
-            sound = np.asarray(fine & (status == Status.UNIQUE))
+            unknowns, rate, fine = rates(tubes.tight + Interval.from_bounds(-reach, reach))
+            sound = np.asarray(fine & (rate.mag < reach).all(axis=1))
         change = _beside(rate, around)
         at = system.place(unknowns[:n], q, _moved(unknowns[n:]))
 

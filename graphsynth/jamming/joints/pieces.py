@@ -17,15 +17,24 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.checks import finite
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval, check_rounding
-from graphsynth.jamming.joints.closure import Layout
-from graphsynth.jamming.joints.enclosure import Moving, Pieces, lower_bounds, shifts_enclosed, start_tilts, upper_bounds
-from graphsynth.jamming.joints.exact import neglected
+from graphsynth.jamming.joints.closure import Layout, shifts
+from graphsynth.jamming.joints.enclosure import (
+    Moving,
+    Pieces,
+    estimated_range,
+    lower_bounds,
+    shifts_enclosed,
+    start_tilts,
+    upper_bounds,
+)
+from graphsynth.jamming.joints.exact import Neglected, neglected
 from graphsynth.jamming.joints.limits import Misalignment, bounds
-from graphsynth.jamming.joints.positions import Positions, Tubes, linked, points, prove_tubes, slopes
-from graphsynth.jamming.joints.program import JointProblem, PoseSolution, check_motion
+from graphsynth.jamming.joints.positions import Positions, points
+from graphsynth.jamming.joints.program import JointProblem, PoseSolution, check_motion, solve_poses
+from graphsynth.jamming.joints.tubes import Tubes, columns_of, prove_tubes, slopes, whole_box
+from graphsynth.tolerances.box import ParameterBox
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
@@ -100,6 +109,8 @@ class Found(NamedTuple):
     """Pieces evaluated: inputs, bounds of the factor, whether positions are proved, and the boxes they lie in.
 
     ``sure`` tells what exact tilts prove: +1 free, -1 binds, 0 nothing; the bounds of the factor are of first order.
+    ``p_lo``, ``p_hi`` (N, m) are the parameters of every piece, ``reach`` (N, 1 + m) what is worth cutting, ``least``
+    and ``most`` estimates of the factor's range over the piece.
     """
 
     lo: Array
@@ -110,6 +121,11 @@ class Found(NamedTuple):
     box_lo: Array
     box_hi: Array
     sure: NDArray[np.int8]
+    p_lo: Array
+    p_hi: Array
+    reach: Array
+    least: Array
+    most: Array
 
     def take(self, rows: Mask | NDArray[np.intp]) -> Found:
         """Return some of the pieces."""
@@ -125,19 +141,66 @@ class Found(NamedTuple):
         """Whether small tilts decide, and exact ones do not."""
         return np.asarray(~self.straddles & (self.sure == 0))
 
+    @property
+    def mixed(self) -> Mask:
+        """Whether some members seem to bind and some do not (estimated): no cut proves them all alike."""
+        return np.asarray((self.least < 1.0) & (self.most > 1.0))
+
     @staticmethod
     def join(parts: list[Found]) -> Found:
-        """Return all pieces in the order of the input."""
+        """Return all pieces in the order of the input, then of the parameters."""
         whole = Found._make(np.concatenate(columns) for columns in zip(*parts))
-        return whole.take(np.lexsort((whole.hi, whole.lo)))
+        return whole.take(np.lexsort((*whole.p_lo.T[::-1], whole.hi, whole.lo)))
+
+    def by_input(self) -> Found:
+        """Return one piece for each range of inputs: decided where all pieces over it are decided alike."""
+        if self.p_lo.shape[1] == 0:
+            return self
+        edges = np.unique(np.concatenate([self.lo, self.hi]))
+        still = np.unique(self.lo[self.lo == self.hi])
+        low, high = np.concatenate([edges[:-1], still]), np.concatenate([edges[1:], still])
+        order = np.lexsort((high, low))
+        parts = []
+        for a, b in zip(low[order].tolist(), high[order].tolist()):
+            rows = (self.lo == self.hi) & (self.lo == a) if a == b else (self.lo <= a) & (self.hi >= b) & (self.lo < b)
+            own = self.take(rows)
+            sure = own.sure.min() if own.sure.min() == own.sure.max() else 0
+            parts.append((a, b, own.lower.min(), own.upper.max(), own.proved.all(), sure))
+        lo, hi, lower, upper, proved, sure = (np.array(column) for column in zip(*parts))
+        whole = Interval.from_bounds(*(np.tile(f(axis=0), (lo.size, 1)) for f in (self.p_lo.min, self.p_hi.max)))
+        found = Found.open(lo, hi, whole, self.box_lo.shape[1])
+        return found._replace(lower=lower, upper=upper, proved=proved.astype(bool), sure=sure.astype(np.int8))
+
+    @property
+    def volume(self) -> Array:
+        """Share of every piece in all inputs and dimensions together."""
+        width = self.p_hi - self.p_lo
+        whole = self.p_hi.max(axis=0, initial=-np.inf) - self.p_lo.min(axis=0, initial=np.inf)
+        shares = np.where(whole > 0.0, width / np.where(whole > 0.0, whole, 1.0), 1.0).prod(axis=1)
+        size = (self.hi - self.lo) * shares
+        return np.asarray(size / size.sum()) if size.sum() > 0.0 else size
+
+    @staticmethod
+    def open(lo: Array, hi: Array, p: Interval, size: int) -> Found:
+        """Return pieces about which nothing is known."""
+        none, box = np.zeros(len(lo)), np.full((len(lo), size), np.nan)
+        reach = np.zeros((len(lo), 1 + p.shape[1]))
+        state = none.astype(np.int8)
+        return Found(lo, hi, none, none + np.inf, none > 1.0, box, box, state, p.lo, p.hi, reach, none, none + np.inf)
 
 
 class Work:
-    """Evaluation of pieces of one problem along one motion; without ``exact`` by small tilts alone."""
+    """Evaluation of pieces of one problem along one motion; without ``exact`` by small tilts alone.
 
-    def __init__(self, given: JointProblem, motion: Motion, tolerance: float, exact: bool = True) -> None:
-        self.given, self.motion, self.tolerance, self.exact = given, motion, tolerance, exact
+    ``tolerance`` is the box of parameters, or one relative half width of every coordinate of a joint.
+    """
+
+    def __init__(
+        self, given: JointProblem, motion: Motion, tolerance: float | ParameterBox, exact: bool = True
+    ) -> None:
+        self.given, self.motion, self.exact = given, motion, exact
         self.system = Positions(motion.mechanism, tolerance)
+        self.box = self.system.box
         self.corners = corner_layouts(given.layout)
         keep = np.flatnonzero(motion.assembled)
         ends = motion.inputs[keep]
@@ -157,85 +220,105 @@ class Work:
 
         passed, back = np.unique(np.concatenate([[self.low], inputs]), return_inverse=True)
         found, at = simulate(self.given.mechanism, passed, start=self.start, events=False), back[1:]
-        return found.assembled[at], found.poses[at], found.velocities[at]
+        fine = found.assembled[at] & np.isfinite(found.velocities[at]).all(axis=(1, 2))
+        return fine, found.poses[at], found.velocities[at]
 
-    def evaluate(self, lo: Array, hi: Array) -> Found:
-        """Bounds of the factor over every piece."""
-        count, size = len(lo), self.system.size
+    def whole(self, count: int) -> Interval:
+        """Return the whole box of parameters for N pieces."""
+        return whole_box(self.system, count)
+
+    def evaluate(self, lo: Array, hi: Array, parameters: Interval | None = None) -> Found:
+        """Bounds of the factor over every piece; ``parameters`` (N, m) is the whole box if not given."""
+        count = len(lo)
         self.evaluated += count
-        u = Interval.from_bounds(lo, hi)
-        assembled, poses, velocities = self._follow(u.mid)
-        lower, upper = np.zeros(count), np.full(count, np.inf)
-        proved = np.zeros(count, dtype=bool)
-        box, sure = np.full((2, count, size), np.nan), np.zeros(count, dtype=np.int8)
-        keep = np.flatnonzero(assembled & np.isfinite(velocities).all(axis=(1, 2)))
-        if keep.size:
-            poses = poses[keep]
-            x, rate = self.system.coordinates(poses, velocities[keep])
-            counted = self.system.count(poses)
-            tubes = prove_tubes(self.system, self.given.layout.joints, u[keep], x, rate, counted)
-            proved[keep] = tubes.proved
-            box[0, keep], box[1, keep] = tubes.domain.lo, tubes.domain.hi
-            rows = np.flatnonzero(tubes.proved)
-            if rows.size:
-                at_middle = prove_tubes(
-                    self.system, self.given.layout.joints, points(u.mid[keep[rows]]), x[rows], rate[rows], counted[rows]
-                )
-                whole = u[keep[rows]], tubes.take(rows), at_middle, counted[rows]
-                lower[keep[rows]], upper[keep[rows]], sure[keep[rows]] = self._bounds(poses[rows], *whole)
-        return Found(lo, hi, lower, upper, proved, box[0], box[1], sure)
+        p = self.whole(count) if parameters is None else parameters
+        u, found = Interval.from_bounds(lo, hi), Found.open(lo, hi, p, self.system.size)
+        found = Found._make(np.array(part) for part in found)
+        fine, poses, velocities = self._follow(u.mid)
+        keep = np.flatnonzero(fine)
+        if keep.size == 0:
+            return found
+        x = self.system.coordinates(poses[keep], velocities[keep])[0]
+        counted = self.system.count(poses[keep])
+        tubes = prove_tubes(self.system, self.given.layout.joints, u[keep], x, counted, p[keep])
+        found.proved[keep], found.reach[keep] = tubes.proved, tubes.reach
+        found.box_lo[keep], found.box_hi[keep] = tubes.domain.lo, tubes.domain.hi
+        rows = np.flatnonzero(tubes.proved)
+        if rows.size:
+            own, x = keep[rows], tubes.tight.mid[rows]
+            middle = prove_tubes(
+                self.system, self.given.layout.joints, points(u.mid[own]), x, counted[rows], points(p.mid[own])
+            )
+            columns = self._bounds(u[own], tubes.take(rows), middle, counted[rows], p[own])
+            for name, value in zip(("lower", "upper", "sure", "least", "most"), columns):
+                getattr(found, name)[own] = value
+        return found
 
-    def _bounds(
-        self, poses: Array, u: Interval, tubes: Tubes, middle: Tubes, counted: Array
-    ) -> tuple[Array, Array, NDArray[np.int8]]:
+    def _bounds(self, u: Interval, tubes: Tubes, middle: Tubes, counted: Array, p: Interval) -> tuple[Any, ...]:
         """Bound the factor: below over the whole boxes, above at the corners of the misalignments.
 
         And where small tilts decide, tell what exact tilts prove.  A combination of corners closes with the combination
         of their tilts, and what exact tilts add to it is the combination of what they add at the corners.
         """
-        layout = self.given.layout
-        rates = slopes(self.system, layout.joints, u, tubes, counted)
-        step = u - points(u.mid)
+        layout, count = self.given.layout, len(counted)
+        *rates, fine = slopes(self.system, layout.joints, u, tubes, counted, p)
+        steps = Interval.stack([u, *columns_of(p)], axis=0)
+        steps = steps - points(steps.mid)
+        sound = middle.proved & fine
+        r, e, base = (
+            _straight(getattr(tubes, name), getattr(middle, name), rate, steps, sound)
+            for name, rate in zip(("r", "e", "base"), rates)
+        )
+        tubes = tubes._replace(r=r, e=e, base=base)
 
         def pieces(own: Layout) -> Pieces:
             """Positions and misalignments, with what the mean value theorem needs where it is proved."""
-            r_slope, e_slope, base_slope, fine = rates
-            moving = Moving(
-                middle.r,
-                middle.e,
-                shifts_enclosed(own, middle.base),
-                r_slope,
-                e_slope,
-                shifts_enclosed(own, base_slope),
-                step,
-                middle.proved & fine,
-            )
+            r_slope, e_slope, base_slope = rates
+            flat = base_slope.reshape(-1, *base_slope.shape[2:])
+            d_slope = shifts_enclosed(own, flat).reshape(*r_slope.shape)
+            shift = shifts_enclosed(own, middle.base)
+            moving = Moving(middle.r, middle.e, shift, r_slope, e_slope, d_slope, steps, sound)
             return Pieces(tubes.r, tubes.e, shifts_enclosed(own, tubes.base), moving)
 
-        upper = np.zeros(len(poses))
+        def solved(own: Layout) -> PoseSolution:
+            return solve_poses(own, middle.r.mid, middle.e.mid, shifts(own, middle.base.mid), "scale")
+
+        upper, least, most = np.zeros((3, count))
         above = []
         for corner in self.corners:
-            found = replace(self.given, layout=corner).solve(poses, "scale")
-            above.append((corner, pieces(corner), found))
+            above.append((corner, pieces(corner), solved(corner)))
             upper = np.maximum(upper, upper_bounds(*above[-1]))
-        if len(self.corners) > 1:  # one alone differs by a factor at most, which the bound from below does not see
-            found = self.given.solve(poses, "scale")
-        below = layout, pieces(layout), found
+            low, high = estimated_range(*above[-1])
+            least, most = np.maximum(least, low), np.maximum(most, high)
+        # one corner alone differs by a factor at most, which the bound from below does not see
+        below = layout, pieces(layout), above[0][2] if len(self.corners) == 1 else solved(layout)
         lower = lower_bounds(*below)
         if not self.exact:
-            return lower, upper, np.zeros(len(poses), dtype=np.int8)
-        return lower, upper, self._sure(lower, upper, below, above, tubes, u, counted)
+            return lower, upper, np.zeros(count, dtype=np.int8), least, most
+        return lower, upper, self._sure(lower, upper, below, above, tubes, u, counted, p), least, most
 
     def _sure(
-        self, lower: Array, upper: Array, below: _Bound, above: list[_Bound], tubes: Tubes, u: Interval, counted: Array
+        self,
+        lower: Array,
+        upper: Array,
+        below: _Bound,
+        above: list[_Bound],
+        tubes: Tubes,
+        u: Interval,
+        counted: Array,
+        p: Interval,
     ) -> NDArray[np.int8]:
         """Tell where exact tilts prove binding (-1) or freedom (+1), among the pieces that small tilts decide."""
         sure = np.zeros(len(lower), dtype=np.int8)
+
+        def rest(layout: Layout, rows: NDArray[np.intp], assumed: Array) -> Neglected:
+            system = self.system.within(columns_of(p[rows]))
+            return neglected(system, layout, tubes.take(rows), u[rows], counted[rows], assumed)
+
         rows = np.flatnonzero(lower > 1.0)
         if rows.size:
             layout, at, found = below[0], _take(below[1], rows), _take(below[2], rows)
-            none = np.full((rows.size, len(layout.limit)), np.inf)
-            exact = neglected(self.system, layout, tubes.take(rows), u[rows], counted[rows], none)
+            exact = rest(layout, rows, np.full((rows.size, len(layout.limit)), np.inf))
             sure[rows[lower_bounds(layout, at, found, exact) > 1.0]] = -1
         rows = np.flatnonzero(upper < 1.0)
         if rows.size:
@@ -244,8 +327,7 @@ class Work:
                 at, found = _take(whole, rows), _take(found, rows)
                 tilts = np.abs(start_tilts(layout, at, found)[0]).sum(axis=-1)
                 tilts = _ROOM * tilts + _SHARE * tilts.max(axis=1, keepdims=True, initial=0.0) + _LEAST
-                exact = neglected(self.system, layout, tubes.take(rows), u[rows], counted[rows], tilts)
-                free &= upper_bounds(layout, at, found, exact) < 1.0
+                free &= upper_bounds(layout, at, found, rest(layout, rows, tilts)) < 1.0
             sure[rows[free]] = 1
         return sure
 
@@ -256,59 +338,30 @@ class Work:
         value[fine] = self.given.solve(poses[fine], "scale").lower
         return value
 
-    def links(self, pieces: Found) -> Mask:
-        """Whether the assemblies of neighbouring pieces are proved to be one at the input they share, (pieces - 1,)."""
-        edges = pieces.lo[1:]
-        found: Mask = pieces.proved[:-1] & pieces.proved[1:]
-        rows = np.flatnonzero(found)
-        if rows.size == 0 or self.system.size == 0:
-            return found
-        fine, poses, velocities = self._follow(edges[rows])
-        fine &= np.isfinite(velocities).all(axis=(1, 2))
-        found[rows[~fine]] = False
-        rows, poses, velocities = rows[fine], poses[fine], velocities[fine]
-        if rows.size == 0:
-            return found
-        x, rate = self.system.coordinates(poses, velocities)
-        counted, u = self.system.count(poses), Interval.from_bounds(edges[rows], edges[rows])
-        single = prove_tubes(self.system, (), u, x, rate, counted)
-        before = Interval.from_bounds(pieces.box_lo[rows], pieces.box_hi[rows])
-        after = Interval.from_bounds(pieces.box_lo[rows + 1], pieces.box_hi[rows + 1])
-        found[rows] = linked(self.system, single, u, before, after, counted)
-        return found
+    def assemblies(self, u: Array, p: Array) -> Tubes:
+        """Prove the assembly of the motion at inputs (N,) and parameters (N, m); the poses are estimated."""
+        fine, poses, _ = self._follow(u)
+        poses = np.where(fine[:, None, None], poses, 0.0)
+        x = self.system.coordinates(poses, np.zeros_like(poses))[0]
+        found = prove_tubes(self.system, (), points(u), x, self.system.count(poses), points(p))
+        return found._replace(proved=found.proved & fine)
 
-    def on_branch(self, pieces: Found, links: Mask) -> Mask:
-        """Whether the assembly of a piece is proved to be that of the motion: a sample's own, or linked to such a one.
 
-        A sample of the motion stands for the one assembly proved next to it.  Every box holds exactly one for each
-        input, so a box around that assembly belongs to the motion.
-        """
-        # proved pieces within which the motion has a sample, and for each the sample nearest to its middle
-        keep = np.flatnonzero(self.motion.assembled)
-        u = self.motion.inputs[keep]
-        place = np.clip(np.searchsorted(pieces.lo, u, side="right") - 1, 0, None)
-        inside = np.flatnonzero(pieces.proved[place] & (pieces.lo[place] <= u) & (u <= pieces.hi[place]))
-        place, u = place[inside], u[inside]
-        away = np.abs(u - 0.5 * (pieces.lo[place] + pieces.hi[place]))
-        order = np.lexsort((away, place))
-        rows, first = np.unique(place[order], return_index=True)
-        samples = keep[inside[order[first]]]
-        if self.system.size and rows.size:
-            poses = self.motion.poses[samples]
-            x, u = self.system.coordinates(poses, np.zeros_like(poses))[0], self.motion.inputs[samples]
-            own = prove_tubes(self.system, (), points(u), x, np.zeros_like(x), self.system.count(poses))
-            box = Interval.from_bounds(pieces.box_lo[rows], pieces.box_hi[rows])
-            rows = rows[own.proved & own.tight.subset(box).all(axis=1)]
-        group = np.concatenate([[0], np.cumsum(~links)])  # of pieces that are linked
-        return np.isin(group, group[rows])
+def _straight(whole: Interval, middle: Interval, rates: Interval, steps: Interval, sound: Mask) -> Interval:
+    """Narrow values over pieces by the mean value theorem, where it is proved: rates are (1 + m, N, ...)."""
+    shape = (*steps.shape, *(1,) * (whole.ndim - 1))
+    with np.errstate(all="ignore"):
+        better = (middle + (rates * steps.reshape(*shape)).sum(0)).intersect(whole)
+    use = sound.reshape(-1, *(1,) * (whole.ndim - 1)) & ~better.is_empty
+    return Interval.from_bounds(np.where(use, better.lo, whole.lo), np.where(use, better.hi, whole.hi))
 
 
 def _take(value: Any, rows: NDArray[np.intp]) -> Any:
     """Return some of the pieces of a named tuple of arrays and intervals; its other entries as they are."""
-    parts = []
+    parts: list[Any] = []
     for part in value:
         if isinstance(part, tuple):
-            parts.append(_take(part, rows) if isinstance(part, Moving) else part)
+            parts.append(part.take(rows) if isinstance(part, Moving) else part)
         else:
             parts.append(part[rows] if isinstance(part, np.ndarray | Interval) else part)
     return type(value)(*parts)
@@ -321,15 +374,13 @@ def cut(lo: Array, hi: Array) -> tuple[Array, Array]:
     return edges[:, :-1].ravel(), edges[:, 1:].ravel()
 
 
-def check_range(motion: Motion, length_tolerance: float, **limits: float) -> None:
-    """Refuse a changed rounding mode, a tolerance or a limit of the work out of bounds, a motion without a range."""
+def check_range(motion: Motion, **limits: float) -> None:
+    """Refuse a changed rounding mode, a limit of the work out of bounds, a motion without a range."""
     check_rounding()
     check_motion(motion)
     for name, value in limits.items():
         if not isinstance(value, int | float | np.number) or not value >= 0 or (value > 2**63 and value != np.inf):
             raise GeometryError(f"{name} = {value!r} must be a number of zero or more; correct the value")
-    if not 0.0 <= finite("length_tolerance", length_tolerance) < 0.5:
-        raise GeometryError(f"length_tolerance = {length_tolerance} must be a relative half width from 0 to 0.5")
     if int(motion.assembled.sum()) < 2:
         raise GeometryError(
             f"the motion has {int(motion.assembled.sum())} assembled samples; a range needs two or more"

@@ -26,6 +26,8 @@ from graphsynth.core.checks import finite
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval
 from graphsynth.jamming.bearing.bearing import Condition
+from graphsynth.jamming.joints.branch import of_the_motion
+from graphsynth.jamming.joints.drawing import Tolerances, drawn
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.pieces import PARTS, Found, Work, check_range, cut
 from graphsynth.jamming.joints.positions import Unsupported
@@ -72,7 +74,7 @@ def largest_scale(
     tilts: Misalignment | Iterable[Misalignment],
     *,
     condition: Condition = "A",
-    length_tolerance: float = 0.0,
+    tolerances: Tolerances = 0.0,
     relative_gap: float = 1e-4,
     max_pieces: int = 20_000,
     seconds: float = 20.0,
@@ -81,7 +83,7 @@ def largest_scale(
 
     Parameters
     ----------
-    motion, bearings, tilts, condition, length_tolerance
+    motion, bearings, tilts, condition, tolerances
         As for `certify_coupled`.
     relative_gap : float
         Wanted ``high / low - 1``.
@@ -95,10 +97,11 @@ def largest_scale(
         lies between ``low * alpha`` and ``high * alpha``.
     """
     begin = perf_counter()
-    check_range(motion, length_tolerance, relative_gap=relative_gap, max_pieces=max_pieces, seconds=seconds)
-    given = problem(motion.mechanism, bearings, tilts, condition)
+    check_range(motion, relative_gap=relative_gap, max_pieces=max_pieces, seconds=seconds)
+    limits, axes, box = drawn(motion.mechanism, bearings, tilts, tolerances)
+    given = problem(motion.mechanism, limits, axes, condition)
     try:
-        work = Work(given, motion, length_tolerance, exact=False)
+        work = Work(given, motion, box, exact=False)
         budget = Budget(1e-9 * (work.high - work.low), max_pieces, seconds, begin)
         found = _enclosed(work, budget, *_branch_and_bound(work, budget, relative_gap))
         if found.reason or found.relative_gap <= relative_gap or found.high == math.inf == found.low:
@@ -137,12 +140,11 @@ def _branch_and_bound(work: Work, budget: Budget, relative_gap: float) -> tuple[
 
 def _enclosed(work: Work, budget: Budget, pieces: Found, above: float, reason: str) -> ScaleCertificate:
     """Turn bounds of the factor into bounds of its inverse; only pieces proved to be on the branch count."""
-    links = work.links(pieces)
-    own = work.on_branch(pieces, links)
+    own, whole = of_the_motion(work, pieces)
     peak = np.where(own, pieces.lower, 0.0)
     top = int(np.argmax(peak))
     best, at = float(peak[top]), math.nan
-    if not (own.all() and links.all()):
+    if not whole:
         above = math.inf
         reason = reason or "the pieces are not proved to be one branch"
     low, high = math.inf if above == 0.0 else 0.0, math.inf

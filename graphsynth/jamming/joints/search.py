@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.intervals import Interval
 from graphsynth.intervals.reading import shortened
 from graphsynth.jamming.joints.limits import Limits, Misalignment, bounds
-from graphsynth.jamming.joints.pieces import Found, Work, cut
+from graphsynth.jamming.joints.pieces import PARTS, Found, Work, cut
 from graphsynth.jamming.joints.program import problem
 
 if TYPE_CHECKING:
@@ -30,6 +31,9 @@ Mask = NDArray[np.bool_]
 _PEAKS = 4
 #: So many pieces may be cut without asking whether it can help.
 _FEW = 8
+#: So many times the parameters of a piece are halved at most; with members of both kinds; what a cut of the input is
+#: worth beside that of a parameter, for it makes more pieces but is needed anyway.
+_CUTS, _MIXED_CUTS, _INPUT = 12, 4, 0.5
 
 
 class Budget(NamedTuple):
@@ -47,27 +51,71 @@ class Budget(NamedTuple):
 
 
 def search(work: Work, budget: Budget) -> tuple[Found, str]:
-    """Cut the range until every piece is decided, too narrow, or cannot be decided; say what stopped the work."""
+    """Cut inputs and parameters until every piece is decided, too narrow, or cannot be decided; say what stopped it."""
     parts: list[Found] = []
     lo, hi = work.first()
+    p = work.whole(len(lo))
     stopped = ""
     first = True
     while lo.size:
         if work.evaluated + lo.size > budget.max_pieces or budget.over:
             stopped = f"the limit of work was reached after {work.evaluated} pieces"
-            parts.append(_open(lo, hi, work.system.size))
+            parts.append(Found.open(lo, hi, p, work.system.size))
             break
-        found = work.evaluate(lo, hi)
-        again = (found.straddles | found.unsure) & (hi - lo > budget.smallest)
+        found = work.evaluate(lo, hi, p)
+        again = (found.straddles | found.unsure) & _worth(work, found, budget)
         if not first and not budget.over:
             again &= ~_hopeless(work, found, again)
         first = False
         parts.append(found.take(~again))
-        lo, hi = cut(lo[again], hi[again])
+        lo, hi, p = _divided(work, found.take(again), budget)
     pieces = Found.join(parts)
     if not (pieces.sure == -1).any() and not ((pieces.upper < 1.0) | ~pieces.proved).all():
         pieces = _with_peak(work, pieces)
     return pieces, stopped
+
+
+def _shares(work: Work, found: Found) -> Array:
+    """Width of every parameter of the pieces over that of the whole box, (N, m)."""
+    whole = work.box.high - work.box.low
+    return (found.p_hi - found.p_lo) / np.where(whole > 0.0, whole, 1.0)
+
+
+def _worth(work: Work, found: Found, budget: Budget) -> Mask:
+    """Tell the pieces that are wide enough to be cut; those with members of both kinds only along the input."""
+    wide = np.asarray(found.hi - found.lo > budget.smallest)
+    if work.box.size == 0:
+        return wide
+    cuts = -np.log2(_shares(work, found)).sum(axis=1)
+    few = np.where(found.mixed & found.proved, _MIXED_CUTS, _CUTS)
+    return np.asarray(wide & (cuts < few - 0.5))
+
+
+def _divided(work: Work, found: Found, budget: Budget) -> tuple[Array, Array, Interval]:
+    """Cut every piece where the assembly moves most: the input into `PARTS`, or a parameter in two."""
+    count = len(found.lo)
+    reach = found.reach.copy()
+    none = ~found.proved & (reach.max(axis=1, initial=0.0) == 0.0)
+    reach[none, 0] = 1.0  # the middle is not assembled: nothing is known of the parameters
+    if work.box.size:
+        reach[found.hi - found.lo <= budget.smallest, 0] = 0.0
+        reach[:, 0] *= _INPUT
+    which = reach.argmax(axis=1)
+    p = Interval.from_bounds(found.p_lo, found.p_hi)
+    by_input = np.flatnonzero(which == 0)
+    lo, hi = cut(found.lo[by_input], found.hi[by_input])
+    rows = np.repeat(by_input, PARTS)
+    parts = [(lo, hi, p.lo[rows], p.hi[rows])]
+    rest = np.flatnonzero(which > 0)
+    for half in (0, 1):
+        low, high = p.lo[rest].copy(), p.hi[rest].copy()
+        at = np.arange(rest.size), which[rest] - 1
+        middle = 0.5 * (low[at] + high[at])
+        (high if half == 0 else low)[at] = middle
+        parts.append((found.lo[rest], found.hi[rest], low, high))
+    assert sum(len(own[0]) for own in parts) == PARTS * by_input.size + 2 * (count - by_input.size)
+    lo, hi, low, high = (np.concatenate(columns) for columns in zip(*parts))
+    return lo, hi, Interval.from_bounds(low, high)
 
 
 def _hopeless(work: Work, found: Found, again: Mask) -> Mask:
@@ -76,21 +124,23 @@ def _hopeless(work: Work, found: Found, again: Mask) -> Mask:
     Tolerances of which some jam and some do not, a factor of 1 all along, or a distance from 1 that exact tilts may
     close.  A guess about what to leave undecided; it proves nothing.
     """
-    stuck = again & found.proved
+    stuck = again & found.proved & (found.mixed | found.unsure | (work.box.size == 0))
     rows = np.flatnonzero(stuck)
     if rows.size <= _FEW:
         return np.zeros_like(stuck)
     lo, hi = found.lo[rows], found.hi[rows]
-    inputs, back = np.unique(np.concatenate([lo, 0.5 * (lo + hi), hi]), return_inverse=True)
-    at = work.evaluate(inputs, inputs)
-    straddles, unsure, proved = (part[back].reshape(3, -1) for part in (at.straddles, at.unsure, at.proved))
+    p = Interval.from_bounds(np.tile(found.p_lo[rows], (3, 1)), np.tile(found.p_hi[rows], (3, 1)))
+    inputs = np.concatenate([lo, 0.5 * (lo + hi), hi])
+    at = work.evaluate(inputs, inputs, p)
+    straddles, unsure, proved = (part.reshape(3, -1) for part in (at.straddles, at.unsure, at.proved))
     stuck[rows] = (proved & np.where(found.straddles[rows], straddles, unsure)).all(axis=0)
     return stuck
 
 
 def peak_inputs(work: Work, pieces: Found, left: NDArray[np.intp]) -> Array:
     """Return inputs in some of the pieces at which the factor seems largest (estimated), ascending."""
-    left = left[np.argsort(-pieces.lower[left], kind="stable")][:_PEAKS]
+    left = left[np.argsort(-pieces.lower[left], kind="stable")]
+    left = left[np.sort(np.unique(pieces.lo[left], return_index=True)[1])][:_PEAKS]
     lo, hi = pieces.lo[left], pieces.hi[left]
     for _ in range(8):
         inputs = np.unique(lo[:, None] + (hi - lo)[:, None] * (np.arange(9) / 8.0))
@@ -114,24 +164,20 @@ def _with_peak(work: Work, pieces: Found) -> Found:
         return pieces
     top = jams[[int(np.argmax(points.lower[jams]))]]
     u = float(points.lo[top[0]])
-    place = int(np.searchsorted(pieces.lo, u, side="right")) - 1
-    split = pieces.take(np.array([place, place]))
-    split.hi[0] = split.lo[1] = u
-    rest = np.delete(np.arange(len(pieces.lo)), place)
-    return Found.join([pieces.take(rest), split, points.take(top)])
-
-
-def _open(lo: Array, hi: Array, size: int) -> Found:
-    """Pieces about which nothing is known."""
-    none = np.zeros(len(lo))
-    box = np.full((len(lo), size), np.nan)
-    return Found(lo, hi, none, none + np.inf, none > 1.0, box, box, none.astype(np.int8))
+    around = np.flatnonzero((pieces.lo <= u) & (pieces.hi >= u))
+    around = around[pieces.lo[around] == pieces.lo[around].max()]
+    before, after = pieces.take(around), pieces.take(around)
+    before.hi[:] = after.lo[:] = u
+    rest = np.delete(np.arange(len(pieces.lo)), around)
+    return Found.join([pieces.take(rest), before, after, points.take(top)])
 
 
 #: Directions tried over the range of each.
 _DIRECTIONS = 9
 #: Relative step back from the corner of the dimensions, so that rounding leaves them inside their box.
 _INSIDE = 1e-9
+#: The corners of a square of this size lie in a disc of radius one.
+_HALF = 0.7071
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +224,9 @@ class MemberWitness:
 
 def jamming_member(work: Work, pieces: Found, own: Mask) -> MemberWitness | None:
     """Return a member proved to jam in one of the pieces ``own`` (proved to be on the branch), or None."""
+    proved = np.flatnonzero(own & (pieces.sure == -1))
+    if proved.size:
+        return _of_a_piece(work, pieces, int(proved[np.argmax(pieces.lower[proved])]))
     left = np.flatnonzero(own & (pieces.upper > 1.0))
     boxes = [bounds(tilt, name) for tilt in work.given.misalignments for name in ("alpha", "direction")]
     lows = []
@@ -186,19 +235,18 @@ def jamming_member(work: Work, pieces: Found, own: Mask) -> MemberWitness | None
         boxes += ranges.values()
         least: dict[str, Any] = {name: low for name, (low, _) in ranges.items()}
         lows.append(type(limit)(**least))
-    if left.size == 0 or not (work.tolerance > 0.0 or any(low < high for low, high in boxes)):
+    if left.size == 0 or not (work.box.size or any(low < high for low, high in boxes)):
         return None
     tilts = tuple(tilt.sharp() for tilt in work.given.misalignments)
-    member = _member(work, work.given.mechanism, tuple(lows), tilts)
+    member = _member(work, np.zeros(work.box.size), tuple(lows), tilts)
     at = peak_inputs(member, pieces, left)
     # dimensions last: their corner depends on which way the axes are tilted
-    for adjust in (_worst_tilts, _worst_dimensions):
-        member = adjust(work, member, at)
+    member = _worst_tilts(work, member, at)
+    member, p = _worst_dimensions(work, member, at)
     at = peak_inputs(member, pieces, left)
-    points = member.evaluate(at, at)
-    place = np.clip(np.searchsorted(pieces.lo, at, side="right") - 1, 0, None)
-    inside = own[place] & points.proved & (at <= pieces.hi[place])
-    inside &= ((points.box_lo >= pieces.box_lo[place]) & (points.box_hi <= pieces.box_hi[place])).all(axis=1)
+    limits, tilts = member.given.limits, member.given.misalignments
+    points = _proving(work, limits, tilts).evaluate(at, at, Interval.from_bounds(*2 * (np.tile(p, (at.size, 1)),)))
+    inside = _in_a_piece(pieces, own, at, p, points)
     exact = bool((inside & (points.sure == -1)).any())
     factor = np.where(inside & ((points.sure == -1) | (not exact)), points.lower, 0.0)
     top = int(np.argmax(factor))
@@ -208,11 +256,42 @@ def jamming_member(work: Work, pieces: Found, own: Mask) -> MemberWitness | None
     return MemberWitness(float(at[top]), float(factor[top]), given.misalignments, given.limits, given.mechanism, exact)
 
 
-def _member(work: Work, mechanism: Mechanism, limits: tuple[Limits, ...], tilts: tuple[Misalignment, ...]) -> Work:
-    """Work of one member, from the start of the motion."""
+def _of_a_piece(work: Work, pieces: Found, row: int) -> MemberWitness:
+    """Return the member in the middle of a piece in which all bind."""
+    u = float(0.5 * (pieces.lo[row] + pieces.hi[row]))
+    p = np.clip(0.5 * (pieces.p_lo[row] + pieces.p_hi[row]), pieces.p_lo[row], pieces.p_hi[row])
+    given = work.given
+    tilts, mechanism = tuple(tilt.sharp() for tilt in given.misalignments), work.box.member(given.mechanism, p)
+    return MemberWitness(u, float(pieces.lower[row]), tilts, given.limits, mechanism)
+
+
+def _in_a_piece(pieces: Found, own: Mask, at: Array, p: Array, points: Found) -> Mask:
+    """Whether the assembly proved at an input, for the member p, is that of a piece on the branch."""
+    found = np.zeros(at.size, dtype=np.bool_)
+    held = own & ((pieces.p_lo <= p) & (p <= pieces.p_hi)).all(axis=1)
+    for k in np.flatnonzero(points.proved).tolist():
+        rows = np.flatnonzero(held & (pieces.lo <= at[k]) & (at[k] <= pieces.hi))
+        low, high = pieces.box_lo[rows] <= points.box_lo[k], points.box_hi[k] <= pieces.box_hi[rows]
+        found[k] = (low & high).all(axis=1).any()
+    return found
+
+
+def _table(work: Work, limits: tuple[Limits, ...], tilts: tuple[Misalignment, ...]) -> dict[tuple[int, int], Limits]:
     rigid = {tilt.pair for tilt in tilts if tilt.rigid}
-    table = {joint.pair: own for joint, own in zip(mechanism.joints, limits) if joint.pair not in rigid}
-    return Work(problem(mechanism, table, tilts), replace(work.motion, mechanism=mechanism), 0.0)
+    return {joint.pair: own for joint, own in zip(work.given.mechanism.joints, limits) if joint.pair not in rigid}
+
+
+def _proving(work: Work, limits: tuple[Limits, ...], tilts: tuple[Misalignment, ...]) -> Work:
+    """Work of the same box of parameters with sharp limits and misalignments."""
+    given = problem(work.given.mechanism, _table(work, limits, tilts), tilts)
+    return Work(given, work.motion, work.box)
+
+
+def _member(work: Work, p: Array, limits: tuple[Limits, ...], tilts: tuple[Misalignment, ...]) -> Work:
+    """Work of one member of the box of parameters, from the start of the motion: to look for what binds."""
+    mechanism = work.box.member(work.given.mechanism, p) if p.any() else work.given.mechanism
+    given = problem(mechanism, _table(work, limits, tilts), tilts)
+    return Work(given, replace(work.motion, mechanism=mechanism), 0.0)
 
 
 def _worst_tilts(work: Work, member: Work, at: NDArray[np.float64]) -> Work:
@@ -224,40 +303,33 @@ def _worst_tilts(work: Work, member: Work, at: NDArray[np.float64]) -> Work:
         for alpha, direction in product(sorted(set(bounds(tilt, "alpha"))), sorted(angles)):
             choice = tilt.sharp(alpha, direction)
             tilts = (*best.given.misalignments[:k], choice, *best.given.misalignments[k + 1 :])
-            other = _member(work, member.given.mechanism, member.given.limits, tilts)
+            other = _member(work, np.zeros(work.box.size), member.given.limits, tilts)
             value = float(other.estimate(at).max())
             if value > most:
                 best, most = other, value
     return best
 
 
-def _worst_dimensions(work: Work, member: Work, at: NDArray[np.float64]) -> Work:
-    """Take every coordinate of a joint to the end of its box that raises the factor at the worst of the inputs."""
-    if work.tolerance == 0.0:
-        return member
-    mechanism, step = member.given.mechanism, work.tolerance * (1.0 - _INSIDE)
+def _worst_dimensions(work: Work, member: Work, at: NDArray[np.float64]) -> tuple[Work, Array]:
+    """Take every parameter to the end of its box that raises the factor at the worst of the inputs."""
+    box = work.box
+    p = np.zeros(box.size)
+    if box.size == 0:
+        return member, p
     value = member.estimate(at)
     worst = at[[int(np.argmax(value))]]
     most = float(value.max())
+    low, high = box.low * (1.0 - _INSIDE), box.high * (1.0 - _INSIDE)
+    for pair in box.discs:
+        low[list(pair)], high[list(pair)] = low[list(pair)] * _HALF, high[list(pair)] * _HALF
 
-    def moved(signs: NDArray[np.float64]) -> Work:
-        grow = (1.0 + step * signs).reshape(-1, 4)
-        joints = [
-            replace(
-                joint,
-                at_a=(joint.at_a[0] * g[0], joint.at_a[1] * g[1]),
-                at_b=(joint.at_b[0] * g[2], joint.at_b[1] * g[3]),
-            )
-            for joint, g in zip(mechanism.joints, grow.tolist())
-        ]
-        other = replace(mechanism, joints=tuple(joints))
-        return _member(work, other, member.given.limits, member.given.misalignments)
+    def moved(values: Array) -> Work:
+        return _member(work, values, member.given.limits, member.given.misalignments)
 
-    signs = np.zeros(4 * len(mechanism.joints))
-    given = np.array([value for joint in mechanism.joints for value in (*joint.at_a, *joint.at_b)])
-    for k in np.flatnonzero(given != 0.0):
-        one = np.zeros_like(signs)
-        one[k] = 1.0
-        signs[k] = np.sign(moved(one).estimate(worst)[0] - most)
-    other = moved(signs)
-    return other if float(other.estimate(worst)[0]) > most else member
+    for k in range(box.size):
+        one = np.zeros(box.size)
+        one[k] = high[k] if high[k] > 0.0 else low[k]
+        rises = moved(one).estimate(worst)[0] >= most
+        p[k] = high[k] if rises == bool(high[k] > 0.0) else low[k]
+    other = moved(p)
+    return (other, p) if float(other.estimate(worst)[0]) > most else (member, np.zeros(box.size))

@@ -9,7 +9,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import FormatError, GraphsynthError
-from graphsynth.pipeline.planar.tables import BearingsTable, EmbodyTable, LoadsTable, MotorTable, PlanarTable
+from graphsynth.pipeline.planar.tables import (
+    BearingsTable,
+    EmbodyTable,
+    LoadsTable,
+    MotorTable,
+    PlanarTable,
+    ToleranceTable,
+)
 from graphsynth.pipeline.products import Candidate, Columns, Outcome, Quantity, Record, Rejected, exact
 from graphsynth.pipeline.stages import Context
 
@@ -20,6 +27,7 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.laws import Driver
     from graphsynth.mechanism.model import Mechanism
+    from graphsynth.tolerances.parts import PartTolerance
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,15 +261,16 @@ def jamming(context: Context, moved: Moved) -> Part:
         alpha_range=(max(alpha - spread, 0.0), alpha + spread) if spread else None,
         direction_range=(0.0, math.tau) if table.any_direction else None,
     )
-    report = assess_coupled(moved.motion, limits, tilt, condition=table.condition)
+    parts = [part_of(own) for own in table.tolerances]
+    given: Any = {"condition": table.condition, "tolerances": parts or table.length_tolerance}
+    report = assess_coupled(moved.motion, limits, tilt, **given)
     verdict, reason = report.verdict, report.reason
     if table.certify:
         proof = certify_coupled(
             moved.motion,
             limits,
             tilt,
-            condition=table.condition,
-            length_tolerance=table.length_tolerance,
+            **given,
             max_pieces=context.scene.budget.boxes or _PIECES,
             seconds=math.inf,
         )
@@ -275,6 +284,26 @@ def jamming(context: Context, moved: Moved) -> Part:
         Quantity.of_si("worst input", report.worst_input, "deg"),
     )
     return Part(f"bearings: {verdict.value}", good, margins, reason if verdict is Verdict.UNDECIDED else "")
+
+
+def part_of(table: ToleranceTable) -> PartTolerance:
+    """Return a tolerance of a part, in metres and radians; fits stay in millimetres."""
+    from graphsynth.tolerances import parts
+
+    own: Any = table
+    if own.kind == "length":
+        return parts.LengthTolerance(own.link, own.ends, own.plus, own.minus)
+    if own.kind == "hole":
+        return parts.HolePosition(own.link, own.to, own.diameter)
+    if own.kind == "temperature":
+        return parts.ThermalExpansion(own.low_kelvin, own.high_kelvin, dict(enumerate(own.per_kelvin)))
+    if own.kind == "fit":
+        return parts.FitClearance(own.joint, own.fit, own.height_mm)
+    if own.kind == "end float":
+        return parts.EndFloat(own.joint, own.least, own.most)
+    if own.kind == "axis":
+        return parts.AxisAngle(own.link, own.to, own.angle)
+    return parts.Parallelism(own.link, own.to, own.diameter, own.over)
 
 
 def dynamics(context: Context, moved: Moved) -> Part:

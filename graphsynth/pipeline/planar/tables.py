@@ -91,6 +91,46 @@ class MotionTable:
     min_transmission: Deg = 0.0
 
 
+Kind = Literal["length", "hole", "temperature", "fit", "end float", "axis", "parallelism"]
+#: What every kind of tolerance needs.
+NEEDED: dict[str, tuple[str, ...]] = {
+    "length": ("link", "ends", "plus"),
+    "hole": ("link", "to", "diameter"),
+    "temperature": ("low_kelvin", "high_kelvin", "per_kelvin"),
+    "fit": ("joint", "fit", "height_mm"),
+    "end float": ("joint", "least", "most"),
+    "axis": ("link", "to", "angle"),
+    "parallelism": ("link", "to", "diameter", "over"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ToleranceTable:
+    """One tolerance of a part, as on a drawing; a joint of a link is named by the link at its other side."""
+
+    kind: Kind
+    link: int | None = None
+    to: int | None = None
+    ends: tuple[int, int] | None = None
+    joint: tuple[int, int] | None = None
+    plus: Annotated[float | None, In("mm", least=0)] = None
+    minus: Annotated[float | None, In("mm", least=0)] = None
+    diameter: Annotated[float | None, In("mm", least=0)] = None
+    over: Annotated[float | None, In("mm", above=0)] = None
+    least: Annotated[float | None, In("mm", least=0)] = None
+    most: Annotated[float | None, In("mm", least=0)] = None
+    angle: Annotated[float | None, In("deg", least=0)] = None
+    fit: str | None = None
+    height_mm: Annotated[float | None, In(above=0)] = None
+    low_kelvin: float | None = None
+    high_kelvin: float | None = None
+    per_kelvin: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        missing = [name for name in NEEDED[self.kind] if getattr(self, name) is None]
+        require(not missing, f"gives no {' and no '.join(missing)}; a tolerance of kind {self.kind!r} needs it")
+
+
 @dataclass(frozen=True, slots=True)
 class BearingsTable:
     """All bearings alike, the driven axis tilted; tolerances are plus or minus, and only certificates use them."""
@@ -107,6 +147,11 @@ class BearingsTable:
     alpha_tolerance: Deg = 0.0
     clearance_tolerance_mm: float = 0.0
     length_tolerance: Annotated[float, In("%")] = 0.0
+    tolerances: tuple[ToleranceTable, ...] = ()
+
+    def __post_init__(self) -> None:
+        both = bool(self.tolerances) and self.length_tolerance > 0.0
+        require(not both, "has tolerances and length_tolerance, one number for all; give one of them")
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,11 +23,13 @@ from graphsynth.jamming.joints import (
     certify_coupled,
     largest_scale,
 )
+from graphsynth.jamming.joints.branch import of_the_motion
 from graphsynth.jamming.joints.closure import joint_places, shifts
 from graphsynth.jamming.joints.enclosure import Pieces
 from graphsynth.jamming.joints.pieces import FEWEST, PARTS, Work
-from graphsynth.jamming.joints.positions import Positions, prove_tubes, slopes
+from graphsynth.jamming.joints.positions import Positions
 from graphsynth.jamming.joints.program import problem
+from graphsynth.jamming.joints.tubes import prove_tubes, slopes
 from graphsynth.mechanism.laws import Harmonic, Table
 
 T_A = 0.006064396559156420060266102798724801172486
@@ -184,12 +186,11 @@ def test_a_box_around_the_float_alone_is_not_that_of_the_motion():
     given = problem(four_bar(), Bearing(), Misalignment(0, 1, 0.01))
     work = Work(given, motion, 0.0)
     pieces = work.evaluate(np.array([4.2]), np.array([4.25]))
-    none = np.zeros(0, dtype=bool)
-    assert work.on_branch(pieces, none).all()
+    assert of_the_motion(work, pieces) == (np.array([True]), True)
     x = work.system.coordinates(motion.poses[:1], np.zeros_like(motion.poses[:1]))[0]
-    assert not work.on_branch(pieces._replace(box_lo=x, box_hi=x), none).any()
-    assert not work.on_branch(pieces._replace(lo=pieces.lo + 0.01), none).any()  # no sample within
-    assert not work.on_branch(pieces._replace(proved=np.array([False])), none).any()
+    assert not of_the_motion(work, pieces._replace(box_lo=x, box_hi=x)).own.any()
+    assert not of_the_motion(work, pieces._replace(lo=pieces.lo + 0.01)).own.any()  # no sample within
+    assert not of_the_motion(work, pieces._replace(proved=np.array([False]))).own.any()
 
 
 def test_whole_turn_of_the_lambda_linkage():
@@ -260,7 +261,7 @@ def test_pieces_against_dense_samples(links, number, resolution):
 def test_tolerances_within_which_all_are_free_or_all_jam():
     motion = simulate(four_bar(), TURN)
     sharp = Misalignment(0, 1, 0.0120)
-    assert certify_coupled(motion, Bearing(), sharp, length_tolerance=1e-4).verdict.name == "CERTIFIED_FREE"
+    assert certify_coupled(motion, Bearing(), sharp, tolerances=1e-4).verdict.name == "CERTIFIED_FREE"
     fit = bearing_limits(Bearing(), clearance_tolerance=0.003)
     free = certify_coupled(motion, fit, Misalignment(0, 1, 0.0108))
     assert free.verdict.name == "CERTIFIED_FREE" and free.witness is None
@@ -285,7 +286,7 @@ def test_some_members_jam(fit, alpha, alpha_range, tolerance):
     tilt = Misalignment(0, 1, alpha, alpha_range=alpha_range)
     motion = simulate(four_bar(), TURN)
     fit = fit() if callable(fit) else fit
-    found = certify_coupled(motion, fit, tilt, length_tolerance=tolerance, resolution=2e-2)
+    found = certify_coupled(motion, fit, tilt, tolerances=tolerance, resolution=2e-2)
     assert found.verdict.name == "CERTIFIED_JAMMED_FOR_SOME" and found.certified, found.reason
     assert not (found.state == -1).any() and found.share(1) > 0.4
     one = found.witness
@@ -390,9 +391,9 @@ def test_tubes_contain_perturbed_motions(make, low, high):
     joints = tuple(range(len(mechanism.joints)))
     tolerance = 1e-4
     system = Positions(mechanism, tolerance)
-    x, rate = system.coordinates(motion.poses, motion.velocities)
+    x, _ = system.coordinates(motion.poses, motion.velocities)
     pieces = Interval.from_bounds(edges[:-1], edges[1:])
-    tubes = prove_tubes(system, joints, pieces, x, rate, system.count(motion.poses))
+    tubes = prove_tubes(system, joints, pieces, x, system.count(motion.poses))
     assert tubes.proved.mean() > 0.95
     *rates, fine = slopes(system, joints, pieces, tubes, system.count(motion.poses))
     assert (fine | ~tubes.proved).all()
@@ -415,7 +416,7 @@ def test_tubes_contain_perturbed_motions(make, low, high):
             simulate(other, [u - h, u, u + h], start=pose, events=False) for u, pose in zip(inputs, sample.poses[1:])
         ]
         ends = [joint_places(other, joints, np.array([one.poses[k] for one in near])) for k in (0, 2)]
-        for before, after, rate in zip(*ends, rates):
+        for before, after, rate in zip(*ends, (own[0] for own in rates)):  # by the input
             slope, size = (after - before) / (2 * h), 1e-8 + 1e-3 * h
             assert ((slope >= rate.lo - size) & (slope <= rate.hi + size))[keep][:, guided].all()
         pad = 1e-12
@@ -432,8 +433,8 @@ def test_reasons_of_what_is_not_proved():
     assert proof.verdict.name == "UNDECIDED" and "Table" in proof.reason
     with pytest.raises(GeometryError, match="two or more"):
         certify_coupled(simulate(four_bar(), [0.0]), RIGID, Misalignment(0, 1, 0.01))
-    with pytest.raises(GeometryError, match="length_tolerance"):
-        certify_coupled(simulate(four_bar(), TURN), RIGID, Misalignment(0, 1, 0.01), length_tolerance=-1.0)
+    with pytest.raises(GeometryError, match="tolerances"):
+        certify_coupled(simulate(four_bar(), TURN), RIGID, Misalignment(0, 1, 0.01), tolerances=-1.0)
     cut = certify_coupled(simulate(four_bar(), TURN), Bearing(), Misalignment(0, 1, 0.012), max_pieces=50)
     assert cut.verdict.name == "UNDECIDED" and "limit of work" in cut.reason
 
@@ -441,8 +442,8 @@ def test_reasons_of_what_is_not_proved():
 @pytest.mark.parametrize(
     ("options", "text"),
     [({"seconds": math.nan}, "seconds = nan"), ({"max_pieces": -1}, "max_pieces"),
-     ({"resolution": math.nan}, "resolution"), ({"length_tolerance": "x"}, "length_tolerance = 'x'"),
-     ({"length_tolerance": 0.5}, "0 to 0.5")],
+     ({"resolution": math.nan}, "resolution"), ({"tolerances": "x"}, "tolerances = 'x'"),
+     ({"tolerances": 0.5}, "0 to 0.5")],
 )  # fmt: skip
 def test_limits_of_the_work_that_make_no_sense(options, text):
     motion = simulate(four_bar(), [0.0, 0.5])
@@ -472,7 +473,7 @@ def test_members_of_many_boxes():
             Misalignment(0, 1, alpha, 0.8, direction_range=(0.7, 0.9)),
             Misalignment(0, 3, 0.001, rigid=False, alpha_range=(-0.002, 0.002)),
         ]
-        found = certify_coupled(motion, pins, tilts, length_tolerance=1e-3, resolution=2e-2)
+        found = certify_coupled(motion, pins, tilts, tolerances=1e-3, resolution=2e-2)
         seen.append(found.verdict.name)
         one = found.witness
         if one is None:

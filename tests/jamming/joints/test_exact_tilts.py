@@ -24,8 +24,8 @@ from graphsynth.jamming.joints.closure import joint_places, shifts
 from graphsynth.jamming.joints.enclosure import Pieces, lower_bounds, upper_bounds
 from graphsynth.jamming.joints.exact import Neglected, _movements, neglected
 from graphsynth.jamming.joints.pieces import Work
-from graphsynth.jamming.joints.positions import prove_tubes
 from graphsynth.jamming.joints.program import problem, solve_poses
+from graphsynth.jamming.joints.tubes import prove_tubes
 
 FREE, JAMMED = Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED
 NEAR_WORST = np.linspace(1.5, 1.64, 3)
@@ -151,9 +151,9 @@ def bounds_at(given, motion):
     """What exact tilts change at the first pose, for a proof of a jam."""
     work = Work(given, motion, 0.0)
     u = Interval.from_bounds(motion.inputs[:1], motion.inputs[:1])
-    x, rate = work.system.coordinates(motion.poses[:1], motion.velocities[:1])
+    x, _ = work.system.coordinates(motion.poses[:1], motion.velocities[:1])
     counted = work.system.count(motion.poses[:1])
-    tubes = prove_tubes(work.system, given.layout.joints, u, x, rate, counted)
+    tubes = prove_tubes(work.system, given.layout.joints, u, x, counted)
     none = np.full((1, len(given.layout.limit)), math.inf)
     return tubes, neglected(work.system, given.layout, tubes, u, counted, none)
 
@@ -345,9 +345,9 @@ def test_movements_that_lead_out_of_the_box_are_not_sound(lengths, u):
     motion = simulate(four_bar(*lengths), [u, u + 1e-3])
     given = problem(motion.mechanism, JointLimits(0.1), Misalignment(0, 1, 0.1))
     work, at = Work(given, motion, 0.0), Interval.from_bounds(motion.inputs[:1], motion.inputs[:1])
-    x, rate = work.system.coordinates(motion.poses[:1], motion.velocities[:1])
+    x, _ = work.system.coordinates(motion.poses[:1], motion.velocities[:1])
     counted = work.system.count(motion.poses[:1])
-    tubes = prove_tubes(work.system, given.layout.joints, at, x, rate, counted)
+    tubes = prove_tubes(work.system, given.layout.joints, at, x, counted)
 
     def moved(size):
         offset = np.full((1, 4), size)

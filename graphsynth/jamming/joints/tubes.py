@@ -1,0 +1,298 @@
+"""Tubes: where the one assembly of a mechanism lies over intervals of the input and of its dimensions, proved.
+
+The assembly at the middle of a piece is proved by Krawczyk's test of a point.  From there it is followed to every other
+input u and every choice p of the dimensions: on the branch ``x' = -F_x^-1 F_(u,p)``, and if that, enclosed over a box
+X around the middle, cannot lead out of X, there is exactly one assembly in X for every member.  Rates
+stay apart, one column for the input and one for each parameter, so that what moves together counts together.
+See theory/drawing-tolerances 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.intervals import Dual, Interval, Status, image, variables
+from graphsynth.intervals.dual import jacobian_of, values_of
+from graphsynth.jamming.joints.positions import Array, Mask, Placement, Positions, enclosed_solve, guide, points
+from graphsynth.mechanism.equations import Pair
+from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
+
+_CHUNK = 256
+#: Rounds of Krawczyk's test of a point, of Newton's method, and of the search for a box that holds the branch.
+_ROUNDS, _STEPS = 6, 4
+#: Size of a box over the movement expected; shells of the way outward where one will not do, and tries for each.
+_ROOM, _SHELLS, _TRIES = 1.25, 4, 2
+
+
+class Tubes(NamedTuple):
+    """Pieces of the input and of the dimensions, and what is proved about them.
+
+    ``proved`` (N,); ``domain`` and ``tight`` (N, size): the box with exactly one assembly, and where that lies;
+    ``r``, ``e``, ``base`` (N, joints, 2), (N, joints, 2), (N, joints, 2, 2): positions, guide directions, directions of
+    links a and b of the joints asked for.  Certified where proved.  ``reach`` (N, 1 + m): how far the input and each
+    parameter lead the unknowns, in units of their weights (estimated): what is worth cutting.
+    """
+
+    proved: Mask
+    domain: Interval
+    tight: Interval
+    r: Interval
+    e: Interval
+    base: Interval
+    reach: Array
+
+    def take(self, rows: NDArray[np.intp]) -> Tubes:
+        """Return some of the pieces."""
+        return Tubes._make(part[rows] for part in self)
+
+
+def prove_tubes(
+    system: Positions,
+    joints: tuple[int, ...],
+    u: Interval,
+    x: Array,
+    counted: Array,
+    parameters: Interval | None = None,
+) -> Tubes:
+    """Prove pieces u (N,) of the input around float solutions, with the positions of the joints named.
+
+    ``x`` (N, size) are the unknowns at the midpoints, ``counted`` (N, closing) is from ``system.count`` there,
+    ``parameters`` (N, m) the box of every piece, the whole one if not given.
+    """
+    p = whole_box(system, len(x)) if parameters is None else parameters
+    parts = []
+    for k in range(0, max(len(x), 1), _CHUNK):
+        part = slice(k, k + _CHUNK)
+        parts.append(_prove(system, joints, u[part], x[part], counted[part], p[part]))
+    return Tubes._make(joined(list(own)) for own in zip(*parts))
+
+
+def joined(parts: list[Any]) -> Any:
+    """Concatenate arrays or intervals."""
+    if not isinstance(parts[0], Interval):
+        return np.concatenate(parts)
+    return Interval.from_bounds(np.concatenate([b.lo for b in parts]), np.concatenate([b.hi for b in parts]))
+
+
+def whole_box(system: Positions, count: int) -> Interval:
+    """Return the whole box of parameters for N pieces, (N, m)."""
+    shape = (count, system.box.size)
+    return Interval.from_bounds(np.broadcast_to(system.box.low, shape), np.broadcast_to(system.box.high, shape))
+
+
+def columns_of(values: Interval) -> list[Interval]:
+    """Split (N, m) into m columns."""
+    return [values[:, k] for k in range(values.shape[1])]
+
+
+def settled(system: Positions, x: Array, u: Interval, p: Interval, counted: Array) -> Array:
+    """Newton's method for float solutions at the middles of inputs and parameters, from those of the nominal mechanism.
+
+    An estimate: what is not a solution is not proved.
+    """
+    at = system.within(columns_of(points(p.mid)))
+    q, size = system.driven(points(u.mid)), x.shape[1]
+    for _ in range(_STEPS):
+        rows = at.equations(variables(points(x)), q, counted)
+        off, table = values_of(rows, (len(x),)).mid, jacobian_of(rows, size, (len(x),)).mid
+        usable = np.asarray(np.isfinite(table).all(axis=(1, 2)) & np.isfinite(off).all(axis=1))
+        inverse = np.linalg.pinv(np.where(usable[:, None, None], table, 0.0), rcond=1e-14)
+        step = (inverse @ np.where(usable[:, None], off, 0.0)[:, :, None])[..., 0]
+        x = x - step
+        if np.abs(step).max(initial=0.0) <= 1e-13:
+            break
+    return x
+
+
+def _middle(system: Positions, u: Interval, x: Array, p: Interval, counted: Array) -> tuple[Mask, Interval]:
+    """Prove the assembly at the middle of every piece: whether, and where."""
+    at, q = system.within(columns_of(points(p.mid))), system.driven(points(u.mid))
+    radius = np.broadcast_to(1e-10 * system.weights, x.shape)
+    low, high, proved = x - radius, x + radius, np.zeros(len(x), dtype=np.bool_)
+    left = np.arange(len(x))
+    for _ in range(_ROUNDS):
+        box, own = Interval.from_bounds(low[left], high[left]), _taken(at, left)
+        driven, turns = [_at(value, left, len(x)) for value in q], counted[left]
+        found = image(lambda unknowns, own=own, q=driven, turns=turns: own.equations(unknowns, q, turns), box)
+        good = found.status == Status.UNIQUE
+        proved[left[good]] = True
+        low[left[good]], high[left[good]] = found.box.lo[good], found.box.hi[good]
+        bad = ~good & found.image.is_bounded.all(axis=1)
+        wider = found.image[bad].hull(box[bad]).inflate(0.5, 1e-12)
+        low[left[bad]], high[left[bad]] = wider.lo, wider.hi
+        left = left[bad][(wider.rad < 1e-3 * system.weights).all(axis=1)]
+        if left.size == 0:
+            break
+    return proved, Interval.from_bounds(low, high)
+
+
+def _taken(system: Positions, rows: NDArray[np.intp]) -> Positions:
+    """Return a system with points for some of the pieces only."""
+    own = system.within(columns_of(points(system.box.low[None])))
+    own.local = [(_point(a, rows), _point(b, rows)) for a, b in system.local]
+    return own
+
+
+def _point(p: Pair, rows: NDArray[np.intp]) -> Pair:
+    x, y = (value[rows] if value.ndim else value for value in (p.x, p.y))
+    return Pair(x, y)
+
+
+def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, counted: Array, p: Interval) -> Tubes:
+    count, size = x.shape
+    if system.box.size:
+        x = settled(system, x, u, p, counted)
+    steps = Interval.stack([u, *columns_of(p)], axis=-1)
+    steps = steps - points(steps.mid)
+    half, weights = steps.mag, system.weights
+    proved = np.ones(count, dtype=np.bool_)
+    tight, domain, reach = Interval.zeros((count, 0)), Interval.zeros((count, 0)), np.zeros(half.shape)
+    if size:
+        proved, centre = _middle(system, u, x, p, counted)
+        rates = _rates(system, points(u.mid), centre, counted, points(p.mid))[2].mag
+        move = (rates * half[:, None]).sum(axis=2)
+        reach = np.where(np.isfinite(rates), rates, 0.0).max(axis=1, initial=0.0, where=True) * half
+        radius = _ROOM * move + (0.05 * (move / weights).max(axis=1, initial=0.0, keepdims=True) + 1e-10) * weights
+        held, parts = np.zeros((count, size)), (u, p, steps)
+        left = np.flatnonzero(proved)
+        proved = np.zeros(count, dtype=np.bool_)
+        for shells in (1, _SHELLS):
+            # a box of half the size of the mechanism says that the piece is too large: give up, it will be cut
+            left = left[(radius[left] < 0.7 * weights).all(axis=1)]
+            if left.size == 0:
+                break
+            piece = parts[0][left], parts[1][left], parts[2][left]
+            lead, room, inside = _lead(system, piece, centre[left], counted[left], (radius[left], move[left]), shells)
+            proved[left[inside]], held[left[inside]], radius[left[inside]] = True, lead[inside], room[inside]
+            left = left[~inside]
+        spread = np.where(proved[:, None], held, 0.0)
+        tight = centre + Interval.from_bounds(-spread, spread)
+        room = np.where(proved[:, None], radius, 0.0)
+        domain = centre + Interval.from_bounds(-room, room)
+    if not joints:
+        none, base = Interval.zeros((count, 0, 2)), Interval.zeros((count, 0, 2, 2))
+        return Tubes(proved, domain, tight, none, none, base, reach)
+    own, q = system.within(columns_of(p)), system.driven(u)
+    at, zero = own.place(columns_of(tight), q), Interval.zeros((count,))
+    r, e, base = places(own, joints, at, lambda value: value + zero)
+    return Tubes(proved, domain, tight, r, e, base, reach)
+
+
+def _lead(
+    system: Positions,
+    piece: tuple[Interval, Interval, Interval],
+    centre: Interval,
+    counted: Array,
+    guess: tuple[Array, Array],
+    shells: int,
+) -> tuple[Array, Array, Mask]:
+    """Bound how far the assembly is led from the middle: lead, radius of the box that held it, whether proved.
+
+    From the middle outward in shells: while the share t of all steps is gone, the rates over a box that holds the
+    branch so far bound the next part of the way.  ``guess`` is a radius for the whole way, and the way to first order.
+    """
+    (u, p, steps), (radius, move) = piece, guess
+    lead, room, inside = np.zeros_like(radius), radius, np.ones(len(radius), dtype=np.bool_)
+    for k in range(shells):
+        share, last = (k + 1) / shells, np.zeros_like(radius)
+        part = points(steps.mid * 0.0) + steps * share
+        room = radius if shells == 1 else lead + 1.6 * (move / shells if k == 0 else lead / k) + 1e-3 * radius
+        for _ in range(1 if shells == 1 else _TRIES):
+            box = centre + Interval.from_bounds(-room, room)
+            here = points(u.mid) + part[:, 0], points(p.mid) + part[:, 1:]
+            _, _, rate, fine = _rates(system, here[0], box, counted, here[1])
+            with np.errstate(all="ignore"):
+                way = (points(rate.mag) * points(steps.mag[:, None])).sum(-1) / shells
+                last = (points(lead) + way).hi
+            good = fine & (last < room).all(axis=1)
+            if (good | ~inside).all():
+                break
+            room = np.where(good[:, None], room, np.where(np.isfinite(last), lead + 1.3 * (last - lead), room))
+        inside &= good
+        lead = np.where(inside[:, None], last, 0.0)
+    return lead, room, inside
+
+
+def _at(value: Interval, rows: NDArray[np.intp], count: int) -> Interval:
+    return value[rows] if value.shape == (count,) else value
+
+
+def places(
+    system: Positions, joints: tuple[int, ...], at: Placement, read: Callable[[Any], Interval]
+) -> tuple[Interval, Interval, Interval]:
+    """Stack positions, guide directions and link directions of joints; ``read`` takes what is wanted of each number."""
+
+    def full(pair: Pair) -> Interval:
+        return Interval.stack([read(pair.x), read(pair.y)], axis=-1)
+
+    r, e, base = [], [], []
+    for k in joints:
+        joint = system.mechanism.joints[k]
+        A, B = system.ends(k, at)
+        # both ends of a revolute joint are the same point: each encloses it
+        r.append(full(A).intersect(full(B)) if isinstance(joint, Revolute) else full(B))
+        along = guide(joint, at) if isinstance(joint, Prismatic | PinSlot) else Pair(Interval(1), Interval(0))
+        e.append(full(along))
+        base.append(Interval.stack([full(at.turn[joint.a]), full(at.turn[joint.b])], axis=-2))
+    return Interval.stack(r, axis=-2), Interval.stack(e, axis=-2), Interval.stack(base, axis=-3)
+
+
+def _rates(
+    system: Positions, u: Interval, x: Interval, counted: Array, p: Interval
+) -> tuple[list[Any], Positions, Interval, Mask]:
+    """Unknowns and system as duals of unknowns, input and parameters over boxes, and the rates (N, size, 1 + m).
+
+    On the branch ``F(x, u, p) = 0``, so ``F_x x' = -F'``; the solution set of the linear systems with both enclosed
+    holds the rates for every member.  The mask tells where every ``F_x`` of the box is proved regular.
+    """
+    count, n = len(u), system.size
+    both = u.reshape(count, 1)
+    box = Interval.from_bounds(
+        np.concatenate([x.lo, both.lo, p.lo], axis=1), np.concatenate([x.hi, both.hi, p.hi], axis=1)
+    )
+    unknowns = variables(box)
+    own = system.within(unknowns[n + 1 :])
+    if n == 0:
+        return unknowns, own, Interval.zeros((count, 0, 1 + p.shape[1])), np.ones(count, dtype=np.bool_)
+    rows = own.equations(unknowns[:n], own.driven(unknowns[n]), counted)
+    values, table = values_of(rows, (count,)), jacobian_of(rows, len(unknowns), (count,))
+    with np.errstate(all="ignore"):
+        rate, fine = enclosed_solve(table[:, :, :n], -table[:, :, n:])
+    smooth = np.broadcast_to(values.guaranteed, values.shape).all(axis=1)
+    smooth &= np.broadcast_to(table.guaranteed, table.shape).all(axis=(1, 2))
+    return unknowns, own, rate, fine & smooth
+
+
+def slopes(
+    system: Positions,
+    joints: tuple[int, ...],
+    u: Interval,
+    tubes: Tubes,
+    counted: Array,
+    parameters: Interval | None = None,
+) -> tuple[Interval, Interval, Interval, Mask]:
+    """Enclose the derivatives of ``r``, ``e``, ``base`` of `Tubes`, and tell where that is proved.
+
+    Each has one axis more in front: by the input, and by every parameter, over the whole of each piece.
+    """
+    count, n = len(u), system.size
+    p = whole_box(system, count) if parameters is None else parameters
+    unknowns, own, rate, fine = _rates(system, u, tubes.tight, counted, p)
+    kinds = 1 + p.shape[1]
+
+    def along(value: Any) -> Interval:
+        """Return the derivatives along the motion and along every parameter, (1 + m, N)."""
+        if not isinstance(value, Dual):
+            return Interval.zeros((kinds, count))
+        total = value.grad[n:] + Interval.zeros((kinds, count))
+        for i in range(n):
+            each = rate[:, i]
+            total = total + Interval.from_bounds(each.lo.T, each.hi.T) * value.grad[i]
+        return total
+
+    moved = places(own, joints, own.place(unknowns[:n], own.driven(unknowns[n])), along)
+    return (*moved, fine)

@@ -1,0 +1,341 @@
+"""Tolerances of parts: places as functions of parameters, independence of the frame, and verdicts against members."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from graphsynth import Driver, Mechanism, MechanismGraph, Prismatic, Revolute, assess_jamming, simulate
+from graphsynth.core.errors import GeometryError
+from graphsynth.intervals import Interval
+from graphsynth.jamming import Bearing, Fit
+from graphsynth.jamming.joints import JointLimits, Misalignment, assess_coupled, certify_coupled, largest_scale
+from graphsynth.jamming.joints.closure import joint_places
+from graphsynth.jamming.joints.drawing import drawn, fit_limits
+from graphsynth.jamming.joints.positions import Positions
+from graphsynth.jamming.joints.tubes import prove_tubes, slopes
+from graphsynth.tolerances import (
+    AxisAngle,
+    EndFloat,
+    FitClearance,
+    HolePosition,
+    LengthTolerance,
+    Parallelism,
+    ThermalExpansion,
+    parameter_box,
+)
+
+LIMITS, TILT = JointLimits(0.006), Misalignment(0, 1, 1e-3)
+TURN = np.linspace(0.0, 2.0 * math.pi, 73)
+LAMBDA = Mechanism.four_bar(2, 1, 2.5, 2.5)
+
+
+def lengths(relative):
+    """All four lengths of the lambda linkage, each plus and minus a share of itself."""
+    ends = {0: ((1, 3), 2.0), 1: ((0, 2), 1.0), 2: ((1, 3), 2.5), 3: ((0, 2), 2.5)}
+    return [LengthTolerance(link, pair, relative * own) for link, (pair, own) in ends.items()]
+
+
+def shifted(mechanism, offsets, turn=0.0):
+    """Return the same mechanism with other frames of its links: moved, and the frame link's also turned."""
+    joints = []
+    for joint in mechanism.joints:
+        moved = {}
+        for link, name in ((joint.a, "at_a"), (joint.b, "at_b")):
+            spin = turn if link == mechanism.frame else 0.0
+            z = complex(*getattr(joint, name)) * np.exp(1j * spin) + offsets[link]
+            moved[name] = (z.real, z.imag)
+        joints.append(replace(joint, **moved))
+    return Mechanism(mechanism.graph, joints, mechanism.drivers)
+
+
+def slider_crank():
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    joints = [Revolute(0, 1), Revolute(1, 2, (1, 0)), Revolute(2, 3, (3, 0)), Prismatic(0, 3, (0, 0.3))]
+    return Mechanism(graph, joints, [Driver(0, 1)])
+
+
+def test_places_are_what_the_drawing_says():
+    """A ternary link with a chain of lengths, a hole in a circle and a temperature, against complex numbers."""
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    at = {0: 0.2 + 0.1j, 2: 1.0 + 0.5j}
+    joints = [
+        Revolute(0, 1, (0.0, 0.0), (at[0].real, at[0].imag)), Revolute(1, 2, (at[2].real, at[2].imag)),
+        Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)), Revolute(0, 3, (2.0, 0.0)),
+    ]  # fmt: skip
+    mechanism = Mechanism(graph, joints, [Driver(0, 1)])
+    given = [
+        LengthTolerance(1, (0, 2), 0.02, 0.01), HolePosition(1, 2, 0.004), HolePosition(0, 3, 0.01),
+        ThermalExpansion(-20.0, 60.0, {0: 1e-5, 1: 2e-5}),
+    ]  # fmt: skip
+    box = parameter_box(mechanism, given)
+    assert box.names == (
+        "length 0-2 of link 1", "x of the hole 1-2 of link 1", "y of the hole 1-2 of link 1",
+        "x of the hole 0-3 of link 0", "y of the hole 0-3 of link 0", "temperature",
+    )  # fmt: skip
+    np.testing.assert_array_equal(box.low, [-0.01, -0.002, -0.002, -0.005, -0.005, -20.0])
+    np.testing.assert_array_equal(box.high, [0.02, 0.002, 0.002, 0.005, 0.005, 60.0])
+    assert box.discs == ((1, 2), (3, 4))
+    values = np.array([0.015, -0.001, 0.0005, 0.002, -0.003, 40.0])
+    member = box.member(mechanism, values)
+    along = (at[2] - at[0]) / abs(at[2] - at[0])
+    expected = at[0] + (at[2] - at[0] + 0.015 * along + (-0.001 + 0.0005j)) * (1.0 + 40.0 * 2e-5)
+    assert complex(*member.joint(1, 2).at_a) == pytest.approx(expected, abs=1e-15)
+    assert complex(*member.joint(0, 1).at_b) == at[0]  # the datum
+    assert complex(*member.joint(0, 3).at_a) == pytest.approx((2.002 - 0.003j) * (1.0 + 40.0 * 1e-5), abs=1e-15)
+    assert member.joint(2, 3) == mechanism.joint(2, 3)  # no tolerance, no coefficient
+
+
+def test_lengths_of_a_link_are_chained_from_their_datum():
+    six = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (1, 3)], frame=0)
+    joints = [Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (1.0, 0.0)), Revolute(1, 3, (1.0, 2.0))]
+    joints[2] = Revolute(2, 3, (1.0, 0.0), (1.0, 0.0))
+    mechanism = Mechanism(six, joints)
+    box = parameter_box(mechanism, [LengthTolerance(1, (2, 3), 0.1), LengthTolerance(1, (0, 2), 0.2)])
+    member = box.member(mechanism, np.array([0.05, -0.1]))
+    assert member.joint(1, 2).at_a == pytest.approx((0.9, 0.0))
+    assert member.joint(1, 3).at_a == pytest.approx((0.9, 2.05))  # moves with its datum
+
+
+@pytest.mark.parametrize("make", [lambda: LAMBDA, slider_crank], ids=["lambda", "slider"])
+def test_tubes_hold_the_motion_of_every_member(make):
+    """Wide boxes of lengths, a hole and a temperature: random members and inputs lie inside, and their rates too."""
+    mechanism = make()
+    rng = np.random.default_rng(3)
+    given = [
+        LengthTolerance(1, (0, 2), 0.02), LengthTolerance(2, (1, 3), 0.03, 0.01), HolePosition(0, 3, 0.02),
+        ThermalExpansion(-50.0, 100.0, {0: 1e-5, 1: 1e-4, 2: 2e-5}),
+    ]  # fmt: skip
+    box = parameter_box(mechanism, given)
+    system, joints = Positions(mechanism, box), tuple(range(len(mechanism.joints)))
+    edges = np.linspace(0.3, 2.8, 41)
+    u = Interval.from_bounds(edges[:-1], edges[1:])
+    motion = simulate(mechanism, u.mid)
+    counted = system.count(motion.poses)
+    x = system.coordinates(motion.poses, motion.velocities)[0]
+    tubes = prove_tubes(system, joints, u, x, counted)
+    assert tubes.proved.all()
+    r_rate, *_, fine = slopes(system, joints, u, tubes, counted)
+    assert fine.all() and r_rate.shape == (1 + box.size, 40, 4, 2)
+    step = 1e-6
+    for _ in range(6):
+        p = rng.uniform(box.low, box.high)
+        inputs = edges[:-1] + rng.uniform(0, 1, 40) * np.diff(edges)
+        places = {}
+        for k in (-1, *range(box.size)):
+            values = p.copy()
+            values[k] = p[k] if k < 0 else p[k] + (step if p[k] < 0.0 else -step) * (box.high[k] - box.low[k])
+            member = box.member(mechanism, values if k >= 0 else p)
+            found = simulate(member, inputs, start=motion.poses[0], events=False)
+            places[k] = joint_places(member, joints, found.poses)[0], values[k] - p[k]
+        r = places[-1][0]
+        # every link is counted from its datum; the frame's is the origin here
+        assert ((r >= tubes.r.lo - 1e-12) & (r <= tubes.r.hi + 1e-12)).all()
+        for k in range(box.size):
+            slope = (places[k][0] - r) / places[k][1]
+            near = 1e-6 + 1e-4 * abs(slope)
+            assert ((slope >= r_rate.lo[1 + k] - near) & (slope <= r_rate.hi[1 + k] + near)).all(), box.names[k]
+
+
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+def test_the_origin_of_a_frame_changes_nothing(seed):
+    """The same parts, drawn from other origins, have the same verdict and the same bounds, up to rounding."""
+    rng = np.random.default_rng(seed)
+    given = [*lengths(0.004), HolePosition(2, 3, 0.004), ThermalExpansion(-30.0, 30.0, 1.2e-5)]
+    offsets = rng.uniform(-50.0, 50.0, 4) + 1j * rng.uniform(-50.0, 50.0, 4)
+    offsets[0] = rng.uniform(-5.0, 5.0) + 1j * rng.uniform(-5.0, 5.0)
+    found = []
+    for mechanism in (LAMBDA, shifted(LAMBDA, offsets)):
+        motion = simulate(mechanism, TURN)
+        found.append(certify_coupled(motion, LIMITS, replace(TILT, alpha=0.0117, alpha_range=None), tolerances=given))
+    here, there = found
+    assert here.verdict is there.verdict and here.verdict.name == "CERTIFIED_FREE"
+    assert here.evaluated == there.evaluated
+    np.testing.assert_allclose(here.upper, there.upper, rtol=1e-8)
+    np.testing.assert_allclose(here.lower, there.lower, rtol=1e-8, atol=1e-12)
+
+
+def worst_scale(mechanism, box, limits=LIMITS, tilt=TILT, count=181):
+    """Smallest allowed scale over all corners of a box, at dense samples (estimated)."""
+    inputs, found = np.linspace(0.0, 2.0 * math.pi, count), math.inf
+    for corner in itertools.product(*zip(box.low, box.high)):
+        motion = simulate(box.member(mechanism, np.array(corner)), inputs, events=False)
+        found = min(found, assess_coupled(motion, limits, tilt).smallest_scale)
+    return found
+
+
+@pytest.mark.slow
+def test_every_length_of_the_lambda_linkage_within_one_percent():
+    """Free at 95 % of what the worst member allows; at 105 % some member binds, and it is named."""
+    scale = worst_scale(LAMBDA, parameter_box(LAMBDA, lengths(0.01)))
+    motion = simulate(LAMBDA, TURN)
+    free = certify_coupled(
+        motion, LIMITS, replace(TILT, alpha=0.95e-3 * scale, alpha_range=None), tolerances=lengths(0.01)
+    )
+    assert free.verdict.name == "CERTIFIED_FREE" and free.one_branch and free.decided == 1.0
+    same = certify_coupled(motion, LIMITS, replace(TILT, alpha=0.95e-3 * scale, alpha_range=None), tolerances=0.01)
+    assert same.verdict.name == "CERTIFIED_FREE"
+    tilt = replace(TILT, alpha=1.05e-3 * scale, alpha_range=None)
+    binds = certify_coupled(motion, LIMITS, tilt, tolerances=lengths(0.01), resolution=1e-2, max_pieces=3000)
+    assert binds.verdict.is_jammed and not binds.verdict.is_free
+
+
+@pytest.mark.slow
+def test_a_member_that_binds_is_named_and_binds():
+    """Between the nominal mechanism and the worst member: the witness is inside its box, and binds at its input."""
+    mechanism, tilt = Mechanism.four_bar(2, 0.7, 1.6, 1.9), TILT
+    given = [LengthTolerance(1, (0, 2), 0.02), LengthTolerance(3, (0, 2), 0.05), HolePosition(2, 3, 0.03)]
+    box = parameter_box(mechanism, given)
+    motion = simulate(mechanism, TURN)
+    nominal = assess_coupled(motion, LIMITS, tilt).smallest_scale
+    worst = worst_scale(mechanism, box)
+    assert worst < 0.995 * nominal
+    alpha = 1e-3 * (0.4 * worst + 0.6 * nominal)
+    found = certify_coupled(
+        motion, LIMITS, Misalignment(0, 1, alpha), tolerances=given, resolution=1e-2, max_pieces=2500
+    )
+    assert found.verdict.name == "CERTIFIED_JAMMED_FOR_SOME", found.reason
+    assert "of all inputs and dimensions together" in found.reason and 0.0 < found.decided < 1.0
+    member, at = found.witness.mechanism, found.witness.input
+    crank = math.dist(member.joint(0, 1).at_b, member.joint(1, 2).at_a)
+    assert abs(crank - 0.7) <= 0.02
+    hole = np.subtract(member.joint(2, 3).at_a, mechanism.joint(2, 3).at_a)
+    assert math.hypot(*hole) <= 0.015 * (1 + 1e-9)
+    reached = simulate(member, np.sort([0.0, at]), start=motion.poses[0], events=False)
+    factor = assess_coupled(reached, LIMITS, Misalignment(0, 1, alpha)).factor
+    assert factor.max() >= found.witness.factor * (1.0 - 1e-9) > 1.0
+
+
+@pytest.mark.parametrize("seed", [pytest.param(k, marks=pytest.mark.slow) for k in range(4)])
+def test_no_member_contradicts_a_proof(seed):
+    """Random four-bars and wide boxes of lengths: random members, dense inputs, no contradiction in any piece."""
+    rng = np.random.default_rng([11, seed])
+    crank, rest = rng.uniform(0.2, 0.5), np.sort(rng.uniform(0.8, 1.2, 3))
+    mechanism = Mechanism.four_bar(rest[2], crank, rest[0], rest[1])
+    ends = {0: ((1, 3), rest[2]), 1: ((0, 2), crank), 2: ((1, 3), rest[0]), 3: ((0, 2), rest[1])}
+    given = [LengthTolerance(link, pair, 0.015 * own) for link, (pair, own) in ends.items()]
+    box, motion = parameter_box(mechanism, given), simulate(mechanism, TURN)
+    scale = assess_coupled(motion, LIMITS, TILT).smallest_scale
+    for use in (0.7, 0.95, 1.0, 1.1, 1.6):
+        tilt = Misalignment(0, 1, 1e-3 * scale * use)
+        found = certify_coupled(motion, LIMITS, tilt, tolerances=given, resolution=5e-3, max_pieces=2000, seconds=60.0)
+        for _ in range(12):
+            p = np.where(rng.random(4) < 0.5, rng.uniform(box.low, box.high), rng.choice([-1, 1], 4) * box.high)
+            inputs = np.sort(rng.uniform(0.0, 2.0 * math.pi, 200))
+            moved = simulate(box.member(mechanism, p), inputs, events=False)
+            factor = assess_coupled(moved, LIMITS, tilt).factor
+            place = np.searchsorted(found.low, inputs, side="right") - 1
+            inside = moved.assembled & (inputs <= found.high[place])
+            # the certificate is of exact tilts; its small-tilt bounds are those of these factors
+            assert (factor[inside] <= found.upper[place][inside] * (1 + 1e-9)).all()
+            assert (factor[inside] >= found.lower[place][inside] * (1 - 1e-9)).all()
+
+
+def test_lengths_that_grow_together_are_one_parameter():
+    """One material: a temperature scales the whole linkage, and no tilt is lost; two materials do lose some."""
+    motion = simulate(LAMBDA, TURN)
+    one = largest_scale(motion, LIMITS, TILT, tolerances=[ThermalExpansion(-100.0, 100.0, 2e-5)], relative_gap=1e-3)
+    assert one.low <= 12.0 <= one.high <= 1.004 * one.low
+    mechanism = Mechanism.four_bar(2, 0.7, 1.6, 1.9)
+    motion = simulate(mechanism, TURN)
+    found = {}
+    for name, coefficients in {"none": 0.0, "same": 1e-4, "crank": {1: 1e-4}}.items():
+        given = [ThermalExpansion(-100.0, 100.0, coefficients)]
+        found[name] = largest_scale(motion, LIMITS, TILT, tolerances=given, relative_gap=1e-3).low
+    assert found["same"] == pytest.approx(found["none"], rel=2e-3)
+    assert found["crank"] < 0.999 * found["none"]
+
+
+def test_a_fit_limits_the_tilt_for_every_pair_of_parts():
+    limits = fit_limits(FitClearance((1, 2), "35 H7/g6", 10.0, 0.1))
+    fit = Fit.read("35 H7/g6")
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        hole = rng.uniform(*(float(fit.nominal + own) for own in (fit.hole.lower, fit.hole.upper))) / 2
+        pin = rng.uniform(*(float(fit.nominal + own) for own in (fit.shaft.lower, fit.shaft.upper))) / 2
+        angle = Bearing(pin, rng.uniform(9.9, 10.1), hole - pin).critical_tilt("A").angle
+        assert limits.tilt_range[0] <= angle <= limits.tilt_range[1]
+    tightest = Bearing(float(fit.radius.upper), 10.1, float(fit.clearance.lower)).critical_tilt("A").angle
+    assert limits.tilt_range[0] == pytest.approx(tightest, rel=1e-3)
+
+
+def test_fits_stand_for_the_limits_of_their_joints():
+    fits = [FitClearance(pair, "35 H8/e8", 10.0) for pair in ((1, 2), (2, 3), (0, 3))]
+    motion = simulate(LAMBDA, TURN)
+    report = assess_jamming(motion, tilt=0.004, tolerances=[*fits, *lengths(0.002)])
+    assert report.verdict.name == "CERTIFIED_FREE"
+    tight = fits[0].fit.replace("e8", "g7")
+    binding = assess_jamming(motion, tilt=0.02, tolerances=[FitClearance(own.joint, tight, 10.0) for own in fits])
+    assert binding.verdict.name == "CERTIFIED_JAMMED"
+
+
+def test_end_floats_and_axes_are_limits_and_misalignments():
+    play = drawn(LAMBDA, LIMITS, TILT, [EndFloat((1, 2), 0.1, 0.3)]).bearings[(1, 2)]
+    assert (play.tilt, play.axial_clearance_range) == (0.006, (0.05, 0.15))
+    plain = drawn(LAMBDA, LIMITS, TILT, [AxisAngle(2, 3, 0.001), Parallelism(1, 2, 0.02, 10.0)])
+    _, seat, pin = plain.tilts
+    assert (seat.base, seat.link, seat.rigid, seat.alpha_range) == (2, 3, False, (0.0, 0.001))
+    assert 0.002 > pin.alpha_range[1] == pytest.approx(math.atan(0.002), rel=1e-14) and pin.alpha_range[1] >= math.atan(
+        0.002
+    )
+
+
+@pytest.mark.slow
+def test_axes_that_may_lean_take_their_share():
+    motion = simulate(LAMBDA, TURN)
+    straight, leaning = (
+        certify_coupled(motion, LIMITS, Misalignment(0, 1, 0.0112), tolerances=own, max_pieces=1500).verdict.name
+        for own in ([], [AxisAngle(2, 3, 0.0003)])
+    )
+    assert (straight, leaning) == ("CERTIFIED_FREE", "CERTIFIED_FREE")
+    wide = certify_coupled(
+        motion, LIMITS, Misalignment(0, 1, 0.0112), tolerances=[AxisAngle(2, 3, 0.01)], max_pieces=1500
+    )
+    assert not wide.verdict.is_free
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ([LengthTolerance(1, (0, 3), 0.1)], "links 1 and 3 have no joint"),
+        ([LengthTolerance(1, (0, 2), 0.1), LengthTolerance(1, (0, 2), 0.1)], "two lengths to its joint with link 2"),
+        ([LengthTolerance(1, (0, 2), 0.1), LengthTolerance(1, (2, 0), 0.1)], "form a ring"),
+        ([LengthTolerance(1, (0, 2), 0.1, 1.0)], "leaves no length"),
+        ([ThermalExpansion(-1, 1, 1e-5), ThermalExpansion(-1, 1, 1e-5)], "two temperature ranges"),
+        ([FitClearance((1, 2), "35 H7/g6", 10.0)] * 2, "two tolerances of one kind"),
+        ([AxisAngle(0, 1, 0.001)], "two misalignments"),
+        ([3.0], "is no tolerance of a part"),
+        ("text", "tolerances = 'text'"),
+        (None, "tolerances"),
+        (0.5, "0 to 0.5"),
+    ],
+)
+def test_drawings_that_do_not_fit_are_refused(given, message):
+    with pytest.raises(GeometryError, match=message):
+        certify_coupled(simulate(LAMBDA, TURN[:9]), LIMITS, TILT, tolerances=given)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: LengthTolerance(1, (0, 0), 0.1), "names one link twice"),
+        (lambda: LengthTolerance(1, 0, 0.1), "no pair of links"),
+        (lambda: LengthTolerance(1, (0, 2), -0.1), "plus"),
+        (lambda: HolePosition(1, 2, math.nan), "diameter"),
+        (lambda: ThermalExpansion(5.0, 9.0, 1e-5), "do not hold 0"),
+        (lambda: FitClearance((1, 2), "35 H7/k6", 10.0), "tightest pair interferes"),
+        (lambda: FitClearance((1, 2), "H7/g6", 10.0), "no nominal size"),
+        (lambda: EndFloat((1, 2), 0.3, 0.1), "exchange them"),
+        (lambda: Parallelism(1, 2, 0.01, 0.0), "length"),
+        (lambda: drawn(LAMBDA, None, TILT, 0.01), "no limits"),
+        (
+            lambda: drawn(LAMBDA, {(0, 3): LIMITS}, TILT, [EndFloat((1, 2), 0.1, 0.3)]),
+            "has an end float, but no limits",
+        ),
+    ],
+)
+def test_tolerances_that_make_no_sense_are_refused(call, message):
+    with pytest.raises(GeometryError, match=message):
+        call()
