@@ -120,13 +120,27 @@ def _formula(writer: Any, node: Any) -> None:
     raise nodes.SkipNode
 
 
+def _long_cells(app: Any, doctree: nodes.document, name: str) -> None:
+    """Mark the cells of long texts: on a phone they stay wide enough to be read."""
+    for cell in doctree.findall(nodes.entry):
+        if len(cell.astext()) > 60:
+            cell["classes"].append("long")
+
+
+def _signature(app: Any, what: str, name: str, obj: Any, options: Any, *texts: str | None) -> tuple[str | None, ...]:
+    """Write aliases of types by their names."""
+    return tuple(text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text) for text in texts)
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Register with Sphinx."""
     next(field for field in PyObject.doc_field_types if field.name == "variable").label = "Attributes"
     app.connect("source-read", _read)
     app.connect("autodoc-process-docstring", _docstring)
+    app.connect("autodoc-process-signature", _signature)
     app.connect("doctree-read", _without_chance_links)
     app.connect("doctree-resolved", _whole_numbers)
+    app.connect("doctree-resolved", _long_cells)
     app.connect("env-updated", _note_other_names)
     app.add_html_math_renderer("mathml", (_formula, None), (_formula, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from typing import TYPE_CHECKING
 
 from graphsynth.cli import console
@@ -72,11 +71,10 @@ def _show(report: StressReport) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    screen = console.screen(None if sys.stdout.isatty() else 132)
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
     for name, width in (("case", 16), ("status", 7), ("error", 7), ("allowed", 7), ("s", 5), ("what", None)):
         words = name in ("case", "status", "what")
-        table.add_column(name, justify="left" if words else "right", no_wrap=True, overflow="ellipsis", min_width=width)
+        table.add_column(name, justify="left" if words else "right", no_wrap=name != "what", min_width=width)
     colours = {"ok": "green", "flagged": "cyan", "WRONG": "bold red", "not run": "yellow"}
     for outcome in report.outcomes:
         worst, status = outcome.worst, outcome.status.value
@@ -86,7 +84,7 @@ def _show(report: StressReport) -> None:
         said, seconds = f"[{colours[status]}]{status}[/]", f"{outcome.seconds:.2f}"
         table.add_row(outcome.case.name, said, error, bound, seconds, escape(outcome.case.title))
     if report.outcomes:
-        screen.print(table)
+        console.screen(console.columns() or 132).print(table)
     for outcome in report.outcomes:
         if outcome.reason:
             console.put(f"{outcome.case.name}: {outcome.reason}")

@@ -46,6 +46,9 @@ class Polodes(NamedTuple):
     fixed: Array
     moving: Array
 
+    def __repr__(self) -> str:
+        return f"Polodes of {len(self.fixed)} samples: fixed, moving"
+
 
 class Circles(NamedTuple):
     """A circle at every sample: ``centre`` (n, 2) in the base's frame, ``diameter`` (n,), ``pole`` (n, 2) on it."""
@@ -53,6 +56,9 @@ class Circles(NamedTuple):
     centre: Array
     diameter: Array
     pole: Array
+
+    def __repr__(self) -> str:
+        return f"Circles at {len(self.pole)} samples: centre, diameter, pole"
 
 
 def _points(z: Complex) -> Array:
@@ -106,10 +112,7 @@ class MotionMethods(Shown):
         return place, [angle, rate, second], np.exp(1j * angle), pole
 
     def instant_centre(self, link: int, base: int | None = None) -> Array:
-        """Return the instant centre (velocity pole) of a link, shape (n, 2), in the frame of the base.
-
-        Infinite where the link only translates.
-        """
+        """Return the velocity pole of a link, shape (n, 2), in the frame of the base; infinite where it translates."""
         return _points(self._relative(link, base)[3])
 
     def polodes(self, link: int, base: int | None = None) -> Polodes:
@@ -230,11 +233,8 @@ class MotionMethods(Shown):
             angular = not isinstance(mechanism.joint(*driver.pair), Prismatic)
             ends = [f"{math.degrees(v):.6g}°" if angular else f"{v:.6g}" for v in (u[0], u[-1])]
             rows.append((f"driver {driver.base}-{driver.link}", f"input {ends[0]} to {ends[1]}, {len(u)} samples"))
-        if self.completed:
-            closed = self.closure.statement if self.closure.tested else "completed; no full rotation"
-            rows.append(("motion", closed))
-        else:
-            rows.append(("motion", f"ends: {self.reason}"))
+        closed = self.closure.statement if self.closure.tested else "completed; no full rotation"
+        rows.append(("motion", closed if self.completed else f"ends: {self.reason}"))
         counted = Counter(event.kind for event in self.events)
         if counted:
             rows.append(("events", ", ".join(f"{n} x {kind}" if n > 1 else kind for kind, n in counted.items())))

@@ -45,7 +45,7 @@ figure.small{grid-column:span 4}
 .sheet figure.small{grid-column:span 3}
 @media (max-width:50rem){.facts{gap:.4rem}.facts li{padding:.35rem .6rem;min-width:0;flex:1 1 40%}
 .facts b{font-size:1.05rem}.verdict b{font-size:1rem}table{font-size:.8rem}td:not(.num){min-width:6.5rem}
-figure{grid-column:1/-1}
+td.long{min-width:13rem}figure{grid-column:1/-1}
 figure.small{grid-column:span 6}.sheet figure.small{grid-column:span 6}}
 figure svg{display:block;max-width:100%;height:auto;margin:0 auto}
 figure.wide svg{max-width:min(100%,44rem);max-height:32rem}
@@ -69,7 +69,8 @@ _PAGE = """
 {%- for column in columns %}<th scope="col">{{ column }}</th>{% endfor -%}
 </tr></thead><tbody>
 {%- for row in rows -%}
-<tr>{% for cell in row %}<td{% if cell | numeric %} class="num"{% endif %}>{{ cell }}</td>{% endfor %}</tr>
+<tr>{% for cell in row %}<td{% if cell and cell | length < 40 and cell[0] in "0123456789-+" %} class="num"
+{%- elif cell | length > 60 %} class="long"{% endif %}>{{ cell }}</td>{% endfor %}</tr>
 {%- endfor -%}
 </tbody></table></div>
 {%- endmacro -%}
@@ -130,7 +131,7 @@ def report_html(report: Report) -> str:
     order = [*_HEADINGS, *sorted(set(names) - {*_HEADINGS, "graph_pictures"})]
     records = products.get("records", ())
     candidates = [(str(r.number), r.solution, r.status, r.verdict or r.reason, r.key) for r in records]
-    body = template(_PAGE, tone={None: "", True: "good", False: "bad"}.get, numeric=_is_number).render(
+    body = template(_PAGE, tone={None: "", True: "good", False: "bad"}.get).render(
         scene=scene,
         notes=report.notes,
         first=found[:first],
@@ -144,7 +145,3 @@ def report_html(report: Report) -> str:
         versions=", ".join(f"{name} {version}" for name, version in report.versions.items()),
     )
     return whole_page(scene.scene.title, _CSS + _PICTURES, body)
-
-
-def _is_number(text: str) -> bool:
-    return len(text) < 40 and text[:1] in tuple("0123456789-+")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from graphsynth.core.errors import GraphsynthError
+from graphsynth.core.shown import Shown
 from graphsynth.pipeline.units import Unit
 
 Guarantee = Literal["exact", "certified", "estimated"]
@@ -111,9 +112,16 @@ class Record:
     recognised_as: str = ""
     verdict: str = ""
     good: bool | None = None  # whether the verdict is favourable; None if there is none
-    margins: tuple[Quantity, ...] = ()
+    margins: tuple[Quantity, ...] = field(default=(), repr=False)
     reason: str = ""
     cause: str = ""  # the reason in words that can be counted; empty if the reason is that already
+
+
+class Records(Shown, tuple[Record, ...]):
+    """Records in the order of their candidates."""
+
+    def _told(self) -> tuple[str, list[tuple[str, str]]]:
+        return "Records", [(f"no. {r.number}", r.verdict or r.reason or r.status) for r in self]
 
 
 @dataclass(frozen=True, slots=True)

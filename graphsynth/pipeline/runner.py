@@ -17,6 +17,7 @@ import graphsynth
 from graphsynth.core.errors import SceneError
 from graphsynth.core.ordered import check_executor
 from graphsynth.pipeline.measure import measured, memory_in_use, new_modules, reset_peak, rooms
+from graphsynth.pipeline.products import Records
 from graphsynth.pipeline.report import write_report
 from graphsynth.pipeline.scene import Scene, load_scene
 from graphsynth.pipeline.stages import Context, Progress, Report, StageTime, resolve
@@ -94,6 +95,8 @@ def execute(
     check_files(scene)
     done = Running(_resolved(scene), scene.outputs.products, Context(scene, executor), progress, journal, fresh)
     products = done.run()
+    if "records" in products:
+        products["records"] = Records(products["records"])
     versions = {"python": platform.python_version(), "graphsynth": graphsynth.__version__}
     versions |= {name: version(name) for name in _PACKAGES if name in sys.modules}
     return Report(

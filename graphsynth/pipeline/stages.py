@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from graphsynth.core.errors import GeometryError, SceneError, SpecError
+from graphsynth.core.shown import Shown
 from graphsynth.evidence.rows import imported
 from graphsynth.pipeline.scene import Scene
 from graphsynth.pipeline.system import Stage, announced, system
@@ -39,9 +40,7 @@ def build(scene: Scene) -> Any:
     name = scene.mechanism.module
     builder = system(name).build
     if not builder:
-        raise (scene.place / "mechanism").error(
-            f"has many mechanisms, not one: module = {name!r} builds none by itself"
-        )
+        raise (scene.place / "mechanism").error(f"has many mechanisms, not one: module = {name!r} builds none")
     try:
         return imported(builder, f"system {name!r}")(Context(scene))
     except (SpecError, GeometryError) as error:
@@ -60,16 +59,16 @@ class StageTime:
     runs: int = 1  # how many candidates it looked at; 1 for a stage over all
 
 
-@dataclass(frozen=True, slots=True)
-class Report:
+@dataclass(frozen=True, slots=True, repr=False)
+class Report(Shown):
     """What a run gave."""
 
-    scene: Scene = field(repr=False)
-    products: Mapping[str, Any] = field(repr=False)  # the outputs asked for, and what became of the candidates
-    times: tuple[StageTime, ...] = field(repr=False)  # in the order of running
-    versions: Mapping[str, str] = field(default_factory=dict, repr=False)  # of Python and of loaded packages
+    scene: Scene
+    products: Mapping[str, Any]  # the outputs asked for, and what became of the candidates
+    times: tuple[StageTime, ...]  # in the order of running
+    versions: Mapping[str, str] = field(default_factory=dict)  # of Python and of loaded packages
     folder: Path | None = None  # where the report was written
-    stages: tuple[Stage, ...] = field(default=(), repr=False)  # that ran, in order
+    stages: tuple[Stage, ...] = ()  # that ran, in order
     notes: tuple[str, ...] = ()  # a budget that was used up, candidates taken over from an interrupted run
     seconds: float = 0.0  # wall clock; stages of candidates that several processes share take longer together
 
@@ -80,6 +79,10 @@ class Report:
                 f"this run did not keep {product!r}; add it to [outputs] products (kept: {', '.join(self.products)})"
             )
         return self.products[product]
+
+    def _told(self) -> tuple[str, list[tuple[str, str]]]:
+        rows = [(f"no. {r.number}", r.verdict or r.reason or r.status) for r in self.products.get("records", ())][:5]
+        return self.scene.scene.title, [*rows, ("products", ", ".join(self.products)), ("folder", str(self.folder))]
 
 
 def _installed(product: str) -> Stage | None:

@@ -301,7 +301,12 @@ def column_files(name: str, columns: Mapping[str, Any], kinds: Sequence[str]) ->
     made = {}
     for kind in kinds:
         if kind == "csv":
-            made[f"{name}.csv"] = _csv(columns).encode()
+            text = io.StringIO()
+            writer = csv.writer(text)
+            writer.writerow(columns)
+            lists = [values.tolist() if hasattr(values, "tolist") else values for values in columns.values()]
+            writer.writerows(zip(*lists, strict=True))
+            made[f"{name}.csv"] = text.getvalue().encode()
             continue
         import pyarrow
         from pyarrow import parquet
@@ -312,24 +317,13 @@ def column_files(name: str, columns: Mapping[str, Any], kinds: Sequence[str]) ->
     return made
 
 
-def results_csv(records: Sequence[Record]) -> str:
-    """Return the records as CSV: one row per candidate, three columns per margin; an empty cell: not computed."""
-    return _csv(results_table(records))
-
-
 def results_table(records: Sequence[Record]) -> dict[str, list[Any]]:
-    """Return the records by the column.
+    """Return the records by the column: one row per candidate, three columns per margin.
 
     For a margin ``m`` the columns are ``m [unit]``, ``m guarantee`` and ``m error [unit]``; None means not computed.
     """
-    columns: dict[str, list[Any]] = {
-        "number": [r.number for r in records],
-        "key": [r.key for r in records],
-        "solution": [r.solution for r in records],
-        "status": [r.status for r in records],
-        "recognised as": [r.recognised_as for r in records],
-        "verdict": [r.verdict for r in records],
-    }
+    first = ("number", "key", "solution", "status", "recognised_as", "verdict")
+    columns = {name.replace("_", " "): [getattr(record, name) for record in records] for name in first}
     units: dict[str, str] = {}
     for record in records:
         for margin in record.margins:
@@ -342,12 +336,3 @@ def results_table(records: Sequence[Record]) -> dict[str, list[Any]]:
         columns[f"{name} error{unit}"] = [None if m is None or m.error is None else float(m.error) for m in margins]
     columns["reason"] = [r.reason for r in records]
     return columns
-
-
-def _csv(columns: Mapping[str, Any]) -> str:
-    stream = io.StringIO()
-    writer = csv.writer(stream)
-    writer.writerow(columns)
-    lists = [values.tolist() if hasattr(values, "tolist") else values for values in columns.values()]
-    writer.writerows(zip(*lists, strict=True))
-    return stream.getvalue()

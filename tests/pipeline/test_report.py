@@ -22,7 +22,7 @@ from graphsynth.pipeline.report import column_widths, print_summary, scene_json,
 from graphsynth.pipeline.runner import Running, run
 from graphsynth.pipeline.scene import OutputsTable, Scene
 from graphsynth.pipeline.stages import Context, Report, StageTime
-from graphsynth.pipeline.store import check_folder, results_csv
+from graphsynth.pipeline.store import check_folder, column_files, results_table
 from graphsynth.pipeline.system import Stage
 
 RECORDS = (
@@ -79,7 +79,8 @@ def test_page_is_balanced_escaped_and_self_contained(report: Report) -> None:
 
 
 def test_csv_has_one_row_per_candidate_and_says_how_each_number_was_had() -> None:
-    rows = list(csv.DictReader(io.StringIO(results_csv(RECORDS), newline="")))
+    content = column_files("results", results_table(RECORDS), ["csv"])["results.csv"].decode()
+    rows = list(csv.DictReader(io.StringIO(content, newline="")))
     assert [row["number"] for row in rows] == ["1", "2", "3"]
     assert float(rows[0]["gap [mm]"]) == -0.25
     assert (rows[0]["gap guarantee"], rows[0]["gap error [mm]"]) == ("estimated", "1e-16")
