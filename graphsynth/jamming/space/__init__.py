@@ -1,0 +1,5 @@
+"""Jamming with the exact closure of every loop in space.  Names are resolved on first use."""
+
+import lazy_loader as _lazy
+
+__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)

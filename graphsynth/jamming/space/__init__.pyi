@@ -1,0 +1,1 @@
+from .model import Seat as Seat, SpaceJoint as SpaceJoint, SpaceModel as SpaceModel

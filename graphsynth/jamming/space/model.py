@@ -1,0 +1,365 @@
+"""Mechanisms in space: seats on links, joints that turn about their axes and give way within limits, loops.
+
+A joint has a seat on each of its links: a point and a rotation, whose z axis is the axis of the joint.  From the seat
+on link a to that on link b the motion is
+
+    translation (shift_x, shift_y, slide) along the axes of seat a,  then  T(x),  then  Rz(turn)
+
+with T(x) the least rotation that takes one axis to the other: about ``x / |x|`` by the angle ``2 atan(|x| / 2)``, x in
+the plane across the axis.  The angle between both axes is the tilt.  See theory/closure-in-space 1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.errors import GeometryError
+from graphsynth.intervals import Interval, cos, sin, tan
+from graphsynth.jamming.joints.limits import JointLimits, Limits, Misalignment
+from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
+
+if TYPE_CHECKING:
+    from graphsynth.jamming.bearing.bearing import Condition
+    from graphsynth.jamming.joints.program import Bearings
+    from graphsynth.mechanism.model import Mechanism
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.intp]
+#: Coordinates of a joint, in this order.
+TURN, TILT_X, TILT_Y, SHIFT_X, SHIFT_Y, SLIDE = range(6)
+#: Tilts from here on are as good as none: the chart of T ends at pi.
+_FREE = 3.0
+
+
+class Unsupported(Exception):  # noqa: N818 - never leaves the package: it becomes an UNDECIDED with this reason
+    """A mechanism that this model does not describe; the text says why."""
+
+
+@dataclass(frozen=True)
+class Seat:
+    """Where a joint sits on a link: a point, and the rotation vector (radians) that turns the z axis to its axis.
+
+    ``turn_box`` (3,) encloses the rotation vector where floats do not say it exactly.
+    """
+
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turn_box: Interval | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("point", "turn"):
+            value = tuple(float(v) for v in getattr(self, name))
+            if len(value) != 3 or not all(map(math.isfinite, value)):
+                raise GeometryError(f"{name} = {value} of a seat is no vector in space; give three finite numbers")
+            object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True)
+class SpaceJoint:
+    """A joint between links a and b with its seats.
+
+    ``limits``: largest tilt and slide (of a guide roll and pitch, by components of x); ``radial`` the largest shift
+    across the axis.  ``driven``: the turn (of a guide the travel along the x axis of seat a) is given.  A guide
+    (``guide``) travels along x and does not turn, a slot (``guide`` and ``turns``) does both.
+    """
+
+    a: int
+    b: int
+    seat_a: Seat
+    seat_b: Seat
+    limits: Limits
+    radial: float = 0.0
+    driven: bool = False
+    guide: bool = False
+    turns: bool = True
+
+
+class Bound(NamedTuple):
+    """A limit: the norm of some unknowns is at most the limit (of tilts: in the chart ``2 tan(limit / 2)``)."""
+
+    joint: int
+    kind: str
+    columns: tuple[int, ...]
+    limit: float
+    angular: bool
+
+    def chart(self, scale: float) -> float:
+        """Return the limit in the chart at a common factor on all limits, in floats."""
+        return 2.0 * math.tan(0.5 * min(scale * self.limit, _FREE)) if self.angular else scale * self.limit
+
+    def slope(self, scale: float) -> float:
+        """Return the derivative of `chart` by the factor."""
+        if not self.angular:
+            return self.limit
+        return self.limit / math.cos(0.5 * min(scale * self.limit, _FREE)) ** 2
+
+    @property
+    def enclosed(self) -> Interval:
+        """The limit in the chart, enclosed."""
+        return 2 * tan(Interval(self.limit) / 2) if self.angular else Interval(self.limit)
+
+
+class Step(NamedTuple):
+    """A joint in a loop: forward from a to b or back; the constant motion from it to the next joint of the loop."""
+
+    joint: int
+    forward: bool
+    rotation: Interval
+    place: Interval
+
+
+@dataclass(frozen=True, eq=False)
+class SpaceModel:
+    """A mechanism in space with limits: loops, unknowns, limits.
+
+    Parameters
+    ----------
+    joints : sequence of SpaceJoint
+    links : int
+    frame : int
+
+    Attributes
+    ----------
+    column : ndarray, shape (joints, 6)
+        Number of the unknown for each coordinate of a joint (turn, tilt x, tilt y, shift x, shift y, slide), or -1;
+        given coordinates of driven joints are numbered after the ``size`` unknowns, ``width`` is the number of both.
+    unit : float
+        Power of two that lengths are measured in.
+    """
+
+    joints: tuple[SpaceJoint, ...]
+    links: int
+    frame: int = 0
+
+    @cached_property
+    def unit(self) -> float:
+        """Length unit of unknowns and equations."""
+        largest = max((abs(v) for j in self.joints for s in (j.seat_a, j.seat_b) for v in s.point), default=1.0)
+        return 2.0 ** round(math.log2(largest)) if largest > 0.0 else 1.0
+
+    @cached_property
+    def column(self) -> Ints:
+        """Numbers of the unknowns."""
+        found, count = np.full((len(self.joints), 6), -1), 0
+        for k, joint in enumerate(self.joints):
+            tilts = [getattr(joint.limits, name) > 0.0 for name in joint.limits.tilts]
+            sizes = {
+                TURN: joint.turns and not (joint.driven and not joint.guide),
+                TILT_X: tilts[0],
+                TILT_Y: tilts[-1],
+                SHIFT_X: (joint.guide and not joint.driven) or joint.radial > 0.0,
+                SHIFT_Y: joint.radial > 0.0,
+                SLIDE: joint.limits.axial_clearance > 0.0,
+            }
+            for place, wanted in sizes.items():
+                if wanted:
+                    found[k, place], count = count, count + 1
+        for k, joint in enumerate(self.joints):
+            if joint.driven:
+                found[k, SHIFT_X if joint.guide else TURN], count = count, count + 1
+        return found
+
+    @property
+    def width(self) -> int:
+        """Number of unknowns and given coordinates."""
+        return int(self.column.max(initial=-1)) + 1
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.width - sum(joint.driven for joint in self.joints)
+
+    @cached_property
+    def bounds(self) -> tuple[Bound, ...]:
+        """All finite limits above zero."""
+        found = []
+        for k, joint in enumerate(self.joints):
+            columns = [int(c) for c in self.column[k]]
+            for place, name in enumerate(joint.limits.tilts):
+                own = columns[TILT_X:SHIFT_X] if len(joint.limits.tilts) == 1 else [columns[TILT_X + place]]
+                limit = getattr(joint.limits, name)
+                if 0.0 < limit < _FREE:
+                    found.append(Bound(k, name, tuple(own), limit, True))
+            if joint.radial > 0.0 and not joint.guide:
+                found.append(Bound(k, "shift", tuple(columns[SHIFT_X:SLIDE]), joint.radial / self.unit, False))
+            if 0.0 < joint.limits.axial_clearance < math.inf:
+                slide = joint.limits.axial_clearance / self.unit
+                found.append(Bound(k, "play", (columns[SLIDE],), slide, False))
+        return tuple(found)
+
+    @cached_property
+    def seats(self) -> list[tuple[tuple[Interval, Interval], tuple[Interval, Interval]]]:
+        """Enclosed rotation (3, 3) and place (3,) of both seats of every joint, lengths in units."""
+        return [(self._seat(joint.seat_a), self._seat(joint.seat_b)) for joint in self.joints]
+
+    def _seat(self, seat: Seat) -> tuple[Interval, Interval]:
+        turn = Interval(list(seat.turn)) if seat.turn_box is None else seat.turn_box
+        return rotation(turn), Interval(list(seat.point)) / self.unit
+
+    @cached_property
+    def loops(self) -> tuple[tuple[Step, ...], ...]:
+        """Loops of the joint graph, each a round of steps; those within flat parts of the mechanism first."""
+        return tuple(self._round(path) for path in self._paths[0])
+
+    @cached_property
+    def rows(self) -> tuple[tuple[int, ...], ...]:
+        """Equations of every loop, of rotations x, y, z and places x, y, z: three in a flat part, else six."""
+        return tuple((2, 3, 4) if flat else (0, 1, 2, 3, 4, 5) for flat in self._paths[1])
+
+    @cached_property
+    def _paths(self) -> tuple[list[list[tuple[int, bool]]], list[bool]]:
+        flat = [_is_flat(joint) for joint in self.joints]
+        part = list(range(self.links))
+        tree: list[list[tuple[int, int]]] = [[] for _ in range(self.links)]
+        closing = []
+        for k in sorted(range(len(self.joints)), key=lambda k: not flat[k]):
+            a, b = self.joints[k].a, self.joints[k].b
+            if part[a] != part[b]:
+                part = [part[b] if own == part[a] else own for own in part]
+                tree[a].append((k, b))
+                tree[b].append((k, a))
+            else:
+                closing.append(k)
+        paths = [[(k, True), *self._way(tree, self.joints[k].b, self.joints[k].a)] for k in closing]
+        return paths, [all(flat[k] for k, _ in path) for path in paths]
+
+    def _way(self, tree: list[list[tuple[int, int]]], start: int, end: int) -> list[tuple[int, bool]]:
+        """Joints passed on the way through the tree."""
+        came: dict[int, tuple[int, int]] = {start: (-1, -1)}
+        queue = [start]
+        for link in queue:
+            for k, other in tree[link]:
+                if other not in came:
+                    came[other] = (k, link)
+                    queue.append(other)
+        way = []
+        while end != start:
+            k, end = came[end]
+            way.append((k, self.joints[k].a == end))
+        return way[::-1]
+
+    def _round(self, path: list[tuple[int, bool]]) -> tuple[Step, ...]:
+        """Join the seats on the link between two joints of a loop to one constant motion."""
+        steps = []
+        for (k, forward), (after, onward) in zip(path, path[1:] + path[:1]):
+            R, p = self.seats[k][1 if forward else 0]
+            S, q = self.seats[after][0 if onward else 1]
+            back = _transposed(R)
+            steps.append(Step(k, forward, product(back, S), (back * (q - p).reshape(1, 3)).sum(-1)))
+        return tuple(steps)
+
+
+def _is_flat(joint: SpaceJoint) -> bool:
+    """Whether both links always move in one plane: no tilt, no slide, seats in the plane."""
+    rigid = max(getattr(joint.limits, name) for name in joint.limits.tilts) == joint.limits.axial_clearance == 0.0
+    level = all(s.point[2] == s.turn[0] == s.turn[1] == 0.0 for s in (joint.seat_a, joint.seat_b))
+    return rigid and level
+
+
+def product(A: Any, B: Any) -> Any:
+    """Product of 3 by 3 matrices (..., 3, 3) of floats or intervals."""
+    if not isinstance(A, Interval) and not isinstance(B, Interval):
+        return A @ B
+    return A[..., :, 0:1] * B[..., 0:1, :] + A[..., :, 1:2] * B[..., 1:2, :] + A[..., :, 2:3] * B[..., 2:3, :]
+
+
+def _transposed(A: Interval) -> Interval:
+    return Interval.from_bounds(A.lo.T.copy(), A.hi.T.copy())
+
+
+def rotation(vector: Interval) -> Interval:
+    """Enclose the rotation about a vector (3,) by its length (radians), shape (3, 3)."""
+    v = list(vector)
+    if all(bool((part.mag == 0.0).all()) for part in v):
+        return Interval(np.eye(3).astype(int).tolist())
+    angle = (v[0].sqr() + v[1].sqr() + v[2].sqr()).sqrt()
+    n = [part / angle for part in v]
+    c, s = cos(angle), sin(angle)
+    k = 2 * sin(angle / 2).sqr()
+    rows = [
+        Interval.stack([c + n[0].sqr() * k, n[0] * n[1] * k - n[2] * s, n[0] * n[2] * k + n[1] * s]),
+        Interval.stack([n[0] * n[1] * k + n[2] * s, c + n[1].sqr() * k, n[1] * n[2] * k - n[0] * s]),
+        Interval.stack([n[0] * n[2] * k - n[1] * s, n[1] * n[2] * k + n[0] * s, c + n[2].sqr() * k]),
+    ]
+    return Interval.stack(rows)
+
+
+def in_space(
+    mechanism: Mechanism,
+    bearings: Bearings,
+    tilts: Misalignment | Iterable[Misalignment],
+    condition: Condition = "A",
+) -> SpaceModel:
+    """Put a plane mechanism with limits and misaligned axes into space; arguments as for `assess_coupled`.
+
+    Raises `Unsupported` for gears, cams and driven slots, `GeometryError` for limits that do not fit the mechanism.
+    """
+    from graphsynth.jamming.joints.program import problem
+
+    given = problem(mechanism, bearings, tilts, condition)
+    by_pair = {tilt.pair: tilt for tilt in given.misalignments}
+    driven = {driver.pair for driver in mechanism.drivers}
+    joints = []
+    for joint, limits in zip(mechanism.joints, given.limits):
+        if not isinstance(joint, Revolute | Prismatic | PinSlot) or (
+            isinstance(joint, PinSlot) and joint.pair in driven
+        ):
+            raise Unsupported(f"joint {joint.a}-{joint.b} ({joint.kind}) is not described in space; use small tilts")
+        tilt = by_pair.get(joint.pair)
+        guide = not isinstance(joint, Revolute)
+        seats = []
+        for link, at, angle in ((joint.a, joint.at_a, "angle_a"), (joint.b, joint.at_b, "angle_b")):
+            own = tilt if tilt is not None and tilt.base == link else None
+            seats.append(_plane_seat(at, getattr(joint, angle, 0.0), own))
+        own_driven = joint.pair in driven
+        joints.append(SpaceJoint(joint.a, joint.b, *seats, limits, 0.0, own_driven, guide, not isinstance(joint, Prismatic)))
+    return SpaceModel(tuple(joints), mechanism.graph.links, mechanism.frame)
+
+
+def _plane_seat(at: tuple[float, float], angle: float, tilt: Misalignment | None) -> Seat:
+    """Seat of a joint of a plane mechanism, turned in the plane (a guide) or out of it (a misaligned axis)."""
+    if tilt is None:
+        return Seat((*at, 0.0), (0.0, 0.0, angle))
+    if angle != 0.0:
+        raise Unsupported("a misaligned guide whose direction is turned is not described in space; use small tilts")
+    alpha, direction = Interval(tilt.alpha), Interval(tilt.direction)
+    box = Interval.stack([alpha * cos(direction), alpha * sin(direction), Interval(0)])
+    return Seat((*at, 0.0), tuple(box.mid.tolist()), box)
+
+
+def start(model: SpaceModel, mechanism: Mechanism, pose: Array) -> Array:
+    """Unknowns and given coordinates (width,) of a plane pose (links, 3): those of the plane mechanism, all else 0."""
+    q = np.zeros(model.width)
+    for joint, own, column in zip(mechanism.joints, model.joints, model.column):
+        (xa, ya, ta), (xb, yb, tb) = pose[joint.a], pose[joint.b]
+        angles = getattr(joint, "angle_a", 0.0), getattr(joint, "angle_b", 0.0)
+        if column[TURN] >= 0:
+            q[column[TURN]] = tb + angles[1] - ta - angles[0]
+        if own.guide and column[SHIFT_X] >= 0:
+            a = complex(xa, ya) + complex(*joint.at_a) * np.exp(1j * ta)
+            b = complex(xb, yb) + complex(*joint.at_b) * np.exp(1j * tb)
+            q[column[SHIFT_X]] = ((b - a) * np.exp(-1j * (ta + angles[0]))).real / model.unit
+    return q
+
+
+def driven_at(model: SpaceModel, mechanism: Mechanism, u: Interval) -> Interval:
+    """Enclose the given coordinates (N, drivers) at inputs (N,), in the order of their columns, lengths in units."""
+    given = []
+    for joint, own in zip(mechanism.joints, model.joints):
+        for driver in mechanism.drivers:
+            if driver.pair != joint.pair:
+                continue
+            law: Any = driver.law
+            if not hasattr(law, "at"):
+                raise Unsupported(f"the law {type(law).__name__} of a driver is not enclosed; use Linear or Harmonic")
+            value = law.at(u, sin, cos)[0]
+            value = value if driver.base == joint.a else -value
+            given.append(value / model.unit if own.guide else value)
+    return Interval.stack(given, axis=-1) if given else Interval.zeros((*u.shape, 0))

@@ -1,0 +1,217 @@
+"""The least common factor on all limits with which a mechanism closes in space at one pose; estimated.
+
+Sequential cone programs: at every step the closure is linearised and the convex program of the small-tilt model
+(`graphsynth.jamming.joints.cones`) gives the next tilts, slips and multipliers; free turns follow from the closure.
+Newton's method on the optimality conditions, with the second derivatives of the closure, adds the last digits.
+The first step from a plane pose is the small-tilt model itself.  See theory/closure-in-space 3.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.jamming.joints.cones import ConeSolution, polish, solve_cones
+from graphsynth.jamming.space.closure import Closure
+
+Array = NDArray[np.float64]
+_ROUNDS = 60
+_RANK = 1e-11
+#: Largest step of an unknown in one round (radians, units).
+_STEP = 0.3
+
+
+class Optimum(NamedTuple):
+    """Least factor at one pose (estimated).
+
+    ``scale``: the factor; infinite if no factor is enough.  ``q`` (width,): unknowns and given coordinates.  ``by`` (equations,): multipliers of
+    the closure; ``weight`` (bounds,): those of ``|x|^2 <= limit^2``, with ``sum 2 weight X dX/ds = 1``.  ``missed``:
+    largest left side of the closure.  ``converged``: whether the iteration came to rest.
+    """
+
+    scale: float
+    q: Array
+    by: Array
+    weight: Array
+    missed: float
+    converged: bool
+
+
+class _Linear(NamedTuple):
+    """Solution of one linearised program: factor, change of unknowns, multipliers of the closure."""
+
+    factor: float
+    q: Array
+    by: Array
+
+
+def least_scale(closure: Closure, q: Array) -> Optimum:
+    """Find the least factor from a start q (width,), whose given coordinates stay."""
+    bounds = closure.model.bounds
+    scale, reach, before = 1.0, _STEP, math.inf
+    q, converged = q.copy(), False
+    found = _Linear(math.inf, q, np.zeros(len(closure.rows)))
+    for _ in range(_ROUNDS):
+        radii = np.array([b.chart(scale) / scale for b in bounds])
+        found = _linearised(closure, q, radii)
+        if not math.isfinite(found.factor):
+            break
+        step = found.q - q
+        size = float(np.abs(step).max(initial=0.0))
+        if size > 0.9 * before:
+            reach *= 0.6
+        q = q + step * min(1.0, reach / max(size, 1e-300))
+        change, scale = abs(found.factor - scale), max(found.factor, 1e-12)
+        if size < 1e-9 and change < 1e-9 * scale:
+            converged = True
+            break
+        before = min(size, reach)
+    loops = closure.loops(q[None])
+    missed = float(np.abs(closure.values(loops)).max(initial=0.0))
+    weight = np.zeros(len(bounds))
+    if not math.isfinite(found.factor):
+        return Optimum(math.inf, q, found.by, weight, missed, False)
+    slope = closure.jacobian(loops)[0].T @ found.by
+    for k, bound in enumerate(bounds):
+        columns, radius = list(bound.columns), bound.chart(scale)
+        inside = float(np.linalg.norm(q[columns])) if radius > 0.0 else 0.0
+        if inside > radius * (1.0 - 1e-6):
+            weight[k] = max(0.0, -float(slope[columns] @ q[columns]) / (2.0 * radius**2))
+    return _polished(closure, Optimum(scale, q, found.by, weight, missed, converged))
+
+
+def _linearised(closure: Closure, q: Array, radii: Array) -> _Linear:
+    """Solve the program with the closure linearised at q: least T with ``|x_b| <= T radius_b`` for every bound."""
+    bounds = closure.model.bounds
+    loops = closure.loops(q[None])
+    values, J = closure.values(loops)[0], closure.jacobian(loops)[0]
+    moving = np.arange(len(q)) < closure.model.size
+    tied = np.zeros(len(q), dtype=bool)
+    for bound in bounds:
+        tied[list(bound.columns)] = True
+    slack = moving & ~tied
+    free = J[:, slack]
+    null = _left_null(free)
+    blocks = np.zeros((len(bounds), 2, null.shape[1]))
+    for k, bound in enumerate(bounds):
+        for axis, column in enumerate(bound.columns):
+            blocks[k, axis] = radii[k] * (J[:, column] @ null)
+    work = (values - J[:, tied] @ q[tied]) @ null
+    factor, x, wrench = _cone(blocks, work)
+    found = q.copy()
+    for k, bound in enumerate(bounds):
+        for axis, column in enumerate(bound.columns):
+            found[column] = radii[k] * x[k, axis]
+    if math.isfinite(factor):
+        rest = values + J @ np.where(tied, found - q, 0.0)
+        found[slack] = q[slack] - np.linalg.lstsq(free, rest, rcond=_RANK)[0]
+    return _Linear(factor, found, null @ wrench)
+
+
+def _left_null(A: Array) -> Array:
+    """Orthonormal basis of what is orthogonal to all columns."""
+    if A.shape[1] == 0:
+        return np.eye(len(A))
+    left, values, _ = np.linalg.svd(A, full_matrices=True)
+    rank = int((values > _RANK * max(values.max(initial=0.0), 1e-300)).sum())
+    return left[:, rank:]
+
+
+def _cone(blocks: Array, work: Array) -> tuple[float, Array, Array]:
+    """Least T, tilts over their radii (bounds, 2), and multipliers: ``sum M_b' x_b + work = 0``, ``|x_b| <= T``."""
+    count, k = len(blocks), len(work)
+    stacked = blocks.reshape(-1, k)
+    unit = float(np.abs(stacked).max(initial=0.0))
+    size = float(np.linalg.norm(work))
+    if size <= 1e-15 * max(unit, 1e-3):
+        return 0.0, np.zeros((count, 2)), np.zeros(k)
+    _, values, right = np.linalg.svd(stacked, full_matrices=True) if count else (0, np.zeros(0), np.eye(k))
+    rank = int((values > _RANK * unit).sum())
+    idle, span = right[rank:], right[:rank].T
+    lost = idle @ work
+    if float(np.linalg.norm(lost)) > 1e-9 * size and float(np.linalg.norm(lost)) > 1e-13:
+        return math.inf, np.zeros((count, 2)), idle.T @ lost / np.linalg.norm(lost)
+    M, W = (blocks @ span / unit)[None], (span.T @ work / size)[None]
+    F = np.zeros((1, 0, rank))
+    found = solve_cones(M, F, W)
+    best = _restored(M, W, found)
+    for robust in (False, True):
+        with np.errstate(all="ignore"):
+            again = polish(M, F, W, found, robust=robust)
+        own = _restored(M, W, again)
+        if np.isfinite(own[0]) and own[0] <= best[0] and np.isfinite(again.q).all():
+            best = own
+    T, tau, q = best
+    # the dual form has W q = T, sum |M_b q| = 1; in the closure T (s + by . g) has the slope of the factor
+    return T * size / unit, tau * (size / unit), span @ q
+
+
+def _restored(M: Array, W: Array, found: ConeSolution) -> tuple[float, Array, Array]:
+    """Factor from tilts whose closure has been restored."""
+    flat = M[0].reshape(-1, W.shape[1])
+    tau = found.tau[0].ravel().copy()
+    inverse = np.linalg.pinv(flat, rcond=1e-13).T
+    for _ in range(2):
+        off = W[0] + flat.T @ tau
+        tau = tau - inverse @ np.where(np.isfinite(off), off, 0.0)
+    tau = tau.reshape(-1, 2)
+    return float(np.hypot(tau[:, 0], tau[:, 1]).max()), tau, found.q[0]
+
+
+def _polished(closure: Closure, found: Optimum) -> Optimum:
+    """Take Newton steps on the optimality conditions with the loaded limits as equations."""
+    bounds = closure.model.bounds
+    loaded = [k for k in range(len(bounds)) if found.weight[k] > 1e-9 * found.weight.max(initial=0.0)]
+    if not loaded:
+        return found
+    best, least = found, math.inf
+    state = found
+    for _ in range(6):
+        matrix, right = _conditions(closure, state, loaded)
+        size = float(np.abs(right).max())
+        if not size < least:
+            break
+        best, least = state, size
+        if size < 1e-15:
+            break
+        step = np.linalg.lstsq(matrix, -right, rcond=1e-12)[0]
+        n, m = closure.model.size, len(state.by)
+        weight = state.weight.copy()
+        weight[loaded] += step[n + m : -1]
+        q, by = state.q.copy(), state.by + step[n : n + m]
+        q[:n] += step[:n]
+        missed = float(np.abs(closure.values(closure.loops(q[None]))).max())
+        state = Optimum(state.scale + float(step[-1]), q, by, weight, missed, state.converged)
+        if not (state.scale > 0.0 and np.abs(step[:n]).max() < 0.1):
+            break
+    return best if (best.weight >= 0.0).all() else found
+
+
+def _conditions(closure: Closure, at: Optimum, loaded: list[int]) -> tuple[Array, Array]:
+    """Matrix and left sides: stationarity in q, closure, loaded limits, normalisation."""
+    bounds = closure.model.bounds
+    loops = closure.loops(at.q[None])
+    n, m, k = closure.model.size, len(at.by), len(loaded)
+    J, H = closure.jacobian(loops)[0][:, :n], closure.hessian(loops, at.by[None])[0][:n, :n]
+    matrix = np.zeros((n + m + k + 1, n + m + k + 1))
+    right = np.zeros(n + m + k + 1)
+    matrix[:n, :n], matrix[:n, n : n + m], matrix[n : n + m, :n] = H, J.T, J
+    right[:n], right[n : n + m] = J.T @ at.by, closure.values(loops)[0]
+    right[-1] = -1.0
+    for place, number in enumerate(loaded):
+        bound, row = bounds[number], n + m + place
+        columns = list(bound.columns)
+        X, slope = bound.chart(at.scale), bound.slope(at.scale)
+        mu, x = at.weight[number], at.q[columns]
+        matrix[columns, columns] += 2.0 * mu
+        matrix[columns, row] = matrix[row, columns] = 2.0 * x
+        matrix[row, -1] = -2.0 * X * slope
+        right[columns] += 2.0 * mu * x
+        right[row] = float(x @ x) - X * X
+        matrix[-1, row] = 2.0 * X * slope
+        matrix[-1, -1] += 2.0 * mu * slope * slope
+        right[-1] += 2.0 * mu * X * slope
+    return matrix, right
