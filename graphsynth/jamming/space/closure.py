@@ -135,6 +135,12 @@ class Loop(NamedTuple):
         move = v - cross(self.t[..., None, :], omega)
         return _joined([*(turn[..., i] for i in range(3)), *(move[..., i] for i in range(3))])
 
+    def repeated(self) -> Loop:
+        """The loop with an axis for several rows of multipliers."""
+        R, t, omega, v = (part[:, None] for part in (self.R, self.t, self.omega, self.v))
+        pairs, turned, pushed = self.bends
+        return self._replace(R=R, t=t, omega=omega, v=v, bends=(pairs, turned[:, None], pushed[:, None]))
+
     def bend(self, by: Any) -> Any:
         """Second derivative of the left sides weighed by multipliers (N, 6), shape (N, k, k)."""
         r, p = by[..., :3], by[..., 3:]
@@ -259,7 +265,9 @@ class Closure:
         local = self._local(plan, q)
         if self.exact and q.rad.any():
             at = self._local(plan, exact(q.mid))
-            R, t, frames, places = self._around(plan, at, q)
+            both = zip(self._frames(plan, local), self._around(plan, at, q))
+            # entry by entry, or by angles: both have the same midpoints
+            R, t, frames, places = (Balls(b.mid, np.where(a.mid == b.mid, np.minimum(a.rad, b.rad), b.rad)) for a, b in both)
         else:
             R, t, frames, places = self._frames(plan, local)
         signs = plan.sign[:, None, None]
@@ -350,17 +358,22 @@ class Closure:
         return spread(lambda part: part)
 
     def hessian(self, loops: list[Loop], by: Any) -> Any:
-        """Second derivative of the equations weighed by multipliers (N, equations), shape (N, width, width)."""
+        """Second derivative of the equations weighed by multipliers (N, equations), shape (N, width, width).
+
+        Several rows of multipliers for each point, (N, M, equations), give (N, M, width, width).
+        """
         n = self.model.width
         total: Any = 0.0
         for k, loop in enumerate(loops):
+            if (by.mid if isinstance(by, Balls) else by).ndim == 3:
+                loop = loop.repeated()
             chosen = {row: place for place, (at, row) in enumerate(self.rows) if at == k}
             none = 0.0 * by[..., 0]
             part = loop.bend(_joined([by[..., chosen[row]] if row in chosen else none for row in range(6)]))
 
             def spread(values: Array, columns: Ints = loop.columns) -> Array:
-                table = np.zeros((len(values), n, n))
-                table[:, columns[:, None], columns[None, :]] = values
+                table = np.zeros((*values.shape[:-2], n, n))
+                table[..., columns[:, None], columns[None, :]] = values
                 return table
 
             total = total + _each(part, spread) if k else _each(part, spread)

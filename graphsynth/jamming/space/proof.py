@@ -1,0 +1,349 @@
+"""Proofs over boxes of given coordinates: within the limits the mechanism closes for all of them, or for none.
+
+*Free*: as many unknowns as equations are chosen by pivoting; the others move linearly with the given coordinates.
+Krawczyk's test proves a closure within a small box for each of the given coordinates, and the box obeys all limits.
+
+*Jammed*: for multipliers ``by + K (q - q*)`` of the closure and weights of the limits that are zero or more, the
+function ``L = (by + K (q - q*)) . g + sum weight (|x|^2 - limit^2)`` is at most zero wherever the loops close within
+the limits.  Its Hessian over the box, shifted to be positive semidefinite (verified Cholesky factorisation), bounds it
+from below; above zero nothing closes.  Boxes are contracted and cut until each is settled.
+
+Both in balls with all rounding errors; proofs in theory/closure-in-space 4 and 5.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+
+from graphsynth.intervals.balls import Balls, exact
+from graphsynth.jamming.space.closure import Closure, swapped, times
+from graphsynth.jamming.space.model import SpaceModel
+from graphsynth.jamming.space.optimum import Optimum
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.intp]
+#: More than what rounding loses in sums of fewer than a thousand nonnegative numbers.
+_UP = 1.0 + 1e-12
+_FREE_STEPS = 6
+_CONTRACTIONS = 8
+_GAIN = 0.9
+
+
+class Enclosed(NamedTuple):
+    """Limits in the chart, enclosed: ``low``, ``high`` (bounds,)."""
+
+    low: Array
+    high: Array
+
+
+def limits_of(model: SpaceModel) -> Enclosed:
+    """Enclose all limits."""
+    both = [bound.enclosed for bound in model.bounds]
+    return Enclosed(np.array([float(b.lo) for b in both]), np.array([float(b.hi) for b in both]))
+
+
+def closes(closure: Closure, at: Array, rate: Array, given: Array) -> bool:
+    """Whether the mechanism is proved to close within its limits for all given coordinates within a box (certified).
+
+    ``at`` (width,) is near a closure with room in all limits, its given coordinates the middle of the box; ``given``
+    (drivers,) are the half widths of the box; ``rate`` (size, drivers) the change of the unknowns.
+    """
+    model = closure.model
+    n = model.size
+    if not closure.rows:
+        return _within(model, at[:n], np.zeros(n))
+    basic = _basic(closure, at)
+    if len(basic) < len(closure.rows):
+        return False
+    other = np.setdiff1d(np.arange(n), basic)
+    radius = np.concatenate([np.abs(rate) @ given, given]) * _UP
+    middle = exact(at[None])
+    value = closure.values(closure.loops(middle))
+    point = closure.jacobian(closure.loops(middle))
+    inverse = np.linalg.pinv(point.mid[0][:, basic])
+    # columns of the given coordinates along the chosen motion
+    reach = np.abs(inverse @ value.mid[0]) * 4.0 + 1e-15
+    for _ in range(_FREE_STEPS):
+        whole = radius.copy()
+        whole[basic] += reach
+        J = closure.jacobian(closure.loops(Balls(at[None], whole[None])))
+        along = times(J[:, :, :n], exact(rate[None])) + J[:, :, n:]
+        start = times(exact(inverse[None]), value[..., None])[..., 0].size[0]
+        start = start + times(exact(inverse[None]), along).size[0] @ given
+        rest = (exact(np.eye(len(basic))[None]) - times(exact(inverse[None]), J[:, :, basic])).size[0]
+        image = (start + rest @ reach) * _UP
+        if (image < reach).all():
+            return _identity(closure, at, whole) and _within(model, at[:n], whole[:n], other)
+        reach = np.maximum(1.5 * image, reach) + 1e-300
+        if not np.isfinite(reach).all() or reach.max() > 1.0:
+            return False
+    return False
+
+
+def _basic(closure: Closure, at: Array) -> Ints:
+    """Unknowns to solve for: as many as equations, those with most room in their limits first."""
+    model = closure.model
+    J = closure.jacobian(closure.loops(at[None])).astype(np.float64)[0][:, : model.size] if not closure.exact else (
+        closure.jacobian(closure.loops(exact(at[None]))).mid[0][:, : model.size]
+    )
+    room = np.ones(model.size)
+    for bound in model.bounds:
+        columns = list(bound.columns)
+        left = bound.chart(1.0) - float(np.linalg.norm(at[columns]))
+        room[columns] = min(1.0, max(left, 1e-12))
+    if not len(J):
+        return np.zeros(0, dtype=np.intp)
+    _, upper, order = qr(J * room, mode="economic", pivoting=True)
+    size = np.abs(np.diag(upper))
+    rank = int((size > 1e-11 * size.max(initial=0.0)).sum())
+    return np.asarray(np.sort(order[: min(rank, len(J))]))
+
+
+def _within(model: SpaceModel, at: Array, radius: Array, _other: Ints | None = None) -> bool:
+    """Whether all unknowns within a box obey their limits."""
+    low = limits_of(model).low
+    for bound, limit in zip(model.bounds, low):
+        columns = list(bound.columns)
+        size = (np.abs(at[columns]) + radius[columns]) * _UP
+        if not math.sqrt(float((size**2).sum())) * _UP < limit:
+            return False
+    return True
+
+
+def _identity(closure: Closure, at: Array, radius: Array) -> bool:
+    """Whether a symmetric rotation of every loop is the identity: no half turn is within the box."""
+    for loop in closure.loops(Balls(at[None], radius[None])):
+        trace = loop.R[..., 0, 0] + loop.R[..., 1, 1] + loop.R[..., 2, 2]
+        if not (trace.mid - trace.rad > -0.99).all():
+            return False
+    return True
+
+
+class Box(NamedTuple):
+    """Boxes of all coordinates: bounds (N, width)."""
+
+    low: Array
+    high: Array
+
+    @property
+    def ball(self) -> Balls:
+        """Balls around the boxes."""
+        middle = 0.5 * self.low + 0.5 * self.high
+        return Balls(middle, np.maximum(self.high - middle, middle - self.low) * _UP + 1e-300)
+
+
+def branch_box(model: SpaceModel, reference: Array, reach: float, given: Array) -> Box:
+    """Box of a branch: coordinates without limit within ``reach`` of the reference, the others within their limits."""
+    radius = np.full(model.width, reach)
+    middle = reference.copy()
+    radius[model.size :] = given
+    for bound, high in zip(model.bounds, limits_of(model).high):
+        middle[list(bound.columns)] = 0.0
+        radius[list(bound.columns)] = high
+    low, high_ends = middle - radius * _UP, middle + radius * _UP
+    low[model.size :], high_ends[model.size :] = (reference - radius)[model.size :], (reference + radius)[model.size :]
+    return Box(low[None], high_ends[None])
+
+
+def contract(closure: Closure, box: Box) -> tuple[Box, NDArray[np.bool_]]:
+    """Cut away parts of boxes where no loop closes (certified); True where nothing is left.
+
+    With C near the inverse of the derivative by as many unknowns as equations, every closure c + d of the box obeys
+    ``d = - C g(c) - (C J(c) - I) d - d C H d / 2`` in those unknowns, H the second derivatives over the box.
+    """
+    low, high = box.low.copy(), box.high.copy()
+    empty = np.zeros(len(low), dtype=bool)
+    basic = _chosen(closure, box)
+    for _ in range(_CONTRACTIONS):
+        live = np.flatnonzero(~empty)
+        before = (high - low)[live]
+        for part in np.array_split(live, 1 + len(live) // 64):
+            down, up = _solved(closure, Box(low[part], high[part]), basic)
+            rows = np.ix_(part, basic)
+            low[rows], high[rows] = np.maximum(low[rows], down), np.minimum(high[rows], up)
+            empty[part] = (low[part] > high[part]).any(1)
+        wide = before > 1e-14
+        after = np.where(empty[live, None], before, (high - low)[live])
+        if empty.all() or not (after[wide] < _GAIN * before[wide]).any():
+            break
+    return Box(low, high), empty
+
+
+def _chosen(closure: Closure, box: Box) -> Ints:
+    """Unknowns to solve for: as many as equations, the widest first."""
+    ball = box.ball
+    J = closure.jacobian(closure.loops(exact(ball.mid[:1]))).mid[0][:, : closure.model.size]
+    weight = np.where(ball.rad[0] > 0.0, ball.rad[0], 1e-300)[: closure.model.size]
+    _, upper, order = qr(J * weight, mode="economic", pivoting=True)
+    diagonal = np.abs(np.diag(upper))
+    rank = int((diagonal > 1e-9 * diagonal.max(initial=0.0)).sum())
+    return np.asarray(np.sort(order[:rank]))
+
+
+def _solved(closure: Closure, box: Box, basic: Ints) -> tuple[Array, Array]:
+    """Bounds of the chosen unknowns, (N, chosen) twice."""
+    ball = box.ball
+    loops = closure.loops(exact(ball.mid))
+    value, J = closure.values(loops), closure.jacobian(loops)
+    inverse = exact(np.linalg.pinv(J.mid[:, :, basic]))
+    offset = times(inverse, value[..., None])[..., 0]
+    M = times(inverse, J)
+    each = np.arange(len(basic))
+    unit = np.zeros(M.mid.shape)
+    unit[:, each, basic] = 1.0
+    rest = (M - exact(unit)).size
+    H = closure.hessian(closure.loops(ball), inverse).size
+    radius = ball.rad
+    second = 0.5 * ((H @ radius[:, None, :, None])[..., 0] * radius[:, None, :]).sum(-1)
+    spread = ((rest @ radius[:, :, None])[..., 0] + second + offset.rad) * _UP
+    centre = ball.mid[:, basic] - offset.mid
+    spread = spread * _UP + 1e-15 * (np.abs(centre) + np.abs(ball.mid[:, basic]) + spread)
+    return centre - spread, centre + spread
+
+
+class Certificate(NamedTuple):
+    """Multipliers of a proof of binding: ``L = (by + K (q - at)) . g + sum weight (|x|^2 - limit^2)``."""
+
+    at: Array
+    by: Array
+    K: Array
+    weight: Array
+
+
+def certificate(closure: Closure, found: Optimum, box: Box, sigma: float) -> Certificate:
+    """Choose multipliers from an optimum; any choice is valid, this one makes L convex near it (estimated).
+
+    Loaded limits curve L upward in their own unknowns.  For the others K = S J adds J' S J, which is sigma times the
+    identity in them, measured by the half widths of the box.
+    """
+    model = closure.model
+    radius = 0.5 * (box.high - box.low)[0]
+    J = closure.jacobian(closure.loops(exact(found.q[None]))).mid[0]
+    idle = np.arange(model.width) < model.size
+    H = np.abs(closure.hessian(closure.loops(exact(found.q[None])), exact(found.by[None])).mid[0])
+    coupled = (H * radius).sum(1) * radius
+    top = 0.0
+    for bound, mu in zip(model.bounds, found.weight):
+        columns = list(bound.columns)
+        own = 2.0 * mu * radius[columns] ** 2
+        top = max(top, float(own.max()))
+        idle[columns] = mu <= 1e-9 * found.weight.max()
+    idle &= coupled > 1e-9 * top
+    active = _active(closure, found)
+    inverse = np.linalg.pinv(J[np.ix_(active, np.flatnonzero(idle))] * radius[idle], rcond=3e-2)
+    K = np.zeros_like(J)
+    K[active] = 0.5 * sigma * (top or 1.0) * (inverse.T @ inverse) @ J[active]
+    return Certificate(found.q, found.by, K, found.weight)
+
+
+def _active(closure: Closure, found: Optimum) -> Ints:
+    """Equations of the loops whose multipliers are not all zero."""
+    largest = float(np.abs(found.by).max(initial=0.0))
+    loops = {k for (k, _), by in zip(closure.rows, found.by) if abs(by) > 1e-10 * largest}
+    return np.array([place for place, (k, _) in enumerate(closure.rows) if k in loops], dtype=np.intp)
+
+
+def lower_bounds(closure: Closure, proofs: list[Certificate], box: Box) -> Array:
+    """Lower bounds of L over boxes, (proofs, N), certified; above zero no member of the box closes within the limits.
+
+    All proofs have the same multipliers but for K.
+    """
+    ball = box.ball
+    z = np.clip(proofs[0].at, box.low, box.high)
+    count = len(z)
+    by, at = exact(np.repeat(proofs[0].by[None], count, 0)), exact(proofs[0].at[None])
+    loops, wide = closure.loops(exact(z)), closure.loops(ball)
+    g, J, everywhere = closure.values(loops), closure.jacobian(loops), closure.jacobian(wide)
+    weighed = _weighed(closure.model, proofs[0].weight, z)
+    below, above = box.low - z, box.high - z
+    far = np.maximum(-below, above) * _UP
+    found = []
+    for proof in proofs:
+        K = exact(proof.K[None])
+        own = by + times(K, (exact(z) - at)[..., None])[..., 0]
+        value = _total(own * g) + weighed[0]
+        slope = times(swapped(J), own[..., None])[..., 0] + times(swapped(K), g[..., None])[..., 0] + weighed[1]
+        product = times(swapped(K), everywhere)
+        H = closure.hessian(wide, by + times(K, (ball - at)[..., None])[..., 0]) + product + swapped(product) + weighed[2]
+        ends = [(slope.mid + sign * slope.rad) * side for sign in (-1.0, 1.0) for side in (below, above)]
+        first = np.minimum(np.min(ends, axis=0), 0.0).sum(-1)
+        second = np.array([shift(*part) for part in zip(H.mid, H.rad, far)])
+        least = value.mid - value.rad * _UP + first * _UP - 0.5 * second * _UP
+        found.append(least - 1e-15 * (np.abs(value.mid) - first + second))
+    return np.array(found)
+
+
+def _weighed(model: SpaceModel, weight: Array, z: Array) -> tuple[Balls, Balls, Balls]:
+    """Return ``sum weight (|x|^2 - limit^2)`` at points (N, width) with first and second derivatives."""
+    count, width = z.shape
+    value, slope, bend = exact(np.zeros(count)), np.zeros((2, count, width)), np.zeros((width, width))
+    for bound, mu, limit in zip(model.bounds, weight, limits_of(model).high):
+        if mu > 0.0:
+            for column in bound.columns:
+                x = exact(z[:, column])
+                value = value + x * x * mu
+                own = x * (2.0 * mu)
+                slope[0, :, column], slope[1, :, column] = own.mid, own.rad
+                bend[column, column] = 2.0 * mu
+            value = value - exact(limit) * exact(limit) * mu
+    return value, Balls(*slope), exact(bend[None])
+
+
+def _total(a: Balls) -> Balls:
+    """Sum over the last axis."""
+    rounding = a.mid.shape[-1] * 4e-16 * np.abs(a.mid).sum(-1)
+    return Balls(a.mid.sum(-1), (a.rad.sum(-1) + rounding) * _UP)
+
+
+def shift(mid: Array, rad: Array, far: Array) -> float:
+    """Return ``sum D far^2`` for a diagonal D >= 0 with H + D positive semidefinite for every H in the ball (certified).
+
+    Infinite where none is found.  In unknowns over ``far``; rows of radii go to the diagonal (Gershgorin).
+    """
+    keep = np.flatnonzero(far > 0.0)
+    if not np.isfinite(mid).all() or not np.isfinite(rad).all():
+        return math.inf
+    scale = far[keep]
+    A = mid[np.ix_(keep, keep)] * scale[:, None] * scale
+    A = 0.5 * (A + A.T)
+    # products of three factors and the mean round; entries of both triangles hold the same true value
+    spread = (rad[np.ix_(keep, keep)] * scale[:, None] * scale) * _UP + 1e-15 * np.abs(A)
+    spread = np.maximum(spread, spread.T)
+    unit = float(np.abs(A).max(initial=0.0))
+    best = math.inf
+    for floor in (1.0, 1e-2, 1e-4, 1e-6):
+        weight = 1.0 / np.sqrt(np.maximum(np.diag(A), floor * unit) + 1e-300)
+        best = min(best, _diagonal(A - np.diag(spread @ weight / weight * _UP), unit))
+    return best
+
+
+def _diagonal(A: Array, unit: float) -> float:
+    """Return the trace of a diagonal D >= 0 with A + D positive semidefinite (certified); infinite if none is found."""
+    values, vectors = np.linalg.eigh(A)
+    least = 1e-13 * unit * len(A) + 1e-300
+    negative = np.minimum(values - 2.0 * least, 0.0)
+    D = np.abs((vectors * negative) @ vectors.T).sum(1)
+    for _ in range(4):
+        if _positive(A + np.diag(D)):
+            return float(D.sum()) * _UP
+        D = 1.5 * D + 4.0 * least
+    return math.inf
+
+
+def _positive(A: Array) -> bool:
+    """Whether a symmetric matrix is proved positive definite: the Cholesky factorisation of a smaller one ends [Rump 2006]."""
+    n = len(A)
+    eps = 2.0**-53
+    gamma = (n + 2) * eps / (1.0 - (n + 2) * eps)
+    diagonal = np.abs(np.diag(A))
+    less = 4.0 * gamma / (1.0 - gamma) * float(diagonal.sum()) + 4.0 * eps * float(diagonal.max(initial=0.0)) + 1e-290
+    try:
+        np.linalg.cholesky(A - less * np.eye(n))
+    except np.linalg.LinAlgError:
+        return False
+    return True
