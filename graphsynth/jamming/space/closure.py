@@ -38,6 +38,8 @@ def _joined(parts: list[Any]) -> Any:
     """Join floats or balls along a new last axis."""
     if any(isinstance(part, Balls) for part in parts):
         whole = [part if isinstance(part, Balls) else exact(part) for part in parts]
+        if all(part.mid.shape == whole[0].mid.shape for part in whole):
+            return stack(whole)
         shape = np.broadcast_shapes(*(part.mid.shape for part in whole))
         return stack([Balls(np.broadcast_to(part.mid, shape), np.broadcast_to(part.rad, shape)) for part in whole])
     return np.stack(np.broadcast_arrays(*parts), -1)
@@ -48,6 +50,8 @@ def times(A: Any, B: Any) -> Any:
     if not isinstance(A, Balls) and not isinstance(B, Balls):
         return A @ B
     A, B = (part if isinstance(part, Balls) else exact(part) for part in (A, B))
+    while B.mid.ndim < A.mid.ndim:  # it would be taken for vectors
+        B = B[None]
     return A.times(B)
 
 

@@ -12,7 +12,6 @@ the plane across the axis.  The angle between both axes is the tilt.  See theory
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -22,12 +21,11 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval, cos, sin, tan
-from graphsynth.jamming.joints.limits import JointLimits, Limits, Misalignment
+from graphsynth.jamming.joints.limits import Limits, Misalignment, bounds
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
 
 if TYPE_CHECKING:
-    from graphsynth.jamming.bearing.bearing import Condition
-    from graphsynth.jamming.joints.program import Bearings
+    from graphsynth.jamming.joints.program import JointProblem
     from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
@@ -89,6 +87,7 @@ class Bound(NamedTuple):
     columns: tuple[int, ...]
     limit: float
     angular: bool
+    box: tuple[float, float]
 
     def chart(self, scale: float) -> float:
         """Return the limit in the chart at a common factor on all limits, in floats."""
@@ -102,8 +101,9 @@ class Bound(NamedTuple):
 
     @property
     def enclosed(self) -> Interval:
-        """The limit in the chart, enclosed."""
-        return 2 * tan(Interval(self.limit) / 2) if self.angular else Interval(self.limit)
+        """The limit in the chart, enclosed over its tolerance box."""
+        limit = Interval.from_bounds(*self.box)
+        return 2 * tan(limit / 2) if self.angular else limit
 
 
 class Step(NamedTuple):
@@ -149,14 +149,14 @@ class SpaceModel:
         """Numbers of the unknowns."""
         found, count = np.full((len(self.joints), 6), -1), 0
         for k, joint in enumerate(self.joints):
-            tilts = [getattr(joint.limits, name) > 0.0 for name in joint.limits.tilts]
+            tilts = [bounds(joint.limits, name)[1] > 0.0 for name in joint.limits.tilts]
             sizes = {
                 TURN: joint.turns and not (joint.driven and not joint.guide),
                 TILT_X: tilts[0],
                 TILT_Y: tilts[-1],
                 SHIFT_X: (joint.guide and not joint.driven) or joint.radial > 0.0,
                 SHIFT_Y: joint.radial > 0.0,
-                SLIDE: joint.limits.axial_clearance > 0.0,
+                SLIDE: bounds(joint.limits, "axial_clearance")[1] > 0.0,
             }
             for place, wanted in sizes.items():
                 if wanted:
@@ -184,15 +184,23 @@ class SpaceModel:
             columns = [int(c) for c in self.column[k]]
             for place, name in enumerate(joint.limits.tilts):
                 own = columns[TILT_X:SHIFT_X] if len(joint.limits.tilts) == 1 else [columns[TILT_X + place]]
-                limit = getattr(joint.limits, name)
-                if 0.0 < limit < _FREE:
-                    found.append(Bound(k, name, tuple(own), limit, True))
+                box = bounds(joint.limits, name)
+                if 0.0 < box[1] < _FREE:
+                    found.append(Bound(k, name, tuple(own), getattr(joint.limits, name), True, box))
             if joint.radial > 0.0 and not joint.guide:
-                found.append(Bound(k, "shift", tuple(columns[SHIFT_X:SLIDE]), joint.radial / self.unit, False))
-            if 0.0 < joint.limits.axial_clearance < math.inf:
-                slide = joint.limits.axial_clearance / self.unit
-                found.append(Bound(k, "play", (columns[SLIDE],), slide, False))
+                size = joint.radial / self.unit
+                found.append(Bound(k, "shift", tuple(columns[SHIFT_X:SLIDE]), size, False, (size, size)))
+            low, high = (end / self.unit for end in bounds(joint.limits, "axial_clearance"))
+            if 0.0 < high < math.inf:
+                size = joint.limits.axial_clearance / self.unit
+                found.append(Bound(k, "play", (columns[SLIDE],), size, False, (low, high)))
         return tuple(found)
+
+    @cached_property
+    def limit_bounds(self) -> Array:
+        """Lower and upper ends of all limits in the chart, (2, bounds)."""
+        both = [bound.enclosed for bound in self.bounds]
+        return np.array([[float(b.lo) for b in both], [float(b.hi) for b in both]])
 
     @cached_property
     def seats(self) -> list[tuple[tuple[Interval, Interval], tuple[Interval, Interval]]]:
@@ -258,7 +266,7 @@ class SpaceModel:
 
 def _is_flat(joint: SpaceJoint) -> bool:
     """Whether both links always move in one plane: no tilt, no slide, seats in the plane."""
-    rigid = max(getattr(joint.limits, name) for name in joint.limits.tilts) == joint.limits.axial_clearance == 0.0
+    rigid = all(bounds(joint.limits, name)[1] == 0.0 for name in (*joint.limits.tilts, "axial_clearance"))
     level = all(s.point[2] == s.turn[0] == s.turn[1] == 0.0 for s in (joint.seat_a, joint.seat_b))
     return rigid and level
 
@@ -291,19 +299,12 @@ def rotation(vector: Interval) -> Interval:
     return Interval.stack(rows)
 
 
-def in_space(
-    mechanism: Mechanism,
-    bearings: Bearings,
-    tilts: Misalignment | Iterable[Misalignment],
-    condition: Condition = "A",
-) -> SpaceModel:
-    """Put a plane mechanism with limits and misaligned axes into space; arguments as for `assess_coupled`.
+def in_space(given: JointProblem) -> SpaceModel:
+    """Put a plane mechanism with limits and misaligned axes into space.
 
-    Raises `Unsupported` for gears, cams and driven slots, `GeometryError` for limits that do not fit the mechanism.
+    Raises `Unsupported` for gears, cams and driven slots.
     """
-    from graphsynth.jamming.joints.program import problem
-
-    given = problem(mechanism, bearings, tilts, condition)
+    mechanism = given.mechanism
     by_pair = {tilt.pair: tilt for tilt in given.misalignments}
     driven = {driver.pair for driver in mechanism.drivers}
     joints = []
@@ -319,7 +320,8 @@ def in_space(
             own = tilt if tilt is not None and tilt.base == link else None
             seats.append(_plane_seat(at, getattr(joint, angle, 0.0), own))
         own_driven = joint.pair in driven
-        joints.append(SpaceJoint(joint.a, joint.b, *seats, limits, 0.0, own_driven, guide, not isinstance(joint, Prismatic)))
+        turns = not isinstance(joint, Prismatic)
+        joints.append(SpaceJoint(joint.a, joint.b, *seats, limits, 0.0, own_driven, guide, turns))
     return SpaceModel(tuple(joints), mechanism.graph.links, mechanism.frame)
 
 
@@ -329,7 +331,9 @@ def _plane_seat(at: tuple[float, float], angle: float, tilt: Misalignment | None
         return Seat((*at, 0.0), (0.0, 0.0, angle))
     if angle != 0.0:
         raise Unsupported("a misaligned guide whose direction is turned is not described in space; use small tilts")
-    alpha, direction = Interval(tilt.alpha), Interval(tilt.direction)
+    alpha, direction = (Interval.from_bounds(*bounds(tilt, name)) for name in ("alpha", "direction"))
+    if alpha.contains(0.0) and tilt.alpha_range != (0.0, 0.0):
+        raise Unsupported("a range of misalignments around zero has no single direction; use small tilts")
     box = Interval.stack([alpha * cos(direction), alpha * sin(direction), Interval(0)])
     return Seat((*at, 0.0), tuple(box.mid.tolist()), box)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,12 +13,11 @@ from graphsynth.intervals import check_rounding
 from graphsynth.jamming.space.closure import Closure
 from graphsynth.jamming.space.model import SpaceModel
 from graphsynth.jamming.space.optimum import Optimum, least_scale
-from graphsynth.jamming.space.proof import Box, Certificate, branch_box, certificate, closes, contract, lower_bounds
+from graphsynth.jamming.space.proof import Box, Certificate, branch_box, certificates, closes, contract, lower_bounds
 
 Array = NDArray[np.float64]
 #: Half width of the box of a branch in unlimited turns (radians) and travels (units), from the largest.
-REACHES = (0.1, 0.05, 0.02, 0.01)
-_SIGMAS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+REACHES = (0.1, 0.03, 0.01)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,49 +33,85 @@ class PoseProof:
     reach: float
     boxes: int
     reason: str
-    optimum: Optimum
+    optimum: Optimum | None = None
+
+    @classmethod
+    def unknown(cls, reason: str) -> PoseProof:
+        """Nothing is proved."""
+        return cls(0, math.nan, 0.0, 0, reason)
 
 
-def prove_pose(model: SpaceModel, q: Array, *, boxes: int = 2000) -> PoseProof:
-    """Prove whether a mechanism closes within its limits near a start q (width,), whose given coordinates stay."""
+def prove_pose(model: SpaceModel, q: Array, *, given: Array | None = None, boxes: int = 300) -> PoseProof:
+    """Prove whether a mechanism closes within its limits near a reference (certified).
+
+    Parameters
+    ----------
+    model : SpaceModel
+    q : ndarray, shape (width,)
+        Reference: unknowns and given coordinates, as of a plane pose (`start`).
+    given : ndarray, shape (drivers,), optional
+        Half widths of a box of the given coordinates; what is proved holds for all of it.
+    boxes : int
+        Boxes into which the unknowns are cut at most.
+
+    Returns
+    -------
+    PoseProof
+        +1: a closure within all limits for each of the given coordinates.  -1: for none of them a closure within the
+        limits whose unlimited turns and travels lie within ``reach`` of the reference.
+    """
     check_rounding()
-    floats, exact = Closure(model, False), Closure(model, True)
+    floats, enclosed = Closure(model, False), Closure(model, True)
+    given = np.zeros(model.width - model.size) if given is None else given
     found = least_scale(floats, q)
     if found.scale < 1.0 and found.missed < 1e-9:
-        if closes(exact, found.q, np.zeros((model.size, model.width - model.size)), np.zeros(model.width - model.size)):
-            return PoseProof(1, found.scale, np.inf, 0, "closes within all limits, proved", found)
-        return PoseProof(0, found.scale, 0.0, 0, "closes in floating point, but the closure is not proved", found)
-    given = np.zeros(model.width - model.size)
-    starts = [(reach, *contract(exact, branch_box(model, q, reach, given))) for reach in REACHES]
-    used = len(starts)
-    tried = []
-    for reach, box, empty in starts:  # first without cuts, from the largest box
-        proofs = [certificate(exact, found, box, sigma) for sigma in _SIGMAS]
-        bound = lower_bounds(exact, proofs, box)[:, 0]
+        free = closes(enclosed, found.q, _rates(floats, found.q), given)
+        reason = "closes within all limits" if free else "a closure is found, but not proved"
+        return PoseProof(int(free), found.scale, math.inf, 0, reason, found)
+    tried, rate = [], _rates(floats, q, free=True)
+    for used, reach in enumerate(REACHES, 1):  # first without cuts, from the largest box
+        box, empty = contract(enclosed, branch_box(model, q, reach, given, rate))
+        proofs = certificates(floats, found, box)
+        bound = lower_bounds(enclosed, proofs, box)[:, 0]
         if empty[0] or bound.max() > 0.0:
-            return PoseProof(-1, found.scale, reach, used, "does not close within the limits, proved", found)
-        tried.append((bound.max(), reach, box, proofs[int(bound.argmax())]))
-    for _, reach, box, proof in sorted(tried, key=lambda one: -one[0])[:1]:
-        done, own = _cut(exact, proof, box, boxes - used)
-        used += own
-        if done:
-            return PoseProof(-1, found.scale, reach, used, "does not close within the limits, proved", found)
-    return PoseProof(0, found.scale, 0.0, used, "neither a closure nor its absence is proved", found)
+            return PoseProof(-1, found.scale, reach, used, "does not close within the limits", found)
+        tried.append((float(bound.max()), reach, box, proofs[int(bound.argmax())]))
+    _, reach, box, proof = max(tried, key=lambda one: one[0])
+    done, used = _cut(enclosed, proof, box, boxes)
+    if done:
+        return PoseProof(-1, found.scale, reach, used, "does not close within the limits", found)
+    return PoseProof(0, found.scale, reach, used, "neither a closure nor its absence is proved", found)
 
 
-def _cut(exact: Closure, proof: Certificate, first: Box, most: int) -> tuple[bool, int]:
+def _rates(floats: Closure, q: Array, free: bool = False) -> Array:
+    """Change of the unknowns with the given coordinates, the least by what their limits leave, (size, drivers).
+
+    With ``free`` only of unknowns without limits.
+    """
+    model = floats.model
+    J = floats.jacobian(floats.loops(q[None]))[0]
+    room = np.ones(model.size)
+    for bound in model.bounds:
+        columns = list(bound.columns)
+        left = bound.chart(1.0) - float(np.linalg.norm(q[columns]))
+        room[columns] = 0.0 if free else min(1.0, max(left, 1e-9))
+    first = J[:, : model.size] * room
+    return np.asarray(-room[:, None] * (np.linalg.pinv(first, rcond=1e-11) @ J[:, model.size :]))
+
+
+def _cut(enclosed: Closure, proof: Certificate, first: Box, most: int) -> tuple[bool, int]:
     """Whether no member of a box closes within the limits, by cutting it; and the boxes looked at."""
     used, live = 1, first
     while len(live.low):
         if used + 2 * len(live.low) > most:
             return False, used
-        live = _halved(live, first, exact.model.size)
+        live = _halved(live, first, enclosed.model.size)
         used += len(live.low)
-        live, empty = contract(exact, live)
-        live = Box(live.low[~empty], live.high[~empty])
+        live, empty = contract(enclosed, live)
+        live = live.take(~empty)
         if len(live.low):
-            left = ~(lower_bounds(exact, [proof], live)[0] > 0.0)
-            live = Box(live.low[left], live.high[left])
+            left = ~(lower_bounds(enclosed, [proof], live)[0] > 0.0)
+            live = live.take(left)
     return True, used
 
 
@@ -86,7 +122,7 @@ def _halved(boxes: Box, first: Box, size: int) -> Box:
     middle = 0.5 * (boxes.low + boxes.high)[rows, side]
     high, low = boxes.high.copy(), boxes.low.copy()
     high[rows, side] = low[rows, side] = middle
-    return Box(np.concatenate([boxes.low, low]), np.concatenate([high, boxes.high]))
+    return boxes._replace(low=np.concatenate([boxes.low, low]), high=np.concatenate([high, boxes.high]))
 
 
 def summary(proof: PoseProof) -> dict[str, Any]:

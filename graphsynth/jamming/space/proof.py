@@ -32,19 +32,8 @@ _UP = 1.0 + 1e-12
 _FREE_STEPS = 6
 _CONTRACTIONS = 8
 _GAIN = 0.9
-
-
-class Enclosed(NamedTuple):
-    """Limits in the chart, enclosed: ``low``, ``high`` (bounds,)."""
-
-    low: Array
-    high: Array
-
-
-def limits_of(model: SpaceModel) -> Enclosed:
-    """Enclose all limits."""
-    both = [bound.enclosed for bound in model.bounds]
-    return Enclosed(np.array([float(b.lo) for b in both]), np.array([float(b.hi) for b in both]))
+#: Curvature given to unknowns without a loaded limit, in parts of that of the loaded ones.
+_PARTS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 
 def closes(closure: Closure, at: Array, rate: Array, given: Array) -> bool:
@@ -54,31 +43,31 @@ def closes(closure: Closure, at: Array, rate: Array, given: Array) -> bool:
     (drivers,) are the half widths of the box; ``rate`` (size, drivers) the change of the unknowns.
     """
     model = closure.model
-    n = model.size
-    if not closure.rows:
-        return _within(model, at[:n], np.zeros(n))
-    basic = _basic(closure, at)
+    basic = _basic(closure, at) if closure.rows else np.zeros(0, dtype=np.intp)
     if len(basic) < len(closure.rows):
         return False
-    other = np.setdiff1d(np.arange(n), basic)
-    radius = np.concatenate([np.abs(rate) @ given, given]) * _UP
-    middle = exact(at[None])
-    value = closure.values(closure.loops(middle))
-    point = closure.jacobian(closure.loops(middle))
-    inverse = np.linalg.pinv(point.mid[0][:, basic])
-    # columns of the given coordinates along the chosen motion
-    reach = np.abs(inverse @ value.mid[0]) * 4.0 + 1e-15
+    along = np.concatenate([rate, np.eye(len(given))])
+    still = (np.abs(along) @ given) * _UP
+    if not closure.rows:
+        return _within(model, at, still)
+    loops = closure.loops(exact(at[None]))
+    value, J = closure.values(loops), closure.jacobian(loops)
+    inverse = exact(np.linalg.pinv(J.mid[:, :, basic]))
+    start = times(inverse, value[..., None])[0, :, 0].size
+    start = start + times(inverse, times(J, exact(along[None])))[0].size @ given
+    rest = (exact(np.eye(len(basic))) - times(inverse, J[:, :, basic])[0]).size
+    reach = 2.0 * start + 1e-15
     for _ in range(_FREE_STEPS):
-        whole = radius.copy()
+        whole = still.copy()
         whole[basic] += reach
-        J = closure.jacobian(closure.loops(Balls(at[None], whole[None])))
-        along = times(J[:, :, :n], exact(rate[None])) + J[:, :, n:]
-        start = times(exact(inverse[None]), value[..., None])[..., 0].size[0]
-        start = start + times(exact(inverse[None]), along).size[0] @ given
-        rest = (exact(np.eye(len(basic))[None]) - times(exact(inverse[None]), J[:, :, basic])).size[0]
-        image = (start + rest @ reach) * _UP
+        H = closure.hessian(closure.loops(Balls(at[None], whole[None])), inverse)[0]
+        turned = times(H, exact(along[None]))
+        bend = (times(exact(along.T[None]), turned).size @ given) @ given  # of the given coordinates alone
+        bend = bend + 2.0 * (turned.size[:, basic] @ given) @ reach
+        bend = bend + ((H.size[:, basic][:, :, basic]) @ reach) @ reach
+        image = (start + rest @ reach + 0.5 * bend) * _UP
         if (image < reach).all():
-            return _identity(closure, at, whole) and _within(model, at[:n], whole[:n], other)
+            return _identity(closure, at, whole) and _within(model, at, whole)
         reach = np.maximum(1.5 * image, reach) + 1e-300
         if not np.isfinite(reach).all() or reach.max() > 1.0:
             return False
@@ -88,26 +77,26 @@ def closes(closure: Closure, at: Array, rate: Array, given: Array) -> bool:
 def _basic(closure: Closure, at: Array) -> Ints:
     """Unknowns to solve for: as many as equations, those with most room in their limits first."""
     model = closure.model
-    J = closure.jacobian(closure.loops(at[None])).astype(np.float64)[0][:, : model.size] if not closure.exact else (
-        closure.jacobian(closure.loops(exact(at[None]))).mid[0][:, : model.size]
-    )
     room = np.ones(model.size)
     for bound in model.bounds:
         columns = list(bound.columns)
         left = bound.chart(1.0) - float(np.linalg.norm(at[columns]))
         room[columns] = min(1.0, max(left, 1e-12))
-    if not len(J):
-        return np.zeros(0, dtype=np.intp)
-    _, upper, order = qr(J * room, mode="economic", pivoting=True)
-    size = np.abs(np.diag(upper))
-    rank = int((size > 1e-11 * size.max(initial=0.0)).sum())
-    return np.asarray(np.sort(order[: min(rank, len(J))]))
+    return _pivots(closure, at, room)
 
 
-def _within(model: SpaceModel, at: Array, radius: Array, _other: Ints | None = None) -> bool:
+def _pivots(closure: Closure, at: Array, weight: Array) -> Ints:
+    """Independent columns of the derivative at a point, the largest by weight first."""
+    J = closure.jacobian(closure.loops(exact(at[None]))).mid[0][:, : closure.model.size]
+    _, upper, order = qr(J * weight, mode="economic", pivoting=True)
+    diagonal = np.abs(np.diag(upper))
+    rank = int((diagonal > 1e-11 * diagonal.max(initial=0.0)).sum())
+    return np.asarray(np.sort(order[:rank]))
+
+
+def _within(model: SpaceModel, at: Array, radius: Array) -> bool:
     """Whether all unknowns within a box obey their limits."""
-    low = limits_of(model).low
-    for bound, limit in zip(model.bounds, low):
+    for bound, limit in zip(model.bounds, model.limit_bounds[0]):
         columns = list(bound.columns)
         size = (np.abs(at[columns]) + radius[columns]) * _UP
         if not math.sqrt(float((size**2).sum())) * _UP < limit:
@@ -125,29 +114,43 @@ def _identity(closure: Closure, at: Array, radius: Array) -> bool:
 
 
 class Box(NamedTuple):
-    """Boxes of all coordinates: bounds (N, width)."""
+    """Boxes of coordinates y, bounds (N, width), with ``q = origin + shear y``: unknowns that follow the given ones."""
 
     low: Array
     high: Array
+    origin: Array
+    shear: Array
 
     @property
     def ball(self) -> Balls:
-        """Balls around the boxes."""
+        """Balls around the boxes of y."""
         middle = 0.5 * self.low + 0.5 * self.high
         return Balls(middle, np.maximum(self.high - middle, middle - self.low) * _UP + 1e-300)
 
+    def unknowns(self, y: Balls) -> Balls:
+        """Coordinates q of some y (N, width)."""
+        return exact(self.origin) + times(exact(self.shear), y[..., None])[..., 0]
 
-def branch_box(model: SpaceModel, reference: Array, reach: float, given: Array) -> Box:
-    """Box of a branch: coordinates without limit within ``reach`` of the reference, the others within their limits."""
+    def take(self, rows: NDArray[np.bool_]) -> Box:
+        """Some of the boxes."""
+        return self._replace(low=self.low[rows], high=self.high[rows])
+
+
+def branch_box(model: SpaceModel, reference: Array, reach: float, given: Array, rate: Array) -> Box:
+    """Box of a branch: coordinates without limit within ``reach`` of the reference, the others within their limits.
+
+    The former move by ``rate`` (size, drivers) with the given coordinates.
+    """
     radius = np.full(model.width, reach)
-    middle = reference.copy()
+    origin, shear = reference.copy(), np.eye(model.width)
+    shear[: model.size, model.size :] = rate
     radius[model.size :] = given
-    for bound, high in zip(model.bounds, limits_of(model).high):
-        middle[list(bound.columns)] = 0.0
-        radius[list(bound.columns)] = high
-    low, high_ends = middle - radius * _UP, middle + radius * _UP
-    low[model.size :], high_ends[model.size :] = (reference - radius)[model.size :], (reference + radius)[model.size :]
-    return Box(low[None], high_ends[None])
+    for bound, high in zip(model.bounds, model.limit_bounds[1]):
+        columns = list(bound.columns)
+        origin[columns] = 0.0
+        radius[columns] = high
+        shear[columns, model.size :] = 0.0
+    return Box(-radius[None], radius[None], origin, shear)
 
 
 def contract(closure: Closure, box: Box) -> tuple[Box, NDArray[np.bool_]]:
@@ -158,12 +161,14 @@ def contract(closure: Closure, box: Box) -> tuple[Box, NDArray[np.bool_]]:
     """
     low, high = box.low.copy(), box.high.copy()
     empty = np.zeros(len(low), dtype=bool)
-    basic = _chosen(closure, box)
+    ball = box.ball
+    weight = np.maximum(ball.rad[0], 1e-300)[: closure.model.size]
+    basic = _pivots(closure, box.unknowns(exact(ball.mid)).mid[0], weight)
     for _ in range(_CONTRACTIONS):
         live = np.flatnonzero(~empty)
         before = (high - low)[live]
         for part in np.array_split(live, 1 + len(live) // 64):
-            down, up = _solved(closure, Box(low[part], high[part]), basic)
+            down, up = _solved(closure, box._replace(low=low[part], high=high[part]), basic)
             rows = np.ix_(part, basic)
             low[rows], high[rows] = np.maximum(low[rows], down), np.minimum(high[rows], up)
             empty[part] = (low[part] > high[part]).any(1)
@@ -171,25 +176,14 @@ def contract(closure: Closure, box: Box) -> tuple[Box, NDArray[np.bool_]]:
         after = np.where(empty[live, None], before, (high - low)[live])
         if empty.all() or not (after[wide] < _GAIN * before[wide]).any():
             break
-    return Box(low, high), empty
-
-
-def _chosen(closure: Closure, box: Box) -> Ints:
-    """Unknowns to solve for: as many as equations, the widest first."""
-    ball = box.ball
-    J = closure.jacobian(closure.loops(exact(ball.mid[:1]))).mid[0][:, : closure.model.size]
-    weight = np.where(ball.rad[0] > 0.0, ball.rad[0], 1e-300)[: closure.model.size]
-    _, upper, order = qr(J * weight, mode="economic", pivoting=True)
-    diagonal = np.abs(np.diag(upper))
-    rank = int((diagonal > 1e-9 * diagonal.max(initial=0.0)).sum())
-    return np.asarray(np.sort(order[:rank]))
+    return box._replace(low=low, high=high), empty
 
 
 def _solved(closure: Closure, box: Box, basic: Ints) -> tuple[Array, Array]:
     """Bounds of the chosen unknowns, (N, chosen) twice."""
-    ball = box.ball
-    loops = closure.loops(exact(ball.mid))
-    value, J = closure.values(loops), closure.jacobian(loops)
+    ball, shear = box.ball, exact(box.shear)
+    loops = closure.loops(box.unknowns(exact(ball.mid)))
+    value, J = closure.values(loops), times(closure.jacobian(loops), shear)
     inverse = exact(np.linalg.pinv(J.mid[:, :, basic]))
     offset = times(inverse, value[..., None])[..., 0]
     M = times(inverse, J)
@@ -197,9 +191,10 @@ def _solved(closure: Closure, box: Box, basic: Ints) -> tuple[Array, Array]:
     unit = np.zeros(M.mid.shape)
     unit[:, each, basic] = 1.0
     rest = (M - exact(unit)).size
-    H = closure.hessian(closure.loops(ball), inverse).size
+    H = closure.hessian(closure.loops(box.unknowns(ball)), inverse)
+    size = times(swapped(shear), times(H, shear)).size
     radius = ball.rad
-    second = 0.5 * ((H @ radius[:, None, :, None])[..., 0] * radius[:, None, :]).sum(-1)
+    second = 0.5 * ((size @ radius[:, None, :, None])[..., 0] * radius[:, None, :]).sum(-1)
     spread = ((rest @ radius[:, :, None])[..., 0] + second + offset.rad) * _UP
     centre = ball.mid[:, basic] - offset.mid
     spread = spread * _UP + 1e-15 * (np.abs(centre) + np.abs(ball.mid[:, basic]) + spread)
@@ -215,30 +210,28 @@ class Certificate(NamedTuple):
     weight: Array
 
 
-def certificate(closure: Closure, found: Optimum, box: Box, sigma: float) -> Certificate:
-    """Choose multipliers from an optimum; any choice is valid, this one makes L convex near it (estimated).
+def certificates(floats: Closure, found: Optimum, box: Box) -> list[Certificate]:
+    """Choose multipliers from an optimum; any choice is valid, these make L convex near it (estimated).
 
-    Loaded limits curve L upward in their own unknowns.  For the others K = S J adds J' S J, which is sigma times the
-    identity in them, measured by the half widths of the box.
+    Loaded limits curve L upward in their own unknowns.  For the others K = S J adds J' S J, which is a small part of
+    that curvature in them, measured by the half widths of the box.
     """
-    model = closure.model
+    model = floats.model
     radius = 0.5 * (box.high - box.low)[0]
-    J = closure.jacobian(closure.loops(exact(found.q[None]))).mid[0]
+    loops = floats.loops(found.q[None])
+    J, H = floats.jacobian(loops)[0], np.abs(floats.hessian(loops, found.by[None])[0])
     idle = np.arange(model.width) < model.size
-    H = np.abs(closure.hessian(closure.loops(exact(found.q[None])), exact(found.by[None])).mid[0])
-    coupled = (H * radius).sum(1) * radius
     top = 0.0
     for bound, mu in zip(model.bounds, found.weight):
         columns = list(bound.columns)
-        own = 2.0 * mu * radius[columns] ** 2
-        top = max(top, float(own.max()))
+        top = max(top, float((2.0 * mu * radius[columns] ** 2).max()))
         idle[columns] = mu <= 1e-9 * found.weight.max()
-    idle &= coupled > 1e-9 * top
-    active = _active(closure, found)
+    idle &= (H * radius).sum(1) * radius > 1e-9 * top
+    active = _active(floats, found)
     inverse = np.linalg.pinv(J[np.ix_(active, np.flatnonzero(idle))] * radius[idle], rcond=3e-2)
     K = np.zeros_like(J)
-    K[active] = 0.5 * sigma * (top or 1.0) * (inverse.T @ inverse) @ J[active]
-    return Certificate(found.q, found.by, K, found.weight)
+    K[active] = 0.5 * (top or 1.0) * (inverse.T @ inverse) @ J[active]
+    return [Certificate(found.q, found.by, part * K, found.weight) for part in _PARTS]
 
 
 def _active(closure: Closure, found: Optimum) -> Ints:
@@ -253,39 +246,42 @@ def lower_bounds(closure: Closure, proofs: list[Certificate], box: Box) -> Array
 
     All proofs have the same multipliers but for K.
     """
-    ball = box.ball
-    z = np.clip(proofs[0].at, box.low, box.high)
-    count = len(z)
-    by, at = exact(np.repeat(proofs[0].by[None], count, 0)), exact(proofs[0].at[None])
-    loops, wide = closure.loops(exact(z)), closure.loops(ball)
+    ball, shear = box.ball, exact(box.shear)
+    at = exact(proofs[0].at[None])
+    z = np.clip(np.linalg.solve(box.shear, proofs[0].at - box.origin), box.low, box.high)
+    by = exact(np.repeat(proofs[0].by[None], len(z), 0))
+    near, far = box.unknowns(exact(z)), box.unknowns(ball)
+    loops, wide = closure.loops(near), closure.loops(far)
     g, J, everywhere = closure.values(loops), closure.jacobian(loops), closure.jacobian(wide)
-    weighed = _weighed(closure.model, proofs[0].weight, z)
+    weighed = _weighed(closure.model, proofs[0].weight, near)
     below, above = box.low - z, box.high - z
-    far = np.maximum(-below, above) * _UP
+    reach = np.maximum(-below, above) * _UP
     found = []
     for proof in proofs:
         K = exact(proof.K[None])
-        own = by + times(K, (exact(z) - at)[..., None])[..., 0]
+        own = by + times(K, (near - at)[..., None])[..., 0]
         value = _total(own * g) + weighed[0]
         slope = times(swapped(J), own[..., None])[..., 0] + times(swapped(K), g[..., None])[..., 0] + weighed[1]
+        slope = times(swapped(shear), slope[..., None])[..., 0]
         product = times(swapped(K), everywhere)
-        H = closure.hessian(wide, by + times(K, (ball - at)[..., None])[..., 0]) + product + swapped(product) + weighed[2]
+        H = closure.hessian(wide, by + times(K, (far - at)[..., None])[..., 0]) + product + swapped(product) + weighed[2]
+        H = times(swapped(shear), times(H, shear))
         ends = [(slope.mid + sign * slope.rad) * side for sign in (-1.0, 1.0) for side in (below, above)]
         first = np.minimum(np.min(ends, axis=0), 0.0).sum(-1)
-        second = np.array([shift(*part) for part in zip(H.mid, H.rad, far)])
+        second = np.array([shift(*part) for part in zip(H.mid, H.rad, reach)])
         least = value.mid - value.rad * _UP + first * _UP - 0.5 * second * _UP
         found.append(least - 1e-15 * (np.abs(value.mid) - first + second))
     return np.array(found)
 
 
-def _weighed(model: SpaceModel, weight: Array, z: Array) -> tuple[Balls, Balls, Balls]:
+def _weighed(model: SpaceModel, weight: Array, q: Balls) -> tuple[Balls, Balls, Balls]:
     """Return ``sum weight (|x|^2 - limit^2)`` at points (N, width) with first and second derivatives."""
-    count, width = z.shape
+    count, width = q.mid.shape
     value, slope, bend = exact(np.zeros(count)), np.zeros((2, count, width)), np.zeros((width, width))
-    for bound, mu, limit in zip(model.bounds, weight, limits_of(model).high):
+    for bound, mu, limit in zip(model.bounds, weight, model.limit_bounds[1]):
         if mu > 0.0:
             for column in bound.columns:
-                x = exact(z[:, column])
+                x = q[:, column]
                 value = value + x * x * mu
                 own = x * (2.0 * mu)
                 slope[0, :, column], slope[1, :, column] = own.mid, own.rad
