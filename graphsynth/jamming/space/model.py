@@ -203,6 +203,28 @@ class SpaceModel:
         return np.array([[float(b.lo) for b in both], [float(b.hi) for b in both]])
 
     @cached_property
+    def leans(self) -> Array:
+        """Upper bounds of the tilt of every joint in the chart, (joints,): its limit, or what the links' axes leave.
+
+        The axis of a link is at most so far from that of the frame as the tilts and misalignments on any way from the
+        frame add up to.
+        """
+        tilt, seat = np.full(len(self.joints), math.inf), np.zeros(len(self.joints))
+        for k, joint in enumerate(self.joints):
+            tilt[k] = math.hypot(*(bounds(joint.limits, name)[1] for name in joint.limits.tilts))
+            for own in (joint.seat_a, joint.seat_b):
+                turn = own.turn[:2] if own.turn_box is None else own.turn_box.mag[:2].tolist()
+                seat[k] += math.hypot(*own.turn) if own.turn[2] != 0.0 and any(own.turn[:2]) else math.hypot(*turn)
+        link = np.full(self.links, math.inf)
+        link[self.frame] = 0.0
+        for _ in range(self.links):
+            for k, joint in enumerate(self.joints):
+                for here, there in ((joint.a, joint.b), (joint.b, joint.a)):
+                    link[there] = min(link[there], link[here] + tilt[k] + seat[k])
+        between = np.array([link[j.a] + link[j.b] for j in self.joints]) + seat
+        return np.asarray(2.0 * np.tan(0.5 * np.minimum(np.minimum(tilt, between) * (1.0 + 1e-12), _FREE)))
+
+    @cached_property
     def seats(self) -> list[tuple[tuple[Interval, Interval], tuple[Interval, Interval]]]:
         """Enclosed rotation (3, 3) and place (3,) of both seats of every joint, lengths in units."""
         return [(self._seat(joint.seat_a), self._seat(joint.seat_b)) for joint in self.joints]

@@ -123,7 +123,7 @@ def _left_null(A: Array) -> Array:
 def _cone(blocks: Array, work: Array) -> tuple[float, Array, Array]:
     """Least T, tilts over their radii (bounds, 2), and multipliers: ``sum M_b' x_b + work = 0``, ``|x_b| <= T``."""
     count, k = len(blocks), len(work)
-    stacked = blocks.reshape(-1, k)
+    stacked = blocks.reshape(2 * count, k)
     unit = float(np.abs(stacked).max(initial=0.0))
     size = float(np.linalg.norm(work))
     if size <= 1e-15 * max(unit, 1e-3):
@@ -171,14 +171,14 @@ def _polished(closure: Closure, found: Optimum) -> Optimum:
     state = found
     for _ in range(6):
         matrix, right = _conditions(closure, state, loaded)
-        size = float(np.abs(right).max())
+        n, m = closure.model.size, len(state.by)
+        size = max(float(np.abs(right[:n]).max()) / max(1.0, np.abs(state.by).max()), float(np.abs(right[n:]).max()))
         if not size < least:
             break
         best, least = state, size
         if size < 1e-15:
             break
         step = np.linalg.lstsq(matrix, -right, rcond=1e-12)[0]
-        n, m = closure.model.size, len(state.by)
         weight = state.weight.copy()
         weight[loaded] += step[n + m : -1]
         q, by = state.q.copy(), state.by + step[n : n + m]
@@ -187,7 +187,7 @@ def _polished(closure: Closure, found: Optimum) -> Optimum:
         state = Optimum(state.scale + float(step[-1]), q, by, weight, missed, state.converged)
         if not (state.scale > 0.0 and np.abs(step[:n]).max() < 0.1):
             break
-    return best if (best.weight >= 0.0).all() else found
+    return best if (best.weight >= 0.0).all() and best.missed <= max(found.missed, 1e-12) else found
 
 
 def _conditions(closure: Closure, at: Optimum, loaded: list[int]) -> tuple[Array, Array]:

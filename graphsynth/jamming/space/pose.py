@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals import check_rounding
 from graphsynth.jamming.space.closure import Closure
-from graphsynth.jamming.space.model import SpaceModel
+from graphsynth.jamming.space.model import SHIFT_X, TURN, SpaceModel
 from graphsynth.jamming.space.optimum import Optimum, least_scale
 from graphsynth.jamming.space.proof import Box, Certificate, branch_box, certificates, closes, contract, lower_bounds
 
@@ -25,23 +24,24 @@ class PoseProof:
     """What is proved about one pose.
 
     ``state``: +1 free, -1 jammed, 0 undecided.  ``scale``: least factor on all limits (estimated).  ``reach``: a jam is
-    proved for all closures whose unlimited turns (radians) and travels lie within it of the reference.  ``boxes``: work.
+    proved for all closures whose unlimited turns (radians) and travels (units) lie within it of the reference.
     """
 
     state: int
     scale: float
     reach: float
-    boxes: int
     reason: str
     optimum: Optimum | None = None
 
     @classmethod
     def unknown(cls, reason: str) -> PoseProof:
         """Nothing is proved."""
-        return cls(0, math.nan, 0.0, 0, reason)
+        return cls(0, math.nan, 0.0, reason)
 
 
-def prove_pose(model: SpaceModel, q: Array, *, given: Array | None = None, boxes: int = 300) -> PoseProof:
+def prove_pose(
+    model: SpaceModel, q: Array, *, given: Array | None = None, boxes: int = 300, reaches: tuple[float, ...] = REACHES
+) -> PoseProof:
     """Prove whether a mechanism closes within its limits near a reference (certified).
 
     Parameters
@@ -52,7 +52,9 @@ def prove_pose(model: SpaceModel, q: Array, *, given: Array | None = None, boxes
     given : ndarray, shape (drivers,), optional
         Half widths of a box of the given coordinates; what is proved holds for all of it.
     boxes : int
-        Boxes into which the unknowns are cut at most.
+        Boxes into which the unknowns are cut at most; 0 for none.
+    reaches : tuple of float
+        Half widths tried for the box of a branch.
 
     Returns
     -------
@@ -67,20 +69,29 @@ def prove_pose(model: SpaceModel, q: Array, *, given: Array | None = None, boxes
     if found.scale < 1.0 and found.missed < 1e-9:
         free = closes(enclosed, found.q, _rates(floats, found.q), given)
         reason = "closes within all limits" if free else "a closure is found, but not proved"
-        return PoseProof(int(free), found.scale, math.inf, 0, reason, found)
+        return PoseProof(int(free), found.scale, math.inf, reason, found)
     tried, rate = [], _rates(floats, q, free=True)
-    for used, reach in enumerate(REACHES, 1):  # first without cuts, from the largest box
+    for reach in _reaches(model, q, found, reaches):  # first without cuts, from the largest box
         box, empty = contract(enclosed, branch_box(model, q, reach, given, rate))
         proofs = certificates(floats, found, box)
         bound = lower_bounds(enclosed, proofs, box)[:, 0]
         if empty[0] or bound.max() > 0.0:
-            return PoseProof(-1, found.scale, reach, used, "does not close within the limits", found)
+            return PoseProof(-1, found.scale, reach, "does not close within the limits", found)
         tried.append((float(bound.max()), reach, box, proofs[int(bound.argmax())]))
     _, reach, box, proof = max(tried, key=lambda one: one[0])
-    done, used = _cut(enclosed, proof, box, boxes)
-    if done:
-        return PoseProof(-1, found.scale, reach, used, "does not close within the limits", found)
-    return PoseProof(0, found.scale, reach, used, "neither a closure nor its absence is proved", found)
+    if boxes and _cut(enclosed, proof, box, boxes):
+        return PoseProof(-1, found.scale, reach, "does not close within the limits", found)
+    return PoseProof(0, found.scale, reach, "neither a closure nor its absence is proved", found)
+
+
+def _reaches(model: SpaceModel, q: Array, found: Optimum, reaches: tuple[float, ...]) -> tuple[float, ...]:
+    """Return those reaches that hold the closure found twice over, or one that does."""
+    away = 0.0
+    for joint, column in zip(model.joints, model.column):
+        for place in (TURN, *((SHIFT_X,) if joint.guide else ())):
+            if 0 <= column[place] < model.size:
+                away = max(away, abs(float(found.q[column[place]] - q[column[place]])))
+    return tuple(reach for reach in reaches if reach >= 2.0 * away) or (2.0 * away,)
 
 
 def _rates(floats: Closure, q: Array, free: bool = False) -> Array:
@@ -99,32 +110,27 @@ def _rates(floats: Closure, q: Array, free: bool = False) -> Array:
     return np.asarray(-room[:, None] * (np.linalg.pinv(first, rcond=1e-11) @ J[:, model.size :]))
 
 
-def _cut(enclosed: Closure, proof: Certificate, first: Box, most: int) -> tuple[bool, int]:
-    """Whether no member of a box closes within the limits, by cutting it; and the boxes looked at."""
+def _cut(enclosed: Closure, proof: Certificate, first: Box, most: int) -> bool:
+    """Whether no member of a box closes within the limits, by cutting it into at most so many boxes."""
     used, live = 1, first
     while len(live.low):
         if used + 2 * len(live.low) > most:
-            return False, used
-        live = _halved(live, first, enclosed.model.size)
+            return False
+        live = _halved(live, enclosed.model.size)
         used += len(live.low)
         live, empty = contract(enclosed, live)
         live = live.take(~empty)
         if len(live.low):
             left = ~(lower_bounds(enclosed, [proof], live)[0] > 0.0)
             live = live.take(left)
-    return True, used
+    return True
 
 
-def _halved(boxes: Box, first: Box, size: int) -> Box:
-    """Cut every box across its widest unknown, measured by the first box."""
-    width = (boxes.high - boxes.low)[:, :size] / np.maximum((first.high - first.low)[0, :size], 1e-300)
+def _halved(boxes: Box, size: int) -> Box:
+    """Cut every box across its widest unknown: angles and parts of the size of the mechanism count alike."""
+    width = (boxes.high - boxes.low)[:, :size]
     rows, side = np.arange(len(width)), width.argmax(1)
     middle = 0.5 * (boxes.low + boxes.high)[rows, side]
     high, low = boxes.high.copy(), boxes.low.copy()
     high[rows, side] = low[rows, side] = middle
     return boxes._replace(low=np.concatenate([boxes.low, low]), high=np.concatenate([high, boxes.high]))
-
-
-def summary(proof: PoseProof) -> dict[str, Any]:
-    """Plain values."""
-    return {name: getattr(proof, name) for name in ("state", "scale", "reach", "boxes", "reason")}

@@ -22,7 +22,7 @@ from scipy.linalg import qr
 
 from graphsynth.intervals.balls import Balls, exact
 from graphsynth.jamming.space.closure import Closure, swapped, times
-from graphsynth.jamming.space.model import SpaceModel
+from graphsynth.jamming.space.model import SLIDE, TILT_X, TILT_Y, SpaceModel
 from graphsynth.jamming.space.optimum import Optimum
 
 Array = NDArray[np.float64]
@@ -137,12 +137,18 @@ class Box(NamedTuple):
 
 
 def branch_box(model: SpaceModel, reference: Array, reach: float, given: Array, rate: Array) -> Box:
-    """Box of a branch: coordinates without limit within ``reach`` of the reference, the others within their limits.
+    """Box of a branch: turns and travels within ``reach`` of the reference, the others within their limits.
 
-    The former move by ``rate`` (size, drivers) with the given coordinates.
+    The former move by ``rate`` (size, drivers) with the given coordinates.  Tilts without a limit are only bounded by
+    the axes of the links, slides without one by half a unit.
     """
     radius = np.full(model.width, reach)
     origin, shear = reference.copy(), np.eye(model.width)
+    for column, lean in zip(model.column, model.leans):
+        for own, size in ((column[TILT_X], lean), (column[TILT_Y], lean), (column[SLIDE], 0.5)):
+            if own >= 0:
+                radius[own] = size
+                shear[own, model.size :] = 0.0
     shear[: model.size, model.size :] = rate
     radius[model.size :] = given
     for bound, high in zip(model.bounds, model.limit_bounds[1]):

@@ -26,8 +26,11 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 #: What the verdict is about.
 MODEL = "exact closure in space: every loop closes in three dimensions, with joints that turn, tilt and slide"
-#: Pieces of a full rotation at first, of any range at least; parts into which one is cut; boxes of a piece.
-_FIRST, _FEWEST, _PARTS, _BOXES = 48, 4, 3, 40
+#: Pieces of a full rotation at first, of any range at least; parts into which one is cut; half width of the
+#: branch in unlimited turns and travels.
+_FIRST, _FEWEST, _PARTS, _REACH = 96, 4, 3, 0.03
+#: Boxes into which the unknowns at a single input are cut.
+_BOXES = 300
 
 
 class _Piece(NamedTuple):
@@ -68,8 +71,8 @@ def certify_in_space(
     -------
     TurnCertificate
         Certified.  State +1: for every input of the piece there is a closure within all limits.  State -1: for none of
-        them there is one whose unlimited turns and travels lie within 0.01 (radians, units; mostly 0.03 or 0.1) of the
-        plane mechanism at the middle of the piece.  ``lower`` and ``upper`` bound the factor on all limits by 1 where
+        them there is one whose unlimited turns and travels move with the plane mechanism, within 0.03 (radians, or
+        parts of its size).  ``lower`` and ``upper`` bound the factor on all limits by 1 where
         that is proved.  `GeometryError` for limits or misalignments that do not fit the mechanism.
 
     Examples
@@ -125,9 +128,25 @@ class _Work:
             again = [p for p in pieces if p.proof.state == 0 and p.high - p.low > resolution * (self.high - self.low)]
             done += [p for p in pieces if p not in again]
             waiting = [part for piece in again for part in _cut(piece)]
-        return sorted(done, key=lambda piece: piece.low), stopped
+        done = sorted(done, key=lambda piece: piece.low)
+        if all(piece.proof.state >= 0 for piece in done):
+            done = self._with_peak(done)
+        return done, stopped
 
-    def _round(self, spans: list[tuple[float, float]], end: float) -> list[_Piece]:
+    def _with_peak(self, pieces: list[_Piece]) -> list[_Piece]:
+        """Try to prove that it binds in the middle of the undecided piece with the largest factor."""
+        open_ones = [p for p in pieces if p.proof.state == 0 and p.proof.scale > 1.0]
+        if not open_ones:
+            return pieces
+        top = max(open_ones, key=lambda piece: piece.proof.scale)
+        u = 0.5 * (top.low + top.high)
+        single = self._round([(u, u)], math.inf, _BOXES)[0]
+        if single.proof.state >= 0:
+            return pieces
+        parts = [top._replace(high=u), single, top._replace(low=u)]
+        return sorted([p for p in pieces if p is not top] + parts, key=lambda piece: (piece.low, piece.high))
+
+    def _round(self, spans: list[tuple[float, float]], end: float, boxes: int = 0) -> list[_Piece]:
         """Prove what can be proved about pieces of the input."""
         from graphsynth.kinematics.simulation import simulate
 
@@ -146,7 +165,7 @@ class _Work:
             q = start(self.model, self.motion.mechanism, found.poses[at])
             q[self.model.size :] = given.mid[k]
             self.evaluated += 1
-            pieces.append(_Piece(a, b, prove_pose(self.model, q, given=given.rad[k], boxes=_BOXES)))
+            pieces.append(_Piece(a, b, prove_pose(self.model, q, given=given.rad[k], boxes=boxes, reaches=(_REACH,))))
         return pieces
 
 
@@ -171,6 +190,9 @@ def _verdict(motion: Motion, pieces: list[_Piece], stopped: str) -> tuple[Verdic
     binding, undecided = (float(width[state == s].sum() / width.sum()) for s in (-1, 0))
     left = next((p for p in pieces if p.proof.state == 0), None)
     why = "" if left is None else f"near the input {left.low:.9g}: {stopped or left.proof.reason}"
+    if binding == 0.0 and (state == -1).any():
+        u = pieces[int(np.argmin(state))].low
+        return Verdict.CERTIFIED_JAMMED, f"binds at the input {u!r}, proved with exact closure in space; else {why}"
     if binding > 0.0:
         part = "the whole range" if (state == -1).all() else f"{100.0 * binding:.3g} % of the range"
         rest = f"; undecided over {undecided:.3g} of it, {why}" if why else ""

@@ -1,19 +1,11 @@
 """Random mechanisms, and answers that share no code with the proofs: links placed by rotation matrices, 50 digits."""
 
-import sys
-from pathlib import Path
-
 import mpmath
-import numpy as np
+from coupled_oracles import embodied, four_bar
 
-sys.path.append(str(Path(__file__).parents[1] / "joints"))
-
-from coupled_oracles import embodied, four_bar  # noqa: E402
-from spatial_oracle import spatial  # noqa: E402, F401
-
-from graphsynth import simulate  # noqa: E402
-from graphsynth.jamming.joints import JointLimits, Misalignment  # noqa: E402
-from graphsynth.jamming.joints.program import problem  # noqa: E402
+from graphsynth import simulate
+from graphsynth.jamming.joints import JointLimits, Misalignment
+from graphsynth.jamming.joints.program import problem
 
 CHAINS = {6: 2, 8: 8}
 
