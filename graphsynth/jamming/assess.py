@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.angles import angle
-from graphsynth.core.checks import checked, finite_array
+from graphsynth.core.checks import checked, choice, finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.arcs import JamArcs, covers, jam_arcs
 from graphsynth.jamming.bearing.areas import CrescentAreas, lid_area, rim_area, surrogate_areas
@@ -220,8 +220,9 @@ def assess_jamming(
     certify: bool = True,
     tolerances: Tolerances = 0.0,
     seconds: float = 20.0,
+    model: str = "small",
 ) -> CoupledReport:
-    """Assess all joints of a mechanism over its motion (model L1)."""
+    """Assess all joints of a mechanism over its motion (model L1, or the exact closure in space)."""
 
 
 @checked
@@ -255,6 +256,8 @@ def assess_jamming(
         a mapping of pairs of links to these, or the tilt that every joint allows, radians or text.
         ``tolerances``, one relative number for all lengths (0), or tolerances of parts (`graphsynth.tolerances`), where
         fits may stand for ``joints``; ``seconds``, the time of the proof (20).
+        ``model``: "small" (L1), or "exact", which closes every loop in space with finite tilts and is slower
+        (theory/closure-in-space); the tables are those of small tilts in both.
 
     Returns
     -------
@@ -310,7 +313,7 @@ def _of_a_motion(
         raise GeometryError(
             f"subject = {motion!r} is neither a Motion (simulate) nor a TiltedFourBar or ToleranceBox; give one"
         )
-    if unknown := set(options) - {"condition", "certify", "tolerances", "seconds"}:
+    if unknown := set(options) - {"condition", "certify", "tolerances", "seconds", "model"}:
         raise GeometryError(f"{unknown.pop()} is no argument of an assessment; give tilt, joints, tolerances")
     if tilt is None:
         raise GeometryError('no axis is misaligned; give tilt="0.5 deg" or tilt=Misalignment(base, link, alpha)')
@@ -321,6 +324,10 @@ def _of_a_motion(
         tilt = Misalignment(driver.base, driver.link, angle("tilt", tilt))
     if isinstance(joints, float | int | str):
         joints = JointLimits(angle("joints", joints))
+    if choice("model", options.pop("model", "small"), ("small", "exact")) == "exact":
+        from graphsynth.jamming.space.turn import assess_in_space
+
+        return assess_in_space(motion, joints, tilt, **options)
     return assess_coupled(motion, joints, tilt, **options)
 
 

@@ -79,8 +79,8 @@ class _Local(NamedTuple):
     """Joints met on a loop, m of them at N points.
 
     ``rotation`` (N, m, 3, 3) and ``place`` (N, m, 3) of seat b seen from seat a; twists (N, m, 6, 3) of the six
-    coordinates in the frame of seat a; ``bend`` (N, m, 4, 3): derivatives of the angular velocities of the tilts x, y by
-    x and y, in the order xx, xy, yx, yy (of which the last is the tilt whose velocity it is).
+    coordinates in the frame of seat a; ``bend`` (N, m, 4, 3): derivatives of the angular velocities of the tilts x, y
+    by x and y, in the order xx, xy, yx, yy (of which the last is the tilt whose velocity it is).
     """
 
     rotation: Any
@@ -140,7 +140,7 @@ class Loop(NamedTuple):
         return _joined([*(turn[..., i] for i in range(3)), *(move[..., i] for i in range(3))])
 
     def repeated(self) -> Loop:
-        """The loop with an axis for several rows of multipliers."""
+        """Return the loop with an axis for several rows of multipliers."""
         R, t, omega, v = (part[:, None] for part in (self.R, self.t, self.omega, self.v))
         pairs, turned, pushed = self.bends
         return self._replace(R=R, t=t, omega=omega, v=v, bends=(pairs, turned[:, None], pushed[:, None]))
@@ -189,7 +189,7 @@ class _Plan(NamedTuple):
 
     joints: Ints
     sign: Array
-    chosen: tuple[Ints, Ints]
+    chosen: tuple[Ints, ...]
     columns: Ints
     order: Ints
     bends: tuple[Ints, Ints, Ints]
@@ -231,7 +231,11 @@ class Closure:
                     kind += [k] * (1 + (i != j))
         constants: list[Any] = [Interval.stack([getattr(s, name) for s in steps]) for name in ("rotation", "place")]
         constants = [ball(part) if self.exact else part.mid for part in constants]
-        bends = np.array(pairs, dtype=np.intp).reshape(-1, 2), np.array(at, dtype=np.intp), np.array(kind, dtype=np.intp)
+        bends = (
+            np.array(pairs, dtype=np.intp).reshape(-1, 2),
+            np.array(at, dtype=np.intp),
+            np.array(kind, dtype=np.intp),
+        )
         return _Plan(joints, sign, chosen, table[chosen], order, bends, *constants)
 
     def loops(self, q: Any) -> list[Loop]:
@@ -271,7 +275,9 @@ class Closure:
             at = self._local(plan, exact(q.mid))
             both = zip(self._frames(plan, local), self._around(plan, at, q))
             # entry by entry, or by angles: both have the same midpoints
-            R, t, frames, places = (Balls(b.mid, np.where(a.mid == b.mid, np.minimum(a.rad, b.rad), b.rad)) for a, b in both)
+            R, t, frames, places = (
+                Balls(b.mid, np.where(a.mid == b.mid, np.minimum(a.rad, b.rad), b.rad)) for a, b in both
+            )
         else:
             R, t, frames, places = self._frames(plan, local)
         signs = plan.sign[:, None, None]
@@ -280,7 +286,7 @@ class Closure:
         v = signs * times(local.v, turned) + cross(places[:, :, None], omega)
         bent = times(local.bend, turned)
         pushed = times(local.push, turned) + cross(places[:, :, None], bent)
-        pairs, at, kind = plan.bends
+        pairs, which, kind = plan.bends
         joint, coordinate = plan.chosen
         return Loop(
             R,
@@ -289,7 +295,7 @@ class Closure:
             v[:, joint, coordinate],
             plan.columns,
             plan.order,
-            (pairs, bent[:, at, kind], pushed[:, at, kind]),
+            (pairs, bent[:, which, kind], pushed[:, which, kind]),
         )
 
     def _frames(self, plan: _Plan, local: _Local) -> tuple[Any, Any, Any, Any]:
@@ -348,11 +354,13 @@ class Closure:
         return _joined([values[k][..., row] for k, row in self.rows])
 
     def jacobian(self, loops: list[Loop]) -> Any:
-        """Derivatives, (N, equations, width)."""
+        """Return the derivatives, (N, equations, width)."""
         parts = [loop.slopes(loop.omega, loop.v) for loop in loops]
 
         def spread(read: Any) -> Array:
-            table = np.zeros((loops[0].t[..., 0].mid.size if self.exact else len(loops[0].t), len(self.rows), self.model.width))
+            table = np.zeros(
+                (loops[0].t[..., 0].mid.size if self.exact else len(loops[0].t), len(self.rows), self.model.width)
+            )
             for place, (k, row) in enumerate(self.rows):
                 table[:, place, loops[k].columns] = read(parts[k])[..., row]
             return table

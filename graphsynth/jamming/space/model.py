@@ -337,13 +337,13 @@ def in_space(given: JointProblem) -> SpaceModel:
             raise Unsupported(f"joint {joint.a}-{joint.b} ({joint.kind}) is not described in space; use small tilts")
         tilt = by_pair.get(joint.pair)
         guide = not isinstance(joint, Revolute)
-        seats = []
+        seats: list[Seat] = []
         for link, at, angle in ((joint.a, joint.at_a, "angle_a"), (joint.b, joint.at_b, "angle_b")):
             own = tilt if tilt is not None and tilt.base == link else None
             seats.append(_plane_seat(at, getattr(joint, angle, 0.0), own))
         own_driven = joint.pair in driven
         turns = not isinstance(joint, Prismatic)
-        joints.append(SpaceJoint(joint.a, joint.b, *seats, limits, 0.0, own_driven, guide, turns))
+        joints.append(SpaceJoint(joint.a, joint.b, seats[0], seats[1], limits, 0.0, own_driven, guide, turns))
     return SpaceModel(tuple(joints), mechanism.graph.links, mechanism.frame)
 
 

@@ -27,9 +27,10 @@ _STEP = 0.3
 class Optimum(NamedTuple):
     """Least factor at one pose (estimated).
 
-    ``scale``: the factor; infinite if no factor is enough.  ``q`` (width,): unknowns and given coordinates.  ``by`` (equations,): multipliers of
-    the closure; ``weight`` (bounds,): those of ``|x|^2 <= limit^2``, with ``sum 2 weight X dX/ds = 1``.  ``missed``:
-    largest left side of the closure.  ``converged``: whether the iteration came to rest.
+    ``scale``: the factor; infinite if no factor is enough.  ``q`` (width,): unknowns and given coordinates.  ``by``
+    (equations,): multipliers of the closure; ``weight`` (bounds,): those of ``|x|^2 <= limit^2``, with
+    ``sum 2 weight X dX/ds = 1``.  ``missed``: largest left side of the closure.  ``converged``: whether the iteration
+    came to rest.
     """
 
     scale: float
@@ -41,11 +42,12 @@ class Optimum(NamedTuple):
 
 
 class _Linear(NamedTuple):
-    """Solution of one linearised program: factor, change of unknowns, multipliers of the closure."""
+    """Solution of one linearised program: factor, unknowns, multipliers, and what the closure missed before."""
 
     factor: float
     q: Array
     by: Array
+    missed: float
 
 
 def least_scale(closure: Closure, q: Array) -> Optimum:
@@ -53,7 +55,7 @@ def least_scale(closure: Closure, q: Array) -> Optimum:
     bounds = closure.model.bounds
     scale, reach, before = 1.0, _STEP, math.inf
     q, converged = q.copy(), False
-    found = _Linear(math.inf, q, np.zeros(len(closure.rows)))
+    found = _Linear(math.inf, q, np.zeros(len(closure.rows)), math.inf)
     for _ in range(_ROUNDS):
         radii = np.array([b.chart(scale) / scale for b in bounds])
         found = _linearised(closure, q, radii)
@@ -65,7 +67,8 @@ def least_scale(closure: Closure, q: Array) -> Optimum:
             reach *= 0.6
         q = q + step * min(1.0, reach / max(size, 1e-300))
         change, scale = abs(found.factor - scale), max(found.factor, 1e-12)
-        if size < 1e-9 and change < 1e-9 * scale:
+        # idle joints may share out their tilts in more than one way, so that the unknowns need not come to rest
+        if change < 1e-9 * scale and (size < 1e-9 or found.missed < 1e-12):
             converged = True
             break
         before = min(size, reach)
@@ -108,7 +111,7 @@ def _linearised(closure: Closure, q: Array, radii: Array) -> _Linear:
     if math.isfinite(factor):
         rest = values + J @ np.where(tied, found - q, 0.0)
         found[slack] = q[slack] - np.linalg.lstsq(free, rest, rcond=_RANK)[0]
-    return _Linear(factor, found, null @ wrench)
+    return _Linear(factor, found, null @ wrench, float(np.abs(values).max(initial=0.0)))
 
 
 def _left_null(A: Array) -> Array:
@@ -178,7 +181,10 @@ def _polished(closure: Closure, found: Optimum) -> Optimum:
         best, least = state, size
         if size < 1e-15:
             break
-        step = np.linalg.lstsq(matrix, -right, rcond=1e-12)[0]
+        size_of = np.ones(len(right))  # unknowns with limits move by parts of these
+        for bound in bounds:
+            size_of[list(bound.columns)] = bound.chart(state.scale)
+        step = size_of * np.linalg.lstsq(matrix * size_of * size_of[:, None], -right * size_of, rcond=1e-12)[0]
         weight = state.weight.copy()
         weight[loaded] += step[n + m : -1]
         q, by = state.q.copy(), state.by + step[n : n + m]
@@ -187,7 +193,8 @@ def _polished(closure: Closure, found: Optimum) -> Optimum:
         state = Optimum(state.scale + float(step[-1]), q, by, weight, missed, state.converged)
         if not (state.scale > 0.0 and np.abs(step[:n]).max() < 0.1):
             break
-    return best if (best.weight >= 0.0).all() and best.missed <= max(found.missed, 1e-12) else found
+    fits = all(np.linalg.norm(best.q[list(b.columns)]) <= b.chart(best.scale) * (1.0 + 1e-9) for b in bounds)
+    return best if fits and (best.weight >= 0.0).all() and best.missed <= max(found.missed, 1e-12) else found
 
 
 def _conditions(closure: Closure, at: Optimum, loaded: list[int]) -> tuple[Array, Array]:

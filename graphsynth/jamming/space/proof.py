@@ -129,10 +129,11 @@ class Box(NamedTuple):
 
     def unknowns(self, y: Balls) -> Balls:
         """Coordinates q of some y (N, width)."""
-        return exact(self.origin) + times(exact(self.shear), y[..., None])[..., 0]
+        moved: Balls = times(exact(self.shear), y[..., None])[..., 0]
+        return exact(self.origin) + moved
 
     def take(self, rows: NDArray[np.bool_]) -> Box:
-        """Some of the boxes."""
+        """Return some of the boxes."""
         return self._replace(low=self.low[rows], high=self.high[rows])
 
 
@@ -270,7 +271,12 @@ def lower_bounds(closure: Closure, proofs: list[Certificate], box: Box) -> Array
         slope = times(swapped(J), own[..., None])[..., 0] + times(swapped(K), g[..., None])[..., 0] + weighed[1]
         slope = times(swapped(shear), slope[..., None])[..., 0]
         product = times(swapped(K), everywhere)
-        H = closure.hessian(wide, by + times(K, (far - at)[..., None])[..., 0]) + product + swapped(product) + weighed[2]
+        H = (
+            closure.hessian(wide, by + times(K, (far - at)[..., None])[..., 0])
+            + product
+            + swapped(product)
+            + weighed[2]
+        )
         H = times(swapped(shear), times(H, shear))
         ends = [(slope.mid + sign * slope.rad) * side for sign in (-1.0, 1.0) for side in (below, above)]
         first = np.minimum(np.min(ends, axis=0), 0.0).sum(-1)
@@ -303,7 +309,7 @@ def _total(a: Balls) -> Balls:
 
 
 def shift(mid: Array, rad: Array, far: Array) -> float:
-    """Return ``sum D far^2`` for a diagonal D >= 0 with H + D positive semidefinite for every H in the ball (certified).
+    """Return ``sum D far^2`` for a diagonal D >= 0 with H + D positive semidefinite for all H in the ball (certified).
 
     Infinite where none is found.  In unknowns over ``far``; rows of radii go to the diagonal (Gershgorin).
     """
@@ -338,7 +344,7 @@ def _diagonal(A: Array, unit: float) -> float:
 
 
 def _positive(A: Array) -> bool:
-    """Whether a symmetric matrix is proved positive definite: the Cholesky factorisation of a smaller one ends [Rump 2006]."""
+    """Whether a symmetric matrix is proved positive definite: the factorisation of a smaller one ends [Rump 2006]."""
     n = len(A)
     eps = 2.0**-53
     gamma = (n + 2) * eps / (1.0 - (n + 2) * eps)

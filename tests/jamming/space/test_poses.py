@@ -180,7 +180,9 @@ def test_a_spherical_linkage_closes_although_no_joint_gives():
     rng = np.random.default_rng(5)
     turns = [rng.uniform(-0.6, 0.6, 3) for _ in range(8)]
     joints = [
-        SpaceJoint(k, (k + 1) % 4, Seat(turn=turns[2 * k]), Seat(turn=turns[2 * k + 1]), JointLimits(0.02), driven=k == 0)
+        SpaceJoint(
+            k, (k + 1) % 4, Seat(turn=turns[2 * k]), Seat(turn=turns[2 * k + 1]), JointLimits(0.02), driven=k == 0
+        )
         for k in range(4)
     ]
     model = SpaceModel(tuple(joints), 4)
