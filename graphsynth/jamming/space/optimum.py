@@ -54,7 +54,7 @@ def least_scale(closure: Closure, q: Array) -> Optimum:
     """Find the least factor from a start q (width,), whose given coordinates stay."""
     bounds = closure.model.bounds
     scale, reach, before = 1.0, _STEP, math.inf
-    q, converged = q.copy(), False
+    q, converged = _nearer(closure, q), False
     found = _Linear(math.inf, q, np.zeros(len(closure.rows)), math.inf)
     for _ in range(_ROUNDS):
         radii = np.array([b.chart(scale) / scale for b in bounds])
@@ -84,6 +84,22 @@ def least_scale(closure: Closure, q: Array) -> Optimum:
         if inside > radius * (1.0 - 1e-6):
             weight[k] = max(0.0, -float(slope[columns] @ q[columns]) / (2.0 * radius**2))
     return _polished(closure, Optimum(scale, q, found.by, weight, missed, converged))
+
+
+def _nearer(closure: Closure, q: Array) -> Array:
+    """Move unknowns without limits towards a closure, by a few steps of Gauss and Newton."""
+    q = q.copy()
+    free = np.arange(len(q)) < closure.model.size
+    for bound in closure.model.bounds:
+        free[list(bound.columns)] = False
+    for _ in range(6):
+        loops = closure.loops(q[None])
+        step = np.linalg.lstsq(closure.jacobian(loops)[0][:, free], closure.values(loops)[0], rcond=1e-6)[0]
+        size = float(np.abs(step).max(initial=0.0))
+        q[free] -= step * min(1.0, _STEP / max(size, 1e-300))
+        if size < 1e-6:
+            break
+    return q
 
 
 def _linearised(closure: Closure, q: Array, radii: Array) -> _Linear:

@@ -15,8 +15,9 @@ from graphsynth.jamming.space.optimum import Optimum, least_scale
 from graphsynth.jamming.space.proof import Box, Certificate, branch_box, certificates, closes, contract, lower_bounds
 
 Array = NDArray[np.float64]
-#: Half width of the box of a branch in unlimited turns (radians) and travels (units), from the largest.
-REACHES = (0.1, 0.03, 0.01)
+#: Half widths of the box of a branch in unlimited turns (radians) and travels (units); the last one is LEAST, or more.
+REACHES = (0.1, 0.03)
+LEAST = 0.005
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +86,14 @@ def prove_pose(
 
 
 def _reaches(model: SpaceModel, q: Array, found: Optimum, reaches: tuple[float, ...]) -> tuple[float, ...]:
-    """Return those reaches that hold the closure found twice over, or one that does."""
+    """Return those reaches that hold the closure found twice over, and the least one that does."""
     away = 0.0
     for joint, column in zip(model.joints, model.column):
         for place in (TURN, *((SHIFT_X,) if joint.guide else ())):
             if 0 <= column[place] < model.size:
                 away = max(away, abs(float(found.q[column[place]] - q[column[place]])))
-    return tuple(reach for reach in reaches if reach >= 2.0 * away) or (2.0 * away,)
+    least = max(2.0 * away, LEAST)
+    return (*(reach for reach in reaches if reach > least), least)
 
 
 def _rates(floats: Closure, q: Array, free: bool = False) -> Array:
