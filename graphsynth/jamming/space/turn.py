@@ -88,7 +88,7 @@ def certify_in_space(
     'CERTIFIED_FREE'
     """
     begin = perf_counter()
-    check_range(motion, 0.0, resolution=resolution, max_pieces=max_pieces, seconds=seconds)
+    check_range(motion, resolution=resolution, max_pieces=max_pieces, seconds=seconds)
     given = problem(motion.mechanism, bearings, tilts, condition)
     try:
         model = in_space(given)
@@ -107,19 +107,19 @@ def certify_in_space(
 
 def assess_in_space(
     motion: Motion,
-    bearings: Bearings,
+    bearings: Bearings | None,
     tilts: Misalignment | Iterable[Misalignment],
     *,
     condition: Condition = "A",
     certify: bool = True,
-    length_tolerance: float = 0.0,
+    tolerances: Any = 0.0,
     seconds: float = 20.0,
 ) -> CoupledReport:
     """Assess a motion with every loop closed in space; the tables are those of small tilts."""
-    if not certify or length_tolerance:
+    if bearings is None or not certify or not isinstance(tolerances, int | float) or tolerances:
         raise GeometryError(
-            f'certify = {certify}, length_tolerance = {length_tolerance}: model="exact" is always proved, for sharp '
-            'lengths; leave both out, or give model="small"'
+            f'certify = {certify}, tolerances = {tolerances}: model="exact" is always proved, for sharp '
+            'lengths and given limits of joints; leave both out, or give model="small"'
         )
     begin = perf_counter()
     report = assess_coupled(motion, bearings, tilts, condition=condition)
