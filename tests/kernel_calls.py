@@ -74,6 +74,7 @@ class Calls:
 def more_calls() -> None:
     """Call what no example of the documentation calls."""
     import graphsynth as gs
+    from graphsynth import intervals
     from graphsynth.dynamics import Body, DynamicModel, simulate_dynamics
     from graphsynth.mechanism.joints import Revolute
     from graphsynth.mechanism.laws import Driver
@@ -84,6 +85,12 @@ def more_calls() -> None:
     from graphsynth.synthesis.shards import works
     from graphsynth.systems.tribometer.model import Tribometer
 
+    x, y = intervals.Interval("0.3", "0.4"), intervals.Interval("-0.1", 2)
+    for _ in range(2):
+        x, y = (x + y) * x - y / x, y.sqr().sqrt() - x
+        for function in (intervals.sin, intervals.cos, intervals.exp, intervals.atan):
+            y = function(y)
+        intervals.log(y.sqr() + 1)
     generate(4)
     for family in EnumerationProblem.chains(10, 1, 3, None, False, None).families:
         for purpose in (LISTING, COUNTING, MAKING):

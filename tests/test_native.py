@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import threading
+from fractions import Fraction
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -318,6 +319,38 @@ def test_interval_loops_give_the_bits_of_numba_for_any_numbers(signature: Signat
     arrays = iter(values)
     args = [int(rng.integers(-5, 9)) if kind == "i8" else next(arrays, None) for kind in types]
     assert agree_on(kernel, tuple(np.empty(each) if value is None else value for value in args))
+
+
+@needs_library
+def test_code_without_fused_operations_forms_them_exactly(each: int = 20_000) -> None:
+    """The library's own ``a b + c``, for its plainest version, beside fractions: cancelling, tiny, huge, special."""
+    rng = np.random.default_rng(12)
+
+    def draw(least: int, most: int) -> np.ndarray:
+        return np.ldexp(rng.uniform(-1.0, 1.0, each), rng.integers(least, most, each))
+
+    a, b, c = draw(-60, 60), draw(-60, 60), draw(-120, 120)
+    wide = rng.random((3, each)) < 0.3
+    a, b, c = (np.where(w, draw(-1074, 1024), v) for w, v in zip(wide, (a, b, c), strict=True))
+    with np.errstate(all="ignore"):
+        c = np.where(rng.random(each) < 0.4, -a * b, c)  # cancels, but for the rounding error
+        c = np.where(rng.random(each) < 0.2, np.nextafter(c, 0.0), c)
+    a, b, c = (np.where(rng.random(each) < 0.03, rng.choice(SPECIAL, each), v) for v in (a, b, c))
+    for x, y, z in zip(a.tolist(), b.tolist(), c.tolist(), strict=True):
+        found = library._library.fma(x, y, z)
+        with np.errstate(all="ignore"):
+            plain = float(np.float64(x) * np.float64(y) + np.float64(z))
+        if not np.isfinite([x, y, z]).all():
+            wanted = z if np.isfinite([x, y]).all() else plain
+        elif (exact := Fraction(x) * Fraction(y) + Fraction(z)) == 0:
+            wanted = plain if x == 0.0 or y == 0.0 else 0.0
+        else:
+            try:
+                wanted = float(exact)
+            except OverflowError:
+                wanted = np.inf if exact > 0 else -np.inf
+            wanted = np.copysign(wanted, 1.0 if exact > 0 else -1.0)
+        assert same_bits(np.array([found]), np.array([wanted])), (x, y, z)
 
 
 @needs_library

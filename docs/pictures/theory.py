@@ -506,6 +506,26 @@ def krawczyk() -> str:
     return board.svg("What follows from Krawczyk's image K(X) of a box X")
 
 
+def rounding_test() -> str:
+    """Draw three doubles, a pair between them with its error, and where nothing is decided."""
+    board = Board(660, 180, 330 + 75j, 1.0)
+    board.line(-300 + 0j, 300 + 0j, width=1.8)
+    for x, text in ((-240, "h − ulp"), (0, "h"), (240, "h + ulp")):
+        board.line(x - 16j, x + 16j, width=2.2)
+        board.text(x - 36j, text, size=15)
+    for x in (-120, 120):
+        board.line(x - 7j, x + 7j, colour="note", dash="3 3")
+    board.line(-28 - 9j, 28 - 9j, 28 + 9j, -28 + 9j, fill="b", colour="b", width=1.2)
+    board.text(46j, "|l| ≤ E: not decided", colour="b", size=13)
+    board.line(62 - 6j, 98 - 6j, 98 + 6j, 62 + 6j, fill="a", colour="a", width=1.2)
+    board.line(80 - 12j, 80 + 12j, colour="a", width=2)
+    board.text(130 + 26j, "h + l, and v within E of it", colour="a", size=13)
+    board.arrow(0 - 74j, 0 - 50j, colour="c")
+    board.arrow(240 - 74j, 240 - 50j, colour="c")
+    board.text(120 - 72j, "tightest bounds of v", colour="c", size=13)
+    return board.svg("The sign of l tells on which side of h the exact value v lies, unless |l| is at most E")
+
+
 def body() -> str:
     """Draw the free body of a link: coordinates, offset of a joint, forces."""
     board = Board(560, 280, 110 + 200j, 2.0)
@@ -720,6 +740,7 @@ DRAWINGS = {
     "theory-extreme": extreme_cases,
     "theory-inverse-design": inverse_design,
     "theory-krawczyk": krawczyk,
+    "theory-rounding-test": rounding_test,
     "theory-levels": levels,
     "theory-linkage": lambda_linkage,
     "theory-modes": modes,

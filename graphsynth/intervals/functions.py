@@ -16,13 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals.dual import Dual
-from graphsynth.intervals.interval import Interval, _both, _make, _marked, interval
-from graphsynth.intervals.operations import Array, run
+from graphsynth.intervals.interval import Interval, _both, _make, _make_single, _marked, interval
+from graphsynth.intervals.operations import Array, run, single
 from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS
+
+#: Functions that have a kernel for one interval.
+_SINGLE = frozenset({"sin", "cos", "exp", "log", "atan"})
 
 
 def _apply(name: str, *arguments: Interval) -> Interval:
     """Run a compiled loop over broadcast arguments; decorations of all are joined."""
+    if name in _SINGLE and (ends := arguments[0]._ends) is not None:
+        return _make_single(single(name)(*ends, 1.0), arguments[0].flags)
     lo, hi = run(name, *[side for a in arguments for side in (a.lo, a.hi)])
     return _make(lo, hi, _both(*[a.flags for a in arguments]))
 

@@ -10,19 +10,22 @@ are carried through every further operation, so the last result tells whether a 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any, NoReturn
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from graphsynth.core.errors import FormatError, IntervalError
 from graphsynth.intervals import operations
+from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.measures import Measures
 from graphsynth.intervals.operations import Array, Flags, Mask
 from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, decimal_outward, read_bounds, read_points
 
 _MOST = int(np.finfo(np.float64).max)
+_EXACT = 2**53  # integers up to this are floats
+_CLIPPED: Flags = np.asarray(CLIPPED)
 
 
 def _both(*flags: Flags) -> Flags:
@@ -31,6 +34,21 @@ def _both(*flags: Flags) -> Flags:
         if flag is not result:
             result = np.asarray(np.bitwise_or(result, flag))
     return result
+
+
+def _operator(name: str) -> Callable[[Interval, Any], Interval]:
+    """Return the method of an operator: `Interval._binary`, with a short way for single intervals of the same flags."""
+
+    def operator(self: Interval, other: Any) -> Interval:
+        if type(other) is int:
+            other = interval(other)
+        if type(other) is Interval and self.flags is other.flags:
+            p, q = self._ends, other._ends
+            if p is not None and q is not None and (name != "divide" or q[0] > 0.0 or q[1] < 0.0):
+                return _make_single(operations.single(name)(p[0], p[1], q[0], q[1], 1.0), self.flags)
+        return self._binary(name, other)
+
+    return operator
 
 
 class Interval(Measures):
@@ -75,7 +93,8 @@ class Interval(Measures):
     Interval([0.25, 0.66666666666666675])
     """
 
-    __slots__ = ("flags", "hi", "lo")
+    __slots__ = ("_ends", "flags", "hi", "lo")
+    _ends: tuple[float, float] | None  # of one interval; its arrays are made when they are asked for
     __array_ufunc__ = None  # numpy arrays leave mixed operations to this class
     __hash__ = None  # type: ignore[assignment]
 
@@ -89,6 +108,17 @@ class Interval(Measures):
 
     def __setattr__(self, name: str, value: Any) -> NoReturn:
         raise AttributeError(f"an Interval does not change; {name} cannot be set")
+
+    if not TYPE_CHECKING:  # to type checkers there are no other attributes than those that are told
+
+        def __getattr__(self, name: str) -> Any:
+            if name == "_ends":
+                _set_ends(self, (self.lo.item(), self.hi.item()) if self.lo.ndim == 0 else None)
+            elif name in ("lo", "hi"):
+                _fill_bounds(self, *map(np.array, self._ends))
+            else:
+                raise AttributeError(f"an Interval has no attribute {name!r}")
+            return object.__getattribute__(self, name)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _make, (self.lo, self.hi, self.flags)
@@ -299,29 +329,22 @@ class Interval(Measures):
         except TypeError:
             return NotImplemented  # type: ignore[no-any-return]
         a, b = (other, self) if reverse else (self, other)
-        flags = _both(a.flags, b.flags)
+        flags = a.flags if a.flags is b.flags else _both(a.flags, b.flags)
+        if (p := a._ends) is not None and (q := b._ends) is not None:
+            if name == "divide" and q[0] <= 0.0 <= q[1]:
+                flags = _both(flags, _CLIPPED)
+            return _make_single(operations.single(name)(*p, *q, 1.0), flags)
         if name == "divide":
             flags = _marked(flags, (b.lo <= 0.0) & (b.hi >= 0.0))
         return _make(*operations.run(name, a.lo, a.hi, b.lo, b.hi), flags)
 
-    def __add__(self, other: Any) -> Interval:
-        return self._binary("add", other)
-
-    __radd__ = __add__
-
-    def __sub__(self, other: Any) -> Interval:
-        return self._binary("subtract", other)
+    __add__ = __radd__ = _operator("add")
+    __sub__ = _operator("subtract")
+    __mul__ = __rmul__ = _operator("multiply")
+    __truediv__ = _operator("divide")
 
     def __rsub__(self, other: Any) -> Interval:
         return self._binary("subtract", other, reverse=True)
-
-    def __mul__(self, other: Any) -> Interval:
-        return self._binary("multiply", other)
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Any) -> Interval:
-        return self._binary("divide", other)
 
     def __rtruediv__(self, other: Any) -> Interval:
         return self._binary("divide", other, reverse=True)
@@ -349,10 +372,15 @@ class Interval(Measures):
 
     def sqr(self) -> Interval:
         """Square: never negative, and tighter than ``x * x``."""
+        if (ends := self._ends) is not None:
+            return _make_single(operations.single("square")(*ends, 1.0), self.flags)
         return _make(*operations.run("square", self.lo, self.hi), self.flags)
 
     def sqrt(self) -> Interval:
         """Square root; a negative part of the argument is clipped and recorded."""
+        if (ends := self._ends) is not None:
+            flags = _both(self.flags, _CLIPPED) if ends[0] < 0.0 else self.flags
+            return _make_single(operations.single("root")(*ends, 1.0), flags)
         return _make(*operations.run("root", self.lo, self.hi), _marked(self.flags, self.lo < 0.0))
 
     def __eq__(self, other: object) -> Any:
@@ -381,17 +409,32 @@ def _marked(flags: Flags, where: Mask, mark: np.uint8 = CLIPPED) -> Flags:
 
 
 # an Interval refuses to be set; its slots are filled once, through their descriptors
-_set_lo, _set_hi, _set_flags = (vars(Interval)[name].__set__ for name in ("lo", "hi", "flags"))
+_set_ends, _set_lo, _set_hi, _set_flags = (vars(Interval)[name].__set__ for name in ("_ends", "lo", "hi", "flags"))
+_new = Interval.__new__
+
+
+def _fill_bounds(target: Interval, lo: Array, hi: Array) -> None:
+    lo.setflags(write=False)
+    hi.setflags(write=False)
+    _set_lo(target, lo)
+    _set_hi(target, hi)
 
 
 def _fill(target: Interval, lo: Array, hi: Array, flags: Flags) -> None:
-    lo.setflags(write=False)
-    hi.setflags(write=False)
+    _fill_bounds(target, lo, hi)
     if flags.ndim and flags.shape != lo.shape:
         flags = np.broadcast_to(flags, lo.shape)
-    _set_lo(target, lo)
-    _set_hi(target, hi)
     _set_flags(target, flags)
+
+
+def _make_single(ends: tuple[float, float], flags: Flags) -> Interval:
+    """Make one interval from bounds known to be right; NaN comes from a processor that does not round to nearest."""
+    if ends[0] != ends[0]:
+        check_rounding()
+    result = _new(Interval)
+    _set_ends(result, ends)
+    _set_flags(result, flags)
+    return result
 
 
 def _make(lo: ArrayLike, hi: ArrayLike, flags: Flags = NO_FLAGS) -> Interval:
@@ -419,6 +462,9 @@ def interval(value: Any) -> Interval:
     """
     if isinstance(value, Interval):
         return value
+    if type(value) is int and -_EXACT <= value <= _EXACT:
+        number = float(value)
+        return _make_single((number, number), NO_FLAGS)
     if hasattr(value, "__interval_priority__"):
         raise TypeError
     return Interval(value)

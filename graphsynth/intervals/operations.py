@@ -26,6 +26,15 @@ def _loop(name: str) -> Callable[..., None]:
     return found
 
 
+@cache
+def single(name: str) -> Callable[..., tuple[float, float]]:
+    """Return a compiled operation on one interval, which looks itself how numbers are rounded (NaN: not to nearest)."""
+    from graphsynth.core.compilation import named
+
+    found: Callable[..., tuple[float, float]] = named("graphsynth.intervals.kernels.single", name)[0]
+    return found
+
+
 def common_shape(*operands: Array) -> tuple[int, ...]:
     """Return the shape to which arrays spread; `IntervalError` if there is none."""
     shape = operands[0].shape

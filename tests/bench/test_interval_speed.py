@@ -101,8 +101,32 @@ def test_operation(benchmark, name):
     assert (hi >= exact).all()
 
 
+SINGLE = {
+    "add": lambda x, y: x + y, "subtract": lambda x, y: x - y, "multiply": lambda x, y: x * y,
+    "divide": lambda x, y: x / y, "square": lambda x, y: x.sqr(), "root": lambda x, y: x.sqrt(),
+    "sin": lambda x, y: sin(x), "integer factor": lambda x, y: x * 3,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SINGLE)
+def test_one_interval(benchmark, name):
+    """One operation on `Interval` objects of one interval each, a thousand times."""
+    x, y, operation = Interval("0.1"), Interval("0.3", "0.4"), SINGLE[name]
+    count = 1000 if benchmark.enabled else 1
+
+    def run():
+        for _ in range(count):
+            found = operation(x, y)
+        return found
+
+    found = timed(benchmark, run, count)
+    many = operation(Interval(["0.1"]), Interval(["0.3"], ["0.4"]))
+    assert found.lo == many.lo[0] and found.hi == many.hi[0]
+
+
+@pytest.mark.parametrize("width", [0.0, 1e-3])
 @pytest.mark.parametrize("name", ["sin", "cos", "tan", "atan", "asin", "acos", "exp", "log"])
-def test_function(benchmark, name):
+def test_function(benchmark, name, width):
     from graphsynth.intervals.kernels import loops
 
     count = 20_000 if benchmark.enabled else 500
@@ -117,7 +141,8 @@ def test_function(benchmark, name):
         others["flint"] = (lambda: [getattr(v, name)() for v in balls], SMALL)
         numpy_name = {"atan": "arctan", "asin": "arcsin", "acos": "arccos"}.get(name, name)
         others["plain numpy"] = (lambda: getattr(np, numpy_name)(x), count)
-    timed(benchmark, lambda: getattr(loops, name)(x, x, low, high), count, **others)
+    upper = x + width
+    timed(benchmark, lambda: getattr(loops, name)(x, upper, low, high), count, **others)
     assert (low <= high).all()
 
 

@@ -123,6 +123,63 @@ double numba_ldexp(double x, int exponent) { return ldexp(x, exponent); }
 double nextafter(double, double);
 double numba_nextafter(double x, double y) { return nextafter(x, y); }
 
+/* -- a b + c with one rounding, for code made for processors that cannot do it -------------------------------------- */
+
+typedef unsigned __int128 Wide;
+typedef union { double number; uint64_t bits; } Double;
+
+/* Fraction between 2^52 and 2^53 and exponent of a finite number that is not 0. */
+static uint64_t parts(double x, int *exponent) {
+    uint64_t bits = (Double){.number = x}.bits, fraction = bits & 0xFFFFFFFFFFFFF;
+    int biased = (int)(bits >> 52 & 0x7FF), up = biased ? 0 : __builtin_clzll(fraction) - 11;
+    *exponent = (biased ? biased : 1) - 1075 - up;
+    return biased ? fraction | 1ull << 52 : fraction << up;
+}
+
+/* Shift to the right; what falls out is kept as the last bit. */
+static Wide jammed(Wide x, int by) { return by > 127 ? x != 0 : x >> by | ((x >> by) << by != x); }
+
+/* The number nearest to x 2^e, x > 0, ties to even. */
+static double nearest(Wide x, int e) {
+    int top = x >> 64 ? 127 - __builtin_clzll((uint64_t)(x >> 64)) : 63 - __builtin_clzll((uint64_t)x);
+    int by = top + e >= -1022 ? top - 52 : -1074 - e; /* to 53 bits, or to multiples of the least number */
+    uint64_t fraction;
+    if (by <= 0) fraction = (uint64_t)(x << -by);
+    else {
+        Wide few = by > 1 ? jammed(x, by - 2) : x << 1; /* two bits more, the last one standing for all that follow */
+        fraction = (uint64_t)(few >> 2) + ((few & 3) + (uint64_t)(few >> 2 & 1) > 2);
+    }
+    int scale = e + by;
+    double found = (double)fraction;
+    if (scale >= -1022 && scale <= 900) return found * (Double){.bits = (uint64_t)(scale + 1023) << 52}.number;
+    return ldexp(found, scale);
+}
+
+/* Integers alone.  The product and c are aligned with 20 bits to spare, so nothing is lost where they nearly cancel, and
+   the last bit stands for what is lost where they do not. */
+double fma(double a, double b, double c) {
+    if (!(a - a == 0.0) || !(b - b == 0.0) || a == 0.0 || b == 0.0) return a * b + c;
+    if (!(c - c == 0.0)) return c + c;
+    if (c == 0.0) return a * b;
+    int ea, eb, ec;
+    Wide p = (Wide)parts(a, &ea) * parts(b, &eb) << 20, s = (Wide)parts(c, &ec) << 72;
+    int negative = (a < 0.0) != (b < 0.0), other = c < 0.0, e = ea + eb - 20, apart = e - (ec - 72);
+    if (apart >= 0) s = jammed(s, apart);
+    else {
+        p = jammed(p, -apart);
+        e = ec - 72;
+    }
+    if (negative == other) s += p;
+    else if (p == s) return 0.0;
+    else if (p > s) s = p - s;
+    else {
+        s -= p;
+        negative = other;
+    }
+    double found = nearest(s, e);
+    return negative ? -found : found;
+}
+
 /* -- table of the kernels --------------------------------------------------------------------------------------------- */
 
 typedef int32_t (*Entry)(const uint64_t *, uint64_t *, void **);
@@ -514,9 +571,15 @@ static PyObject *set_level(PyObject *module, PyObject *args) {
     return Py_BuildValue("i", level);
 }
 
+static PyObject *software_fma(PyObject *module, PyObject *args) {
+    double a, b, c;
+    if (!PyArg_ParseTuple(args, "ddd", &a, &b, &c)) return NULL;
+    return PyFloat_FromDouble(fma(a, b, c));
+}
+
 static const Method methods[] = {
     {"set_hooks", set_hooks, VARARGS, NULL}, {"set_numpy", set_numpy, VARARGS, NULL}, {"peek", peek, ONE, NULL}, {"contents", contents, NOARGS, NULL},
-    {"set_level", set_level, VARARGS, NULL}, {NULL, NULL, 0, NULL}};
+    {"set_level", set_level, VARARGS, NULL}, {"fma", software_fma, VARARGS, NULL}, {NULL, NULL, 0, NULL}};
 static const Method kernel_methods[] = {
     {"set_fallback", set_fallback, ONE, NULL}, {"entry", entry, NOARGS, NULL}, {NULL, NULL, 0, NULL}};
 static const Slot slots[] = {

@@ -7,7 +7,7 @@ import numpy as np
 
 from graphsynth.core.compilation import kernel
 from graphsynth.core.intrinsics import fma
-from graphsynth.intervals.kernels import double_double as dd
+from graphsynth.intervals.kernels import double_double as dd, quick
 from graphsynth.intervals.kernels.rounding import ETA, INF, MAX, add_down, add_up, multiply_both, root_both, up
 
 _LOG2 = Fraction(dd.log2_fixed(300), 2**300)
@@ -17,7 +17,7 @@ _LOG2_H, _LOG2_L = dd.split(_LOG2)
 _EXP = np.array([dd.split(Fraction(1, factorial(k))) for k in range(21)])
 _ODD = np.array([dd.split(Fraction(2, 2 * k + 1)) for k in range(20)])
 _EXP_EXACT, _LOG_EXACT = 10, 7
-RELATIVE = 2.0**-66
+RELATIVE, HYPOT_RELATIVE = 2.0**-78, 2.0**-66
 
 
 @kernel
@@ -75,6 +75,9 @@ def exp(al, ah):
     """Range of the exponential."""
     if al > ah:
         return INF, -INF
+    lo, hi = quick.exp(al, ah)
+    if lo == lo:
+        return lo, hi
     return 0.0 if al == -INF else exp_at(al)[0], INF if ah == INF else exp_at(ah)[1]
 
 
@@ -83,6 +86,9 @@ def log(al, ah):
     """Range of the logarithm of the part above 0."""
     if al > ah or ah <= 0.0:
         return INF, -INF
+    lo, hi = quick.log(al, ah)
+    if lo == lo:
+        return lo, hi
     return log_at(max(al, 0.0))[0], log_at(ah)[1]
 
 
@@ -116,7 +122,7 @@ def _hypot_at(x, y):
     ph, qh = a * a, b * b
     h, l = dd.add(ph, fma(a, a, -ph), qh, fma(b, b, -qh))
     h, l = dd.root(h, l)
-    lo, hi = dd.bounds(h, l, h * RELATIVE)
+    lo, hi = dd.bounds(h, l, h * HYPOT_RELATIVE)
     # roots of bounds are wider, but exact where the squares and their sum are
     lo = max(lo, root_both(add_down(multiply_both(a, a)[0], multiply_both(b, b)[0]))[0])
     hi = min(hi, root_both(add_up(multiply_both(a, a)[1], multiply_both(b, b)[1]))[1])

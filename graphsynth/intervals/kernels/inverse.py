@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from graphsynth.core.compilation import kernel
-from graphsynth.intervals.kernels import double_double as dd
+from graphsynth.intervals.kernels import double_double as dd, quick
 from graphsynth.intervals.kernels.rounding import INF, divide_both, down, up
 
 _TABLE = np.array([dd.split(Fraction(dd.atan_fixed(k, 16, 256), 2**256)) for k in range(17)])
@@ -17,7 +17,7 @@ _ODD = np.array([dd.split(Fraction((-1) ** k, 2 * k + 1)) for k in range(12)])
 _PI_H, _PI_L = dd.split(Fraction(dd.pi_fixed(256), 2**256))
 _HALF_H, _HALF_L = 0.5 * _PI_H, 0.5 * _PI_L
 PI_DOWN, PI_UP = dd.PI
-RELATIVE = 2.0**-68
+RELATIVE, ATAN_RELATIVE = 2.0**-68, 2.0**-78
 _SMALL = 2.0**-27
 
 
@@ -53,7 +53,7 @@ def atan_at(x):
         h, l = dd.divide(1.0, 0.0, size, 0.0) if size < 2.0**900 else (0.0, 0.0)
         h, l = atan_unit(h, l)
         h, l = dd.add(_HALF_H, _HALF_L, -h, -l)
-    lo, hi = dd.bounds(h, l, h * RELATIVE)
+    lo, hi = dd.bounds(h, l, h * ATAN_RELATIVE)
     return (lo, hi) if x > 0.0 else (-hi, -lo)
 
 
@@ -62,6 +62,9 @@ def atan(al, ah):
     """Range of the arctangent."""
     if al > ah:
         return INF, -INF
+    lo, hi = quick.atan(al, ah)
+    if lo == lo:
+        return lo, hi
     return atan_at(al)[0], atan_at(ah)[1]
 
 

@@ -1,7 +1,7 @@
 """Loops of the interval operations and elementary functions over flat arrays; bounds in, bounds out."""
 
 from graphsynth.core.compilation import kernel
-from graphsynth.intervals.kernels import arithmetic, exponential, inverse, trigonometry
+from graphsynth.intervals.kernels import arithmetic, exponential, inverse, quick, trigonometry
 
 
 def _loop_of_one(name, operation):
@@ -10,6 +10,20 @@ def _loop_of_one(name, operation):
     def loop(al, ah, lo, hi):
         for i in range(lo.size):
             lo[i], hi[i] = operation(al[i], ah[i])
+
+    loop.__name__ = loop.__qualname__ = name
+    return kernel(loop)
+
+
+def _loop_of_quick(name, first, operation):
+    """Return the kernel that applies ``first`` to all, in vector instructions, ``operation`` to what that leaves."""
+
+    def loop(al, ah, lo, hi):
+        for i in range(lo.size):
+            lo[i], hi[i] = first(al[i], ah[i])
+        for i in range(lo.size):
+            if lo[i] != lo[i]:
+                lo[i], hi[i] = operation(al[i], ah[i])
 
     loop.__name__ = loop.__qualname__ = name
     return kernel(loop)
@@ -30,14 +44,14 @@ add = _loop_of_two("add", arithmetic.add)
 subtract = _loop_of_two("subtract", arithmetic.subtract)
 square = _loop_of_one("square", arithmetic.square)
 root = _loop_of_one("root", arithmetic.root)
-sin = _loop_of_one("sin", trigonometry.sin)
-cos = _loop_of_one("cos", trigonometry.cos)
+sin = _loop_of_quick("sin", quick.sin, trigonometry.sin)
+cos = _loop_of_quick("cos", quick.cos, trigonometry.cos)
 tan = _loop_of_one("tan", trigonometry.tan)
-atan = _loop_of_one("atan", inverse.atan)
+atan = _loop_of_quick("atan", quick.atan, inverse.atan)
 asin = _loop_of_one("asin", inverse.asin)
 acos = _loop_of_one("acos", inverse.acos)
-exp = _loop_of_one("exp", exponential.exp)
-log = _loop_of_one("log", exponential.log)
+exp = _loop_of_quick("exp", quick.exp, exponential.exp)
+log = _loop_of_quick("log", quick.log, exponential.log)
 atan2 = _loop_of_two("atan2", inverse.atan2)
 hypot = _loop_of_two("hypot", exponential.hypot)
 

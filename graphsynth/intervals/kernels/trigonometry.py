@@ -11,7 +11,7 @@ from math import factorial, frexp
 import numpy as np
 
 from graphsynth.core.compilation import kernel
-from graphsynth.intervals.kernels import double_double as dd
+from graphsynth.intervals.kernels import double_double as dd, quick
 from graphsynth.intervals.kernels.rounding import INF, down, up
 
 _WORDS = np.array(dd.two_over_pi_words(42), dtype=np.uint64)
@@ -28,7 +28,7 @@ _MODERATE = 1e6
 _SIN = np.array([dd.split(Fraction((-1) ** k, factorial(2 * k + 1))) for k in range(13)])
 _COS = np.array([dd.split(Fraction((-1) ** k, factorial(2 * k))) for k in range(14)])
 _SIN_EXACT, _COS_EXACT = 5, 6
-RELATIVE, ABSOLUTE = 2.0**-68, 2.0**-140
+RELATIVE, ABSOLUTE = 2.0**-74, 2.0**-140
 _SMALL = 2.0**-27
 _MASK = np.uint64(0xFFFFFFFF)
 _32 = np.uint64(32)
@@ -149,6 +149,9 @@ def sine_turned(al, ah, turn):
     """Range of ``sin(x + turn pi/2)``."""
     if al > ah:
         return INF, -INF
+    lo, hi = quick.sine(al, ah, turn)
+    if lo == lo:
+        return lo, hi
     width = ah - al
     if not width < 6.28:
         return -1.0, 1.0
