@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from inspect import signature
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,9 @@ from graphsynth.pipeline.stages import build
 from graphsynth.systems.tribometer.forms import model_error
 from graphsynth.systems.tribometer.model import Tribometer, general_model
 from graphsynth.systems.tribometer.motion import RunStatus, StickSlipMotion
-from graphsynth.systems.tribometer.precise import PreciseMotion, precise_motion
+
+if TYPE_CHECKING:
+    from graphsynth.systems.tribometer.precise import PreciseMotion
 
 Array = NDArray[np.float64]
 _DIGITS = 22
@@ -161,6 +163,8 @@ def event_problem(model: Tribometer, duration: float, effort: Effort | None = No
     """
     effort = effort or Effort()
     default = _default("event_driven", "rtol")
+    from graphsynth.systems.tribometer.precise import precise_motion
+
     truth = precise_motion(model, duration, digits=_DIGITS)
     tolerances = sorted({1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, default}, reverse=True)
     rows = tolerance_rows(model, truth, duration, effort.some(tolerances), effort.rounds)
