@@ -36,8 +36,7 @@ _STATUS = {RunStatus.COMPLETE: RowStatus.OK, RunStatus.UNRELIABLE: RowStatus.UNR
 
 def events(context: Any, effort: Effort) -> Problem:
     """Event-driven run against multiple precision, over the first seconds."""
-    table = context.scene.mechanism
-    duration = min(table.run.duration, 0.5 if effort.quick else _PRECISE_S)
+    duration = min(context.scene.mechanism.run.duration, 0.5 if effort.quick else _PRECISE_S)
     return event_problem(build(context.scene), duration, effort)
 
 
@@ -61,11 +60,11 @@ class _Truth(NamedTuple):
 def _reference(model: Tribometer, duration: float) -> _Truth:
     """Run the automaton at the times of theory/tribometer 10: 0.05, 0.10, ... below the duration."""
     times: Array = 0.05 * np.arange(1, max(2, round(duration / 0.05)), dtype=np.float64)
-    motion = model.event_driven(duration, times=times)
-    if not motion.complete:
-        raise SpecError(f"There is no reference to compare with: {motion.statement}")
-    name = f"event-driven run with relative tolerance 1e-14, error estimated {motion.error:.1e} m"
-    return _Truth(times, motion.x2, np.array([event.time for event in motion.events]), name)
+    found = model.event_driven(duration, times=times)
+    if not found.complete:
+        raise SpecError(f"There is no reference to compare with: {found.statement}")
+    name = f"event-driven run with relative tolerance 1e-14, error estimated {found.error:.1e} m"
+    return _Truth(times, found.x2, np.array([event.time for event in found.events]), name)
 
 
 def _row(method: str, value: float, run: Callable[[], StickSlipMotion], truth: _Truth, effort: Effort) -> Row:
@@ -77,8 +76,7 @@ def _row(method: str, value: float, run: Callable[[], StickSlipMotion], truth: _
     except SpecError as refusal:
         if method in _SETTINGS:
             raise
-        none = {"events": 0.0, "steps or calls": 0.0}
-        return replace(row, status=RowStatus.FAILED, reason=str(refusal), more=none)
+        return replace(row, status=RowStatus.FAILED, reason=str(refusal), more={"events": 0.0, "steps or calls": 0.0})
     status = _STATUS.get(motion.status, RowStatus.FAILED)
     found = np.array([event.time for event in motion.events])
     more = {"events": float(found.size), "steps or calls": float(motion.evaluations)}
