@@ -42,10 +42,9 @@ def events(context: Any, effort: Effort) -> Problem:
 
 def stick_slip(context: Any, effort: Effort) -> Problem:
     """All methods over the duration of the scene, with its settings."""
-    table = context.scene.mechanism
-    duration = min(table.run.duration, 1.0) if effort.quick else table.run.duration
-    m = table.methods
-    return stick_slip_problem(build(context.scene), duration, m.steps, m.speeds, m.solvers, effort)
+    run, ways = context.scene.mechanism.run, context.scene.mechanism.methods
+    duration = min(run.duration, 1.0) if effort.quick else run.duration
+    return stick_slip_problem(build(context.scene), duration, ways.steps, ways.speeds, ways.solvers, effort)
 
 
 class _Truth(NamedTuple):
@@ -156,8 +155,7 @@ def _default(method: str, name: str) -> Any:
 def event_problem(model: Tribometer, duration: float, effort: Effort | None = None) -> Problem:
     """Compare the event-driven run with multiple precision: final position and every event.
 
-    The law of the model has a Taylor series at rest, or `SpecError` is raised; multiple precision takes seconds for
-    each second of ``duration``.
+    Raises `SpecError` if the law has no Taylor series at rest; takes seconds for each second of ``duration``.
     """
     effort = effort or Effort()
     default = _default("event_driven", "rtol")
