@@ -697,10 +697,10 @@ def drawn_link() -> str:
     for end in (datum, second):
         board.line(end - 0.12j, end - 0.48j, colour="note", width=0.8)
     board.span(-0.4j, 2.4 - 0.4j, "L", aside=-0.05 + 0.17j)
-    board.line(2.28 - 0.4j, 2.52 - 0.4j, colour="b", width=5.0)
-    board.text(2.62 - 0.4j, "+b, -c", colour="b", anchor="start")
+    board.line(2.28 - 0.52j, 2.52 - 0.52j, colour="b", width=5.0)
+    board.text(2.62 - 0.52j, "+b, -c", colour="b", anchor="start")
     board.circle(hole, 0.2, colour="b", width=1.4, dash="4 3")
-    board.text(hole + 0.3 + 0.1j, "within a circle t", colour="b", anchor="start", size=13.0)
+    board.text(hole - 0.32 + 0.12j, "within a circle t", colour="b", anchor="end", size=13.0)
     board.joint(datum, second, hole)
     board.text(-0.15 + 0.25j, "datum")
     return board.svg("A link with three joints: a length with plus and minus, a hole within a circle, and a datum")
