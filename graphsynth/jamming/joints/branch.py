@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 #: So many times other points are tried for pieces that are not linked yet.
-_TRIES = 3
+_TRIES = 12
 
 
 class Branch(NamedTuple):

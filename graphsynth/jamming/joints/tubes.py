@@ -153,9 +153,11 @@ def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, co
     tight, domain, reach = Interval.zeros((count, 0)), Interval.zeros((count, 0)), np.zeros(half.shape)
     if size:
         proved, centre = _middle(system, u, x, p, counted)
+        tight = domain = centre
+    if size and half.any():
         rates = _rates(system, points(u.mid), centre, counted, points(p.mid))[2].mag
         move = (rates * half[:, None]).sum(axis=2)
-        reach = np.where(np.isfinite(rates), rates, 0.0).max(axis=1, initial=0.0, where=True) * half
+        reach = np.where(np.isfinite(rates), rates, 0.0).max(axis=1, initial=0.0) * half
         radius = _ROOM * move + (0.05 * (move / weights).max(axis=1, initial=0.0, keepdims=True) + 1e-10) * weights
         held, parts = np.zeros((count, size)), (u, p, steps)
         left = np.flatnonzero(proved)
