@@ -28,6 +28,8 @@ _shown.WORK.update(
         "draw motion": "graphsynth.drawing.methods:draw_motion",
         "plot motion": "graphsynth.drawing.methods:plot_motion",
         "animate motion": "graphsynth.drawing.methods:animate_motion",
+        "chart": "graphsynth.drawing.plots:Chart",
+        "chart line": "graphsynth.drawing.plots:Line",
         "motion picture": "graphsynth.drawing.methods:motion_picture",
     }
 )

@@ -13,6 +13,12 @@ from .intervals.paving import pave as pave
 from .intervals.proving import krawczyk as krawczyk
 from .jamming.assess import JammingReport as JammingReport, assess_jamming as assess_jamming
 from .jamming.bearing.fits import Fit as Fit
+from .jamming.chance.allocation import Grade as Grade, allocate_tolerances as allocate_tolerances
+from .jamming.chance.distributions import Distribution as Distribution
+from .jamming.chance.probability import (
+    JammingProbability as JammingProbability,
+    probability_of_jamming as probability_of_jamming,
+)
 from .jamming.joints.assess import CoupledReport as CoupledReport
 from .jamming.joints.limits import JointLimits as JointLimits, Misalignment as Misalignment
 from .kinematics.certify.poses import certify as certify

@@ -232,6 +232,34 @@ def jam_arcs() -> str:
     return board.svg("Two jam arcs per turn, where the sine of the tilt exceeds the critical one")
 
 
+def binding_corner() -> str:
+    """Draw the part of a box of tolerances that binds, between two lines, and the box that is left to look at."""
+    board = Board(560, 300, 60 + 255j, 1.0)
+    wide, high, rest = 400.0, 205.0, 17.0
+
+    def line(x: float) -> float:
+        return 330.0 - 0.62 * x
+
+    left, low = (330.0 - rest - high) / 0.62, line(wide) - rest
+    board.line(0j, wide + 0j, complex(wide, high), 1j * high, 0j, colour="ink")
+    corners = complex(left, low), complex(wide, low), complex(wide, high), complex(left, high)
+    board.line(*corners, corners[0], colour="note", dash="5 4")
+    curve = [complex(x, line(x) + 10.0 - 1.6e-3 * (x - 290.0) ** 2) for x in range(180, int(wide) + 1)]
+    curve = [point for point in curve if point.imag <= high]
+    board.line(*curve, complex(wide, high), colour="b", width=0, fill="b")
+    board.curve(curve, colour="b", width=2.2)
+    for shift in (rest, -rest):
+        start = (330.0 + shift - high) / 0.62
+        board.line(complex(start, high), complex(wide, line(wide) + shift), colour="a", width=1.2, dash="2 4")
+    board.text(345 + 178j, "m < 0: binds", colour="b", size=13)
+    board.text(80 + 70j, "ruled out", size=13)
+    board.text(complex(wide + 42, line(wide)), "line ± ρ", colour="a", size=13)
+    board.text(complex(left + 48, low + 14), "what is left", colour="note", size=12)
+    board.text(wide - 14j, "v1", size=13)
+    board.text(-14 + 1j * high, "v2", size=13)
+    return board.svg("The part of a box that binds, the margin between two lines, and the box that is left")
+
+
 def whitney() -> str:
     """Draw a peg in a hole with two contacts, and the diagram of its loads."""
     board = Board(660, 330, 150 + 150j, 3.0)
@@ -745,6 +773,7 @@ DRAWINGS = {
     "theory-linkage": lambda_linkage,
     "theory-modes": modes,
     "theory-platform": platform,
+    "theory-probability": binding_corner,
     "theory-shared-tilt": shared_tilt,
     "theory-singular": singular,
     "theory-small-crank": small_crank,

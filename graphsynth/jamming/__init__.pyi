@@ -44,4 +44,20 @@ from .bearing.limits import (
 )
 from .bearing.parameters import Range as Range, ToleranceBox as ToleranceBox, spread as spread
 from .bearing.sweep import TurnPartition as TurnPartition, sweep_linkage as sweep_linkage, sweep_turn as sweep_turn
+from .chance.allocation import (
+    Allocation as Allocation,
+    Grade as Grade,
+    ParetoCurve as ParetoCurve,
+    allocate_tolerances as allocate_tolerances,
+    pareto_curve as pareto_curve,
+)
+from .chance.distributions import Distribution as Distribution
+from .chance.probability import (
+    CommonFactor as CommonFactor,
+    JammingProbability as JammingProbability,
+    SampledProbability as SampledProbability,
+    SensitivityOfProbability as SensitivityOfProbability,
+    ToleranceEffect as ToleranceEffect,
+    probability_of_jamming as probability_of_jamming,
+)
 from .verdict import Verdict as Verdict
