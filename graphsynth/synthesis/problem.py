@@ -48,7 +48,7 @@ WorkItem = Chunk | OneByOne
 class EnumerationProblem:
     """What to enumerate or to count."""
 
-    title: str  # one line for people; also identifies the problem when interrupted work is resumed
+    title: str  # one line for people
     families: tuple[Family, ...]  # what the search kernels generate
     one_by_one: tuple[OneByOne, ...] = ()  # what is made one by one; listed first
     symmetry: int = 0  # 0, or the prime order of a required automorphism
@@ -57,8 +57,9 @@ class EnumerationProblem:
 
     @property
     def signature(self) -> str:
-        """A short text that differs between problems."""
-        return sha256(repr(self).encode()).hexdigest()[:16]
+        """A short text that differs between problems; catalogues and journals keep it, so its form stays as it was."""
+        text = repr(self).replace("EnumerationProblem(", "Problem(").replace("one_by_one=", "handfuls=")
+        return sha256(text.replace("OneByOne(", "Handful(").encode()).hexdigest()[:16]
 
     def work_items(self, *, listing: bool) -> list[WorkItem]:
         """Cut the problem; the cut depends on the problem alone."""
@@ -303,8 +304,7 @@ def graphs(items: Iterable[WorkItem], executor: Executor | None) -> Iterator[Mec
 def processes(workers: int) -> AbstractContextManager[Executor | None]:
     """Give a pool of worker processes, or None for one worker (then everything is done in this process).
 
-    The kernels are compiled here first, so that the workers find them in the cache.  When the block is left by an
-    exception (Ctrl-C), the workers are stopped at once; what was already written stays.
+    Kernels are compiled here first, so that workers find them in the cache.  An exception (Ctrl-C) stops the workers.
     """
     return processes_of(workers, _compile_kernels)
 

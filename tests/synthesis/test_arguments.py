@@ -70,6 +70,12 @@ def test_numbers_of_numpy_are_the_same_question():
     assert StructuralSpec(levels={np.int64(1): 2}).levels == {1: (2, 2)}
 
 
+def test_stored_names_of_questions_stay():
+    """Catalogues and journals name a question by its signature: it may not change with the words of the code."""
+    six = EnumerationProblem.chains(6, 1, 3, None, True, None)
+    assert (six.signature, [item.weight for item in six.work_items(listing=True)]) == ("0a85df02c530983a", [1.0, 2.0])
+
+
 @pytest.mark.parametrize("bad", NOT_NUMBERS, ids=lambda bad: type(bad).__name__)
 def test_anything_else_gets_a_sentence(bad):
     calls = [
