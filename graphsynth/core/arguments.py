@@ -95,12 +95,12 @@ def _union(annotation: str, words: Mapping[str, Look], module: Mapping[str, Any]
     parts = _split(annotation, "|")
     looks = [_part(part, words, module) for part in parts if part != "None"]
     known = [look for look in looks if look is not None]
-    classes = {part for part in parts if part not in words}
     if not known or len(known) < len(looks):
         return None
 
     def look(value: Any) -> str:
-        if (value is None and "None" in parts) or any(base.__name__ in classes for base in type(value).__mro__):
+        ours = {base.__name__ for base in type(value).__mro__ if base.__module__.startswith("graphsynth.")}
+        if (value is None and "None" in parts) or ours & (set(parts) - words.keys()):
             return ""  # no other class is looked up, which would import its module
         said = [look(value) for look in known]
         if "" in said:
