@@ -1,4 +1,4 @@
-"""Loops and bodies: the small-tilt closure of any planar mechanism.
+"""Loops and bodies: the small-tilt closure of any planar mechanism, in numbers and in intervals.
 
 Body i has the tilt vector ``omega_i`` and the axial displacement ``w_i``: ``z_i(r) = w_i + cross(omega_i, r)``.  At
 joint j between bodies a and b, ``tau_j = omega_b - omega_a - d_j`` (d_j the misalignment of its axis) and
@@ -14,11 +14,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.intervals import Interval
 from graphsynth.jamming.joints.limits import Limits, Misalignment, bounds
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
 
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
+#: x and y of every joint, intervals or duals of shape (N,).
+Columns: TypeAlias = list[tuple[Any, Any]]
 
 #: Which tilt a limit is on: that of a round joint in all directions, or one of a straight guide.
 KINDS = ("tilt", "roll", "pitch")
@@ -150,6 +153,23 @@ def shifts(layout: Layout, base: Array, extra: float = 0.0) -> Array:
     return d
 
 
+def shifts_enclosed(layout: Layout, base: Interval) -> Interval:
+    """Enclose the misalignments over their tolerance boxes; ``base`` (N, joints, 2, 2) directions of links a and b."""
+    from graphsynth.intervals import cos, sin
+
+    count, joints = base.shape[:2]
+    zero = Interval.zeros((count,))
+    columns = [Interval.zeros((count, 2)) for _ in range(joints)]
+    for place, sign, tilt in layout.misalignments:
+        alpha = Interval.from_bounds(*bounds(tilt, "alpha")) * sign
+        direction = Interval.from_bounds(*bounds(tilt, "direction"))
+        c, s = cos(direction) * alpha, sin(direction) * alpha
+        turn = base[:, place, 0 if sign > 0 else 1]
+        x, y = turn[:, 0], turn[:, 1]
+        columns[place] = Interval.stack([x * c - y * s + zero, x * s + y * c + zero], axis=-1)
+    return Interval.stack(columns, axis=1) if joints else Interval.zeros((count, 0, 2))
+
+
 def moment_rows(layout: Layout, r: Array, e: Array) -> Array:
     """Matrix of all blocks' moments by the loop wrenches ``(M_x, M_y, f)``, shape (N, blocks, 2, 3 loops)."""
     C = layout.incidence
@@ -184,3 +204,39 @@ def work_row(layout: Layout, r: Array, d: Array) -> Array:
     rows[:, :, 0], rows[:, :, 1] = d[:, :, 0] @ C.T, d[:, :, 1] @ C.T
     rows[:, :, 2] = (d[:, :, 1] * r[:, :, 0] - d[:, :, 0] * r[:, :, 1]) @ C.T
     return rows.reshape(len(r), -1)
+
+
+def by_joint(values: Interval) -> Columns:
+    """Split pairs (N, joints, 2) into x and y of every joint."""
+    return [(values[:, k, 0], values[:, k, 1]) for k in range(values.shape[1])]
+
+
+def closure_sums(
+    layout: Layout, r: Columns, e: Columns, tau: Interval, zeta: Interval, length: float, d: Columns | None = None
+) -> list[Any]:
+    """Sum up every loop (3 for each): tilts, tilts, slips over ``length``; misalignments d included if given."""
+    zero = Interval.zeros((len(tau),))
+    x: list[Any] = [zero] * len(layout.joints)
+    y: list[Any] = [zero] * len(layout.joints)
+    for block, place in enumerate(layout.block_joint.tolist()):
+        axis = layout.block_axis[block]
+        if axis == ROUND:
+            x[place], y[place] = x[place] + tau[:, block, 0], y[place] + tau[:, block, 1]
+        else:
+            own, (a, b) = tau[:, block, 0], e[place]
+            if axis == PITCH:
+                a, b = -b, a
+            x[place], y[place] = x[place] + a * own, y[place] + b * own
+    if d is not None:
+        for place, _, _ in layout.misalignments:
+            x[place], y[place] = x[place] + d[place][0], y[place] + d[place][1]
+    sums: list[Any] = []
+    for signs in layout.incidence.tolist():
+        parts: list[Any] = [zero] * 3
+        for place, sign in enumerate(signs):
+            if sign == 0.0:
+                continue
+            lift = r[place][0] * y[place] - r[place][1] * x[place] + zeta[:, place] / length
+            parts = [p + v if sign > 0.0 else p - v for p, v in zip(parts, (x[place], y[place], lift))]
+        sums += parts
+    return sums

@@ -9,14 +9,13 @@ See theory/joints-that-share-a-tilt 4, 5.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.intervals import Dual, Interval, cos, sin
-from graphsynth.jamming.joints.closure import PITCH, ROLL, ROUND, Layout, moment_rows
-from graphsynth.jamming.joints.limits import bounds
+from graphsynth.intervals import Dual, Interval
+from graphsynth.jamming.joints.closure import PITCH, ROLL, ROUND, Columns, Layout, by_joint, closure_sums, moment_rows
 from graphsynth.jamming.joints.positions import enclosed_solve, points
 from graphsynth.jamming.joints.program import PoseSolution, Units
 
@@ -28,8 +27,6 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 #: Share in which a joint that is used up may still tilt further in a correction.
 _STIFF = 1e-3
-#: x and y of every joint, intervals or duals of shape (N,).
-Columns: TypeAlias = list[tuple[Any, Any]]
 
 
 class Moving(NamedTuple):
@@ -65,21 +62,6 @@ class Pieces(NamedTuple):
     moving: Moving | None = None
 
 
-def shifts_enclosed(layout: Layout, base: Interval) -> Interval:
-    """Enclose the misalignments over their tolerance boxes; ``base`` (N, joints, 2, 2) directions of links a and b."""
-    count, joints = base.shape[:2]
-    zero = Interval.zeros((count,))
-    columns = [Interval.zeros((count, 2)) for _ in range(joints)]
-    for place, sign, tilt in layout.misalignments:
-        alpha = Interval.from_bounds(*bounds(tilt, "alpha")) * sign
-        direction = Interval.from_bounds(*bounds(tilt, "direction"))
-        c, s = cos(direction) * alpha, sin(direction) * alpha
-        turn = base[:, place, 0 if sign > 0 else 1]
-        x, y = turn[:, 0], turn[:, 1]
-        columns[place] = Interval.stack([x * c - y * s + zero, x * s + y * c + zero], axis=-1)
-    return Interval.stack(columns, axis=1) if joints else Interval.zeros((count, 0, 2))
-
-
 def _around(values: Interval, radius: Array) -> Interval:
     """Widen pairs (N, joints, 2) by (N, joints)."""
     return values + Interval.from_bounds(-radius, radius).reshape(*radius.shape, 1)
@@ -111,7 +93,7 @@ def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglect
         columns.append(total)
     wrench = Interval.stack(columns, axis=1)
     m = (wrench[:, :, 0] - wrench[:, :, 2] * r[:, :, 1], wrench[:, :, 1] + wrench[:, :, 2] * r[:, :, 0])
-    work = _work(layout, wrench, _columns(r), _columns(at.d))
+    work = _work(layout, wrench, by_joint(r), by_joint(at.d))
     if at.moving is not None and exact is None:
         work = _straight_work(layout, wrench, at.moving, found.units, work)
     cost = Interval.zeros((len(found.y),))
@@ -205,7 +187,7 @@ def _work(layout: Layout, wrench: Interval, r: Columns, d: Columns) -> Any:
 
 def _straight_work(layout: Layout, wrench: Interval, moving: Moving, units: Units, whole: Interval) -> Interval:
     """Narrow the work by the mean value theorem: wrenches are in equilibrium whatever the positions."""
-    middle = _work(layout, wrench, _columns((moving.r - Interval(units.centre)) / units.length), _columns(moving.d))
+    middle = _work(layout, wrench, by_joint((moving.r - Interval(units.centre)) / units.length), by_joint(moving.d))
     r = (moving.r_slope / units.length, moving.r + (moving.r_slope * _spread(moving)).sum(0))
     d = (moving.d_slope, moving.d + (moving.d_slope * _spread(moving)).sum(0))
     values = (_duals((r[1] - Interval(units.centre)) / units.length, r[0]), _duals(d[1], d[0]))
@@ -260,11 +242,11 @@ def upper_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglect
         off = off + Interval.from_bounds(-rest, rest)
         r, e = _around(r, (points(exact.r) / length).hi), _around(e, exact.e)
     off = _remainder(layout, at, found.units, rule, closes, (off, r, e, exact))
-    places, guides = _columns(r), _columns(e)
+    places, guides = by_joint(r), by_joint(e)
     columns = tilts.shape[-1]
     parts = []
     for c in range(columns):
-        sums = _closure(layout, places, guides, points(tilts[..., c]), points(slips[..., c]), length)
+        sums = closure_sums(layout, places, guides, points(tilts[..., c]), points(slips[..., c]), length)
         parts.append(Interval.stack(sums, axis=-1))
     matrix = Interval.stack(parts, axis=-1)
     step, fine = enclosed_solve(matrix, -off)
@@ -303,11 +285,11 @@ def _rule(
     length, centre = found.units.length, Interval(found.units.centre)
     own = (at.r - centre) / length, moving.r_slope / length
     values = _duals(*own), _duals(at.e, moving.e_slope), _duals(at.d, moving.d_slope)
-    sums = _closure(layout, values[0], values[1], points(tau), points(zeta), length, values[2])
+    sums = closure_sums(layout, values[0], values[1], points(tau), points(zeta), length, values[2])
     zero = Interval.zeros(moving.steps.shape)
     change = Interval.stack([v.grad + zero if isinstance(v, Dual) else zero for v in sums], axis=-1)
-    middle = _columns((moving.r - centre) / length), _columns(moving.e)
-    sums = _closure(layout, *middle, points(tau), points(zeta), length)
+    middle = by_joint((moving.r - centre) / length), by_joint(moving.e)
+    sums = closure_sums(layout, *middle, points(tau), points(zeta), length)
     held = np.nan_to_num(np.stack([value.mid for value in sums], axis=-1))
     C, y = np.nan_to_num(change.mid), np.nan_to_num(found.y)
     given = (held * y).sum(axis=-1)
@@ -335,13 +317,13 @@ def _remainder(
     kinds, count = moving.steps.shape
     many = [Interval.from_bounds(np.tile(v.lo, (kinds, 1, 1)), np.tile(v.hi, (kinds, 1, 1))) for v in (r, e)]
     tau, zeta = rule.by.reshape(-1, *rule.tau.shape[1:]), rule.slip.reshape(-1, rule.zeta.shape[1])
-    sums = _closure(layout, _columns(many[0]), _columns(many[1]), points(tau), points(zeta), units.length)
+    sums = closure_sums(layout, by_joint(many[0]), by_joint(many[1]), points(tau), points(zeta), units.length)
     follows = Interval.stack(sums, axis=-1).reshape(kinds, count, -1)
     steps = moving.steps.reshape(kinds, count, 1)
     plain = off + (follows * steps).sum(0)
     centre = Interval(units.centre)
-    middle = (_columns((moving.r - centre) / units.length), _columns(moving.e))
-    sums = _closure(layout, *middle, points(rule.tau), points(rule.zeta), units.length, _columns(moving.d))
+    middle = (by_joint((moving.r - centre) / units.length), by_joint(moving.e))
+    sums = closure_sums(layout, *middle, points(rule.tau), points(rule.zeta), units.length, by_joint(moving.d))
     straight = Interval.stack(sums, axis=-1) + ((change + follows) * steps).sum(0)
     if exact is not None:
         rest = _disturbed(layout, (at.r - centre) / units.length, at, rule.tau, units.length, exact)
@@ -465,9 +447,9 @@ def _fill_free(layout: Layout, r: Array, at: Pieces, start: tuple[Array, Array],
     rows = moment_rows(layout, r, at.e.mid)[:, blocks].reshape(count, -1, 3 * layout.loops)
     slips = np.zeros((count, int(joints.sum()), 3 * layout.loops))
     slips[:, :, 2::3] = layout.incidence.T[joints]
-    middle = (_columns(points(value)) for value in (r, at.e.mid, at.d.mid))
+    middle = (by_joint(points(value)) for value in (r, at.e.mid, at.d.mid))
     places, guides, shift = middle
-    off = Interval.stack(_closure(layout, places, guides, points(tau), points(zeta), length, shift), axis=-1).mid
+    off = Interval.stack(closure_sums(layout, places, guides, points(tau), points(zeta), length, shift), axis=-1).mid
     both = np.concatenate([rows, slips], axis=1).transpose(0, 2, 1)
     value = -(np.linalg.pinv(both, rcond=1e-12) @ np.nan_to_num(off)[:, :, None])[..., 0]
     n = 2 * int(blocks.sum())
@@ -477,42 +459,7 @@ def _fill_free(layout: Layout, r: Array, at: Pieces, start: tuple[Array, Array],
     return tau, zeta
 
 
-def _closure(
-    layout: Layout, r: Columns, e: Columns, tau: Interval, zeta: Interval, length: float, d: Columns | None = None
-) -> list[Any]:
-    """Sum up every loop (3 for each): tilts, tilts, slips over ``length``; misalignments d included if given."""
-    zero = Interval.zeros((len(tau),))
-    x: list[Any] = [zero] * len(layout.joints)
-    y: list[Any] = [zero] * len(layout.joints)
-    for block, place in enumerate(layout.block_joint.tolist()):
-        axis = layout.block_axis[block]
-        if axis == ROUND:
-            x[place], y[place] = x[place] + tau[:, block, 0], y[place] + tau[:, block, 1]
-        else:
-            own, (a, b) = tau[:, block, 0], e[place]
-            if axis == PITCH:
-                a, b = -b, a
-            x[place], y[place] = x[place] + a * own, y[place] + b * own
-    if d is not None:
-        for place, _, _ in layout.misalignments:
-            x[place], y[place] = x[place] + d[place][0], y[place] + d[place][1]
-    sums: list[Any] = []
-    for signs in layout.incidence.tolist():
-        parts: list[Any] = [zero] * 3
-        for place, sign in enumerate(signs):
-            if sign == 0.0:
-                continue
-            lift = r[place][0] * y[place] - r[place][1] * x[place] + zeta[:, place] / length
-            parts = [p + v if sign > 0.0 else p - v for p, v in zip(parts, (x[place], y[place], lift))]
-        sums += parts
-    return sums
-
-
-def _columns(values: Interval) -> Columns:
-    return [(values[:, k, 0], values[:, k, 1]) for k in range(values.shape[1])]
-
-
 def _off(layout: Layout, at: Pieces, scaled: Interval, tau: Interval, zeta: Interval, units: Units) -> Interval:
     """Enclose what is missing from the closure of given tilts over a piece, (N, 3 loops)."""
-    sums = _closure(layout, _columns(scaled), _columns(at.e), tau, zeta, units.length, _columns(at.d))
+    sums = closure_sums(layout, by_joint(scaled), by_joint(at.e), tau, zeta, units.length, by_joint(at.d))
     return Interval.stack(sums, axis=-1)

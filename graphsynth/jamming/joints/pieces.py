@@ -19,16 +19,8 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval, check_rounding
-from graphsynth.jamming.joints.closure import Layout, shifts
-from graphsynth.jamming.joints.enclosure import (
-    Moving,
-    Pieces,
-    estimated_range,
-    lower_bounds,
-    shifts_enclosed,
-    start_tilts,
-    upper_bounds,
-)
+from graphsynth.jamming.joints.closure import Layout, shifts, shifts_enclosed
+from graphsynth.jamming.joints.enclosure import Moving, Pieces, estimated_range, lower_bounds, start_tilts, upper_bounds
 from graphsynth.jamming.joints.exact import Neglected, neglected
 from graphsynth.jamming.joints.limits import Misalignment, bounds
 from graphsynth.jamming.joints.positions import Positions, points
