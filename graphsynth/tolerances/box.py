@@ -8,7 +8,8 @@ See theory/drawing-tolerances 2.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -26,8 +27,7 @@ Term: TypeAlias = tuple[int, Interval | float, Interval | float]
 class LinkPoint(NamedTuple):
     """Point of a joint on one of its links: nominal place, terms, and growth per unit of the parameter ``heat``.
 
-    Places are counted from the ``datum`` of the link, one of its joints, unless it is the ``fixed`` one: so it does not
-    matter where the frame of the link has its origin.
+    Places are counted from the ``datum`` of the link, one of its joints, not from its origin, unless it is ``fixed``.
     """
 
     at: tuple[float, float]
@@ -85,14 +85,18 @@ class ParameterBox:
         """The box, shape (m,)."""
         return Interval.from_bounds(self.low, self.high)
 
+    @cached_property
+    def _still(self) -> list[tuple[Pair | None, ...]]:
+        """Points that no parameter moves."""
+        return [tuple(None if p.terms or p.growth else p.place(()) for p in both) for both in self.points]
+
     def places(self, values: Sequence[Any]) -> list[tuple[Pair, Pair]]:
         """Points of every joint on its links, for values of the parameters in any arithmetic."""
-        return [(a.place(values), b.place(values)) for a, b in self.points]
+        both = zip(self.points, self._still)
+        return [(still_a or a.place(values), still_b or b.place(values)) for (a, b), (still_a, still_b) in both]
 
     def member(self, mechanism: Mechanism, values: Array) -> Mechanism:
         """Return the mechanism with given values of the parameters, its coordinates rounded to doubles."""
-        from dataclasses import replace
-
         exact = [Interval(float(value)) for value in values]
         joints = []
         for joint, ends in zip(mechanism.joints, self.points):

@@ -24,7 +24,7 @@ LARGEST = 500
 _TINY = 1
 _MICRO = Fraction(1, 1000)
 _FINEST_WITH_DELTA = GRADES.index("3")
-_CLASS = re.compile(r"([A-Za-z]{1,2})(01|0|[1-9]\d?)")
+_CLASS = re.compile(r"([A-Z]{1,2}|[a-z]{1,2})(01|0|[1-9]\d?)")
 _FIT = re.compile(r"(?:(?P<size>[^\sA-Za-z]+)\s*)?(?P<hole>[A-Z]{1,2}\d+)\s*/?\s*(?P<shaft>[a-z]{1,2}\d+)")
 
 
@@ -146,7 +146,7 @@ def limit_deviations(tolerance_class: str, size: Any) -> LimitDeviations:
     LimitDeviations(lower=Fraction(-3, 200), upper=Fraction(3, 500))
     """
     parts = _CLASS.fullmatch(tolerance_class.strip()) if isinstance(tolerance_class, str) else None
-    if parts is None or parts[2] not in GRADES or parts[1].lower() not in LETTERS or parts[1] != _one_case(parts[1]):
+    if parts is None or parts[2] not in GRADES or parts[1].lower() not in LETTERS:
         raise GeometryError(
             f"tolerance class {tolerance_class!r} is not in the table; give a letter a to zc (A to ZC for a hole) and "
             "a grade 01 to 18, as H7 or g6"
@@ -161,10 +161,6 @@ def limit_deviations(tolerance_class: str, size: Any) -> LimitDeviations:
     value, is_upper = found
     lower = value - width if is_upper else value
     return LimitDeviations(lower * _MICRO, (lower + width) * _MICRO)
-
-
-def _one_case(letters: str) -> str:
-    return letters.upper() if letters[0].isupper() else letters.lower()
 
 
 def _shaft(letter: str, grade: str, size: Fraction) -> tuple[Fraction, bool] | None:

@@ -75,8 +75,6 @@ def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglect
     any numbers give valid bounds for every member, 0 where nothing is proved.  With ``exact`` above 1 only where exact
     tilts bind too.
     """
-    if layout.loops == 0:
-        return np.zeros(len(at.r))
     length = found.units.length
     if exact is not None:
         at = Pieces(_around(at.r, exact.r), _around(at.e, exact.e), _around(at.d, exact.d))
@@ -167,7 +165,7 @@ def _forbidden(layout: Layout, r: Interval, e: Interval) -> Interval | None:
     return Interval.stack([Interval.stack([value + nothing for value in row], axis=-1) for row in rows], axis=1)
 
 
-def start_tilts(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array, Array]:
+def _start_tilts(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array, Array]:
     """Tilts (N, blocks, 2) and slips (N, joints) from which a closed system is sought, in floats."""
     tau, zeta = np.nan_to_num(found.tau), np.nan_to_num(found.zeta)
     tau[:, layout.limit == 0.0], zeta[:, layout.end_float == 0.0] = 0.0, 0.0
@@ -212,7 +210,9 @@ class Rule(NamedTuple):
     """How a sharing of the tilts follows the input and the parameters, to first order; any numbers give valid bounds.
 
     ``tau`` (N, blocks, 2) and ``zeta`` (N, joints) at the middle, ``by`` (K, N, blocks, 2) and ``slip`` (K, N, joints)
-    what one unit of each parameter adds; ``rates`` (N, K): relative change of the factor (estimated).
+    what one unit of each parameter adds; ``rates`` (N, K): relative change of the factor (estimated).  ``tilts`` and
+    ``slips`` are the directions of `_directions`.  Enclosed: closure of tau and zeta over the piece ``off`` and at its
+    middle ``middle``, (N, 3 loops), and its derivatives ``change`` (K, N, 3 loops).
     """
 
     tau: Array
@@ -220,77 +220,43 @@ class Rule(NamedTuple):
     by: Array
     slip: Array
     rates: Array
+    tilts: Array
+    slips: Array
+    off: Interval
+    middle: Interval
+    change: Interval
+
+    def take(self, rows: NDArray[np.intp]) -> Rule:
+        """Return some of the pieces."""
+        by_kind = ("by", "slip", "change")
+        return Rule._make(own[:, rows] if name in by_kind else own[rows] for name, own in self._asdict().items())
 
 
 @np.errstate(all="ignore")
-def upper_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglected | None = None) -> Array:
-    """Upper bounds as `lower_bounds`, or infinity; with ``exact`` below 1 only where exact tilts are free too.
-
-    The tilts are ``tau + sum of by_k step_k`` plus what closes the loops exactly for every member: an enclosed linear
-    solve of a remainder of second order.
-    """
-    if layout.loops == 0:
-        return np.zeros(len(at.r))
-    length = found.units.length
-    r, e = (at.r - Interval(found.units.centre)) / length, at.e
-    tau, zeta = start_tilts(layout, at, found)
-    tilts, slips = _directions(layout, r.mid, e.mid, (tau, zeta), length)
-    rule, closes = _rule(layout, at, found, (tau, zeta), (tilts, slips))
-    off = _off(layout, at, r, points(tau), points(zeta), found.units)
-    if exact is not None:
-        rest = _disturbed(layout, r, at, tau, length, exact)
-        off = off + Interval.from_bounds(-rest, rest)
-        r, e = _around(r, (points(exact.r) / length).hi), _around(e, exact.e)
-    off = _remainder(layout, at, found.units, rule, closes, (off, r, e, exact))
-    places, guides = by_joint(r), by_joint(e)
-    columns = tilts.shape[-1]
-    parts = []
-    for c in range(columns):
-        sums = closure_sums(layout, places, guides, points(tilts[..., c]), points(slips[..., c]), length)
-        parts.append(Interval.stack(sums, axis=-1))
-    matrix = Interval.stack(parts, axis=-1)
-    step, fine = enclosed_solve(matrix, -off)
-    steps = Interval.zeros((0, len(step))) if at.moving is None else at.moving.steps
-    worst = _largest_ratio(layout, rule, (tilts, slips), (steps, step), exact)
-    sound = fine & ~np.isnan(worst)
-    if exact is not None:
-        sound &= exact.sound
-    return np.where(sound, worst, np.inf)
-
-
-def estimated_range(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array, Array]:
-    """Estimate the range of the factor over pieces, to first order."""
-    if layout.loops == 0 or at.moving is None:
-        return np.zeros(len(at.r)), np.zeros(len(at.r))
-    start = start_tilts(layout, at, found)
-    length = found.units.length
-    ways = _directions(layout, (at.r.mid - found.units.centre) / length, at.e.mid, start, length)
-    rates = _rule(layout, at, found, start, ways)[0].rates
-    change = (np.abs(rates) * at.moving.steps.mag.T).sum(axis=1)
-    return found.lower * np.maximum(1.0 - change, 0.0), found.lower * (1.0 + change)
-
-
-def _rule(
-    layout: Layout, at: Pieces, found: PoseSolution, start: tuple[Array, Array], ways: tuple[Array, Array]
-) -> tuple[Rule, Interval | None]:
-    """Choose the rule, in floats, and enclose how the closure of the tilts at the middle changes, (K, N, 3 loops).
+def rule_of(layout: Layout, at: Pieces, found: PoseSolution) -> Rule:
+    """Choose the rule, in floats.
 
     The optimal factor changes by ``g = - (y . C) / (y . closure(tau))`` for a change C of the closure, y the wrenches
     of the dual program.  All tilts in proportion take that part; what is left needs no more of the joints that bind.
     """
-    moving, (tau, zeta) = at.moving, start
-    if moving is None:
-        none = np.zeros((0, *tau.shape)), np.zeros((0, *zeta.shape)), np.zeros((len(tau), 0))
-        return Rule(tau, zeta, *none), None
     length, centre = found.units.length, Interval(found.units.centre)
-    own = (at.r - centre) / length, moving.r_slope / length
-    values = _duals(*own), _duals(at.e, moving.e_slope), _duals(at.d, moving.d_slope)
-    sums = closure_sums(layout, values[0], values[1], points(tau), points(zeta), length, values[2])
+    r, moving = (at.r - centre) / length, at.moving
+    tau, zeta = _start_tilts(layout, at, found)
+    ways = _directions(layout, r.mid, at.e.mid, (tau, zeta), length)
+    start = points(tau), points(zeta)
+    off = Interval.stack(closure_sums(layout, by_joint(r), by_joint(at.e), *start, length, by_joint(at.d)), axis=-1)
+    if moving is None:
+        empty = np.zeros((0, *tau.shape)), np.zeros((0, *zeta.shape)), np.zeros((len(tau), 0))
+        return Rule(tau, zeta, *empty, *ways, off, off, Interval.zeros((0, *off.shape)))
+    values = _duals(r, moving.r_slope / length), _duals(at.e, moving.e_slope), _duals(at.d, moving.d_slope)
+    sums = closure_sums(layout, *values[:2], *start, length, values[2])
     zero = Interval.zeros(moving.steps.shape)
     change = Interval.stack([v.grad + zero if isinstance(v, Dual) else zero for v in sums], axis=-1)
-    middle = by_joint((moving.r - centre) / length), by_joint(moving.e)
-    sums = closure_sums(layout, *middle, points(tau), points(zeta), length)
-    held = np.nan_to_num(np.stack([value.mid for value in sums], axis=-1))
+    place = (moving.r - centre) / length
+    sums = closure_sums(layout, by_joint(place), by_joint(moving.e), *start, length, by_joint(moving.d))
+    rows = moment_rows(layout, place.mid, moving.e.mid)
+    held = np.nan_to_num(np.einsum("nbic,nbi->nc", rows, tau))
+    held[:, 2::3] += zeta @ layout.incidence.T / length
     C, y = np.nan_to_num(change.mid), np.nan_to_num(found.y)
     given = (held * y).sum(axis=-1)
     rates = np.where(given != 0.0, -(C * y).sum(axis=-1) / np.where(given != 0.0, given, 1.0), 0.0)
@@ -298,50 +264,73 @@ def _rule(
     left = np.where(moving.sound[:, None], -(C + rates[..., None] * held), 0.0)
     by = rates[..., None, None] * tau + np.einsum("nbic,knc->knbi", ways[0], left)
     slip = rates[..., None] * zeta + np.einsum("njc,knc->knj", ways[1], left)
-    return Rule(tau, zeta, np.nan_to_num(by), np.nan_to_num(slip), rates.T), change
+    return Rule(
+        tau, zeta, np.nan_to_num(by), np.nan_to_num(slip), rates.T, *ways, off, Interval.stack(sums, axis=-1), change
+    )
+
+
+@np.errstate(all="ignore")
+def upper_bounds(
+    layout: Layout, at: Pieces, found: PoseSolution, exact: Neglected | None = None, rule: Rule | None = None
+) -> Array:
+    """Upper bounds as `lower_bounds`, or infinity; with ``exact`` below 1 only where exact tilts are free too.
+
+    The tilts are ``tau + sum of by_k step_k`` plus what closes the loops exactly for every member: an enclosed linear
+    solve of a remainder of second order.  ``rule`` is that of `rule_of`.
+    """
+    rule = rule_of(layout, at, found) if rule is None else rule
+    length = found.units.length
+    whole = (at.r - Interval(found.units.centre)) / length
+    r, e, rest = whole, at.e, Interval(0)
+    if exact is not None:
+        more = _disturbed(layout, whole, at, rule.tau, length, exact)
+        rest = Interval.from_bounds(-more, more)
+        r, e = _around(r, (points(exact.r) / length).hi), _around(e, exact.e)
+    off = _remainder(layout, at.moving, length, rule, (r, e)) + rest
+    places, guides = by_joint(r), by_joint(e)
+    parts = []
+    for c in range(rule.tilts.shape[-1]):
+        ways = points(rule.tilts[..., c]), points(rule.slips[..., c])
+        parts.append(Interval.stack(closure_sums(layout, places, guides, *ways, length), axis=-1))
+    step, fine = enclosed_solve(Interval.stack(parts, axis=-1), -off)
+    steps = Interval.zeros((0, len(step))) if at.moving is None else at.moving.steps
+    worst = _largest_ratio(layout, rule, (steps, step), exact)
+    sound = fine & ~np.isnan(worst)
+    if exact is not None:
+        sound &= exact.sound
+    return np.where(sound, worst, np.inf)
+
+
+def factor_range(rule: Rule, steps: Interval, found: PoseSolution) -> tuple[Array, Array]:
+    """Estimate the range of the factor over pieces with these ``steps`` (K, N), to first order."""
+    change = (np.abs(rule.rates) * steps.mag.T).sum(axis=1)
+    return found.lower * np.maximum(1.0 - change, 0.0), found.lower * (1.0 + change)
 
 
 def _remainder(
-    layout: Layout,
-    at: Pieces,
-    units: Units,
-    rule: Rule,
-    change: Interval | None,
-    given: tuple[Interval, Interval, Interval, Neglected | None],
+    layout: Layout, moving: Moving | None, length: float, rule: Rule, wide: tuple[Interval, Interval]
 ) -> Interval:
-    """Enclose what is missing from the closure of the tilts of the rule, (N, 3 loops)."""
-    off, r, e, exact = given
-    moving = at.moving
-    if moving is None or change is None:
-        return off
+    """Enclose what is missing from the closure of the tilts of the rule, (N, 3 loops); ``wide`` positions and guides.
+
+    Over the whole piece, and by the mean value theorem: the narrower of both.
+    """
+    if moving is None:
+        return rule.off
     kinds, count = moving.steps.shape
-    many = [Interval.from_bounds(np.tile(v.lo, (kinds, 1, 1)), np.tile(v.hi, (kinds, 1, 1))) for v in (r, e)]
+    many = [Interval.from_bounds(np.tile(v.lo, (kinds, 1, 1)), np.tile(v.hi, (kinds, 1, 1))) for v in wide]
     tau, zeta = rule.by.reshape(-1, *rule.tau.shape[1:]), rule.slip.reshape(-1, rule.zeta.shape[1])
-    sums = closure_sums(layout, by_joint(many[0]), by_joint(many[1]), points(tau), points(zeta), units.length)
+    sums = closure_sums(layout, by_joint(many[0]), by_joint(many[1]), points(tau), points(zeta), length)
     follows = Interval.stack(sums, axis=-1).reshape(kinds, count, -1)
     steps = moving.steps.reshape(kinds, count, 1)
-    plain = off + (follows * steps).sum(0)
-    centre = Interval(units.centre)
-    middle = (by_joint((moving.r - centre) / units.length), by_joint(moving.e))
-    sums = closure_sums(layout, *middle, points(rule.tau), points(rule.zeta), units.length, by_joint(moving.d))
-    straight = Interval.stack(sums, axis=-1) + ((change + follows) * steps).sum(0)
-    if exact is not None:
-        rest = _disturbed(layout, (at.r - centre) / units.length, at, rule.tau, units.length, exact)
-        straight = straight + Interval.from_bounds(-rest, rest)
-    better = plain.intersect(straight)
+    plain = rule.off + (follows * steps).sum(0)
+    better = plain.intersect(rule.middle + ((rule.change + follows) * steps).sum(0))
     use = moving.sound[:, None] & ~better.is_empty
     return Interval.from_bounds(np.where(use, better.lo, plain.lo), np.where(use, better.hi, plain.hi))
 
 
-def _largest_ratio(
-    layout: Layout,
-    rule: Rule,
-    ways: tuple[Array, Array],
-    moved: tuple[Interval, Interval],
-    exact: Neglected | None,
-) -> Array:
+def _largest_ratio(layout: Layout, rule: Rule, moved: tuple[Interval, Interval], exact: Neglected | None) -> Array:
     """Upper bound of the largest tilt or slip over its limit, (N,)."""
-    (tilts, slips), (steps, step) = ways, moved
+    tilts, slips, (steps, step) = rule.tilts, rule.slips, moved
     worst = np.zeros(len(rule.tau))
     limits, plays = layout.limit_range[:1], layout.end_float_range[:1]
     if exact is not None:
@@ -457,9 +446,3 @@ def _fill_free(layout: Layout, r: Array, at: Pieces, start: tuple[Array, Array],
     tau[:, layout.block_axis != ROUND, 1] = 0.0
     zeta[:, joints] = value[:, n:] * length
     return tau, zeta
-
-
-def _off(layout: Layout, at: Pieces, scaled: Interval, tau: Interval, zeta: Interval, units: Units) -> Interval:
-    """Enclose what is missing from the closure of given tilts over a piece, (N, 3 loops)."""
-    sums = closure_sums(layout, by_joint(scaled), by_joint(at.e), tau, zeta, units.length, by_joint(at.d))
-    return Interval.stack(sums, axis=-1)

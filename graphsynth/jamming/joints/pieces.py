@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval, check_rounding
 from graphsynth.jamming.joints.closure import Layout, shifts, shifts_enclosed
-from graphsynth.jamming.joints.enclosure import Moving, Pieces, estimated_range, lower_bounds, start_tilts, upper_bounds
+from graphsynth.jamming.joints.enclosure import Moving, Pieces, Rule, factor_range, lower_bounds, rule_of, upper_bounds
 from graphsynth.jamming.joints.exact import Neglected, neglected
 from graphsynth.jamming.joints.limits import Misalignment, bounds
 from graphsynth.jamming.joints.positions import Positions, points
 from graphsynth.jamming.joints.program import JointProblem, PoseSolution, check_motion, solve_poses
-from graphsynth.jamming.joints.tubes import Tubes, columns_of, prove_tubes, slopes, whole_box
+from graphsynth.jamming.joints.tubes import Tubes, columns_of, middles, prove_tubes, slopes, whole_box
 from graphsynth.tolerances.box import ParameterBox
 
 if TYPE_CHECKING:
@@ -237,11 +237,9 @@ class Work:
         found.box_lo[keep], found.box_hi[keep] = tubes.domain.lo, tubes.domain.hi
         rows = np.flatnonzero(tubes.proved)
         if rows.size:
-            own, x = keep[rows], tubes.tight.mid[rows]
-            middle = prove_tubes(
-                self.system, self.given.layout.joints, points(u.mid[own]), x, counted[rows], points(p.mid[own])
-            )
-            columns = self._bounds(u[own], tubes.take(rows), middle, counted[rows], p[own])
+            own, tubes = keep[rows], tubes.take(rows)
+            middle = middles(self.system, self.given.layout.joints, u[own], tubes, p[own])
+            columns = self._bounds(u[own], tubes, middle, counted[rows], p[own])
             for name, value in zip(("lower", "upper", "sure", "least", "most"), columns):
                 getattr(found, name)[own] = value
         return found
@@ -253,6 +251,9 @@ class Work:
         of their tilts, and what exact tilts add to it is the combination of what they add at the corners.
         """
         layout, count = self.given.layout, len(counted)
+        if layout.loops == 0:
+            none = np.zeros(count)
+            return none, none, np.full(count, int(self.exact), dtype=np.int8), none, none
         *rates, fine = slopes(self.system, layout.joints, u, tubes, counted, p)
         steps = Interval.stack([u, *columns_of(p)], axis=0)
         steps = steps - points(steps.mid)
@@ -278,9 +279,11 @@ class Work:
         upper, least, most = np.zeros((3, count))
         above = []
         for corner in self.corners:
-            above.append((corner, pieces(corner), solved(corner)))
-            upper = np.maximum(upper, upper_bounds(*above[-1]))
-            low, high = estimated_range(*above[-1])
+            bound = corner, pieces(corner), solved(corner)
+            rule = rule_of(*bound)
+            above.append((*bound, rule))
+            upper = np.maximum(upper, upper_bounds(*bound, rule=rule))
+            low, high = factor_range(rule, steps, bound[2])
             least, most = np.maximum(least, low), np.maximum(most, high)
         # one corner alone differs by a factor at most, which the bound from below does not see
         below = layout, pieces(layout), above[0][2] if len(self.corners) == 1 else solved(layout)
@@ -294,7 +297,7 @@ class Work:
         lower: Array,
         upper: Array,
         below: _Bound,
-        above: list[_Bound],
+        above: list[tuple[Layout, Pieces, PoseSolution, Rule]],
         tubes: Tubes,
         u: Interval,
         counted: Array,
@@ -315,11 +318,11 @@ class Work:
         rows = np.flatnonzero(upper < 1.0)
         if rows.size:
             free = np.ones(rows.size, dtype=bool)
-            for layout, whole, found in above:
-                at, found = _take(whole, rows), _take(found, rows)
-                tilts = np.abs(start_tilts(layout, at, found)[0]).sum(axis=-1)
+            for layout, whole, found, rule in above:
+                at, found, rule = _take(whole, rows), _take(found, rows), rule.take(rows)
+                tilts = np.abs(rule.tau).sum(axis=-1)
                 tilts = _ROOM * tilts + _SHARE * tilts.max(axis=1, keepdims=True, initial=0.0) + _LEAST
-                free &= upper_bounds(layout, at, found, rest(layout, rows, tilts)) < 1.0
+                free &= upper_bounds(layout, at, found, rest(layout, rows, tilts), rule) < 1.0
             sure[rows[free]] = 1
         return sure
 

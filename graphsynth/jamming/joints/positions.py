@@ -34,8 +34,6 @@ Mask = NDArray[np.bool_]
 #: Disturbances of every joint: offset of its point in the plane, and twist that it prescribes amiss.
 Moved: TypeAlias = list[tuple[Pair, Any]]
 PLANE = Plane(sin, cos, hypot, atan2)
-_CHUNK = 256
-_ROUNDS = 6
 
 
 class Unsupported(Exception):  # noqa: N818 - never leaves the package: it becomes an UNDECIDED with this reason
@@ -129,6 +127,12 @@ class Positions:
         """Return the same equations for other values of the parameters: intervals, or duals."""
         other = copy(self)
         other.local = self.box.places(values)
+        return other
+
+    def of(self, rows: NDArray[np.intp]) -> Positions:
+        """Return the same equations for some of the pieces that the values of `within` are for."""
+        other = copy(self)
+        other.local = [(_taken(a, rows), _taken(b, rows)) for a, b in self.local]
         return other
 
     @property
@@ -237,6 +241,11 @@ class Positions:
         """Enclose the coordinates of the drivers over the inputs (N,)."""
         laws: list[Any] = [driver.law for driver in self.mechanism.drivers]
         return [law.at(u, sin, cos)[0] for law in laws]
+
+
+def _taken(p: Pair, rows: NDArray[np.intp]) -> Pair:
+    x, y = (value[rows] if value.ndim else value for value in (p.x, p.y))
+    return Pair(x, y)
 
 
 def guide(joint: Prismatic | PinSlot, at: Placement) -> Pair:

@@ -93,7 +93,6 @@ def _worth(work: Work, found: Found, budget: Budget) -> Mask:
 
 def _divided(work: Work, found: Found, budget: Budget) -> tuple[Array, Array, Interval]:
     """Cut every piece where the assembly moves most: the input into `PARTS`, or a parameter in two."""
-    count = len(found.lo)
     reach = found.reach.copy()
     none = ~found.proved & (reach.max(axis=1, initial=0.0) == 0.0)
     reach[none, 0] = 1.0  # the middle is not assembled: nothing is known of the parameters
@@ -113,7 +112,6 @@ def _divided(work: Work, found: Found, budget: Budget) -> tuple[Array, Array, In
         middle = 0.5 * (low[at] + high[at])
         (high if half == 0 else low)[at] = middle
         parts.append((found.lo[rest], found.hi[rest], low, high))
-    assert sum(len(own[0]) for own in parts) == PARTS * by_input.size + 2 * (count - by_input.size)
     lo, hi, low, high = (np.concatenate(columns) for columns in zip(*parts))
     return lo, hi, Interval.from_bounds(low, high)
 
@@ -129,9 +127,11 @@ def _hopeless(work: Work, found: Found, again: Mask) -> Mask:
     if rows.size <= _FEW:
         return np.zeros_like(stuck)
     lo, hi = found.lo[rows], found.hi[rows]
-    p = Interval.from_bounds(np.tile(found.p_lo[rows], (3, 1)), np.tile(found.p_hi[rows], (3, 1)))
     inputs = np.concatenate([lo, 0.5 * (lo + hi), hi])
-    at = work.evaluate(inputs, inputs, p)
+    low, high = np.tile(found.p_lo[rows], (3, 1)), np.tile(found.p_hi[rows], (3, 1))
+    # neighbours share their ends
+    _, one, back = np.unique(np.column_stack([inputs, low, high]), axis=0, return_index=True, return_inverse=True)
+    at = work.evaluate(inputs[one], inputs[one], Interval.from_bounds(low[one], high[one])).take(back.reshape(-1))
     straddles, unsure, proved = (part.reshape(3, -1) for part in (at.straddles, at.unsure, at.proved))
     stuck[rows] = (proved & np.where(found.straddles[rows], straddles, unsure)).all(axis=0)
     return stuck

@@ -32,6 +32,7 @@ class Tubes(NamedTuple):
     """Pieces of the input and of the dimensions, and what is proved about them.
 
     ``proved`` (N,); ``domain`` and ``tight`` (N, size): the box with exactly one assembly, and where that lies;
+    ``centre`` (N, size): where it lies at the middle of the input and of the parameters;
     ``r``, ``e``, ``base`` (N, joints, 2), (N, joints, 2), (N, joints, 2, 2): positions, guide directions, directions of
     links a and b of the joints asked for.  Certified where proved.  ``reach`` (N, 1 + m): how far the input and each
     parameter lead the unknowns, in units of their weights (estimated): what is worth cutting.
@@ -40,6 +41,7 @@ class Tubes(NamedTuple):
     proved: Mask
     domain: Interval
     tight: Interval
+    centre: Interval
     r: Interval
     e: Interval
     base: Interval
@@ -115,7 +117,7 @@ def _middle(system: Positions, u: Interval, x: Array, p: Interval, counted: Arra
     low, high, proved = x - radius, x + radius, np.zeros(len(x), dtype=np.bool_)
     left = np.arange(len(x))
     for _ in range(_ROUNDS):
-        box, own = Interval.from_bounds(low[left], high[left]), _taken(at, left)
+        box, own = Interval.from_bounds(low[left], high[left]), at.of(left)
         driven, turns = [_at(value, left, len(x)) for value in q], counted[left]
         found = image(lambda unknowns, own=own, q=driven, turns=turns: own.equations(unknowns, q, turns), box)
         good = found.status == Status.UNIQUE
@@ -130,18 +132,6 @@ def _middle(system: Positions, u: Interval, x: Array, p: Interval, counted: Arra
     return proved, Interval.from_bounds(low, high)
 
 
-def _taken(system: Positions, rows: NDArray[np.intp]) -> Positions:
-    """Return a system with points for some of the pieces only."""
-    own = system.within(columns_of(points(system.box.low[None])))
-    own.local = [(_point(a, rows), _point(b, rows)) for a, b in system.local]
-    return own
-
-
-def _point(p: Pair, rows: NDArray[np.intp]) -> Pair:
-    x, y = (value[rows] if value.ndim else value for value in (p.x, p.y))
-    return Pair(x, y)
-
-
 def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, counted: Array, p: Interval) -> Tubes:
     count, size = x.shape
     if system.box.size:
@@ -150,7 +140,8 @@ def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, co
     steps = steps - points(steps.mid)
     half, weights = steps.mag, system.weights
     proved = np.ones(count, dtype=np.bool_)
-    tight, domain, reach = Interval.zeros((count, 0)), Interval.zeros((count, 0)), np.zeros(half.shape)
+    tight = domain = centre = Interval.zeros((count, 0))
+    reach = np.zeros(half.shape)
     if size:
         proved, centre = _middle(system, u, x, p, counted)
         tight = domain = centre
@@ -162,7 +153,7 @@ def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, co
         held, parts = np.zeros((count, size)), (u, p, steps)
         left = np.flatnonzero(proved)
         proved = np.zeros(count, dtype=np.bool_)
-        for shells in (1, _SHELLS):
+        for shells in (1, 1, _SHELLS):
             # a box of half the size of the mechanism says that the piece is too large: give up, it will be cut
             left = left[(radius[left] < 0.7 * weights).all(axis=1)]
             if left.size == 0:
@@ -170,6 +161,8 @@ def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, co
             piece = parts[0][left], parts[1][left], parts[2][left]
             lead, room, inside = _lead(system, piece, centre[left], counted[left], (radius[left], move[left]), shells)
             proved[left[inside]], held[left[inside]], radius[left[inside]] = True, lead[inside], room[inside]
+            wider = np.where(inside[:, None] | ~(_ROOM * lead < 0.7 * weights), radius[left], _ROOM * lead)
+            radius[left] = np.maximum(radius[left], wider)
             left = left[~inside]
         spread = np.where(proved[:, None], held, 0.0)
         tight = centre + Interval.from_bounds(-spread, spread)
@@ -177,11 +170,22 @@ def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, co
         domain = centre + Interval.from_bounds(-room, room)
     if not joints:
         none, base = Interval.zeros((count, 0, 2)), Interval.zeros((count, 0, 2, 2))
-        return Tubes(proved, domain, tight, none, none, base, reach)
-    own, q = system.within(columns_of(p)), system.driven(u)
-    at, zero = own.place(columns_of(tight), q), Interval.zeros((count,))
-    r, e, base = places(own, joints, at, lambda value: value + zero)
-    return Tubes(proved, domain, tight, r, e, base, reach)
+        return Tubes(proved, domain, tight, centre, none, none, base, reach)
+    return Tubes(proved, domain, tight, centre, *_placed(system, joints, u, tight, p), reach)
+
+
+def middles(system: Positions, joints: tuple[int, ...], u: Interval, tubes: Tubes, p: Interval) -> Tubes:
+    """Return tubes of the middles of pieces u and p: where the joints are there."""
+    u, p, x = points(u.mid), points(p.mid), tubes.centre
+    return Tubes(tubes.proved, x, x, x, *_placed(system, joints, u, x, p), np.zeros_like(tubes.reach))
+
+
+def _placed(
+    system: Positions, joints: tuple[int, ...], u: Interval, x: Interval, p: Interval
+) -> tuple[Interval, Interval, Interval]:
+    """Enclose ``r``, ``e`` and ``base`` of `Tubes` for unknowns x."""
+    own, zero = system.within(columns_of(p)), Interval.zeros((len(u),))
+    return places(own, joints, own.place(columns_of(x), own.driven(u)), lambda value: value + zero)
 
 
 def _lead(
@@ -192,7 +196,7 @@ def _lead(
     guess: tuple[Array, Array],
     shells: int,
 ) -> tuple[Array, Array, Mask]:
-    """Bound how far the assembly is led from the middle: lead, radius of the box that held it, whether proved.
+    """Bound how far the assembly is led from the middle: lead, radius of the box that held it, whether it did.
 
     From the middle outward in shells: while the share t of all steps is gone, the rates over a box that holds the
     branch so far bound the next part of the way.  ``guess`` is a radius for the whole way, and the way to first order.
@@ -216,7 +220,7 @@ def _lead(
             room = np.where(good[:, None], room, np.where(np.isfinite(last), lead + 1.3 * (last - lead), room))
         inside &= good
         lead = np.where(inside[:, None], last, 0.0)
-    return lead, room, inside
+    return last, room, inside
 
 
 def _at(value: Interval, rows: NDArray[np.intp], count: int) -> Interval:
