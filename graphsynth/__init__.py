@@ -18,6 +18,7 @@ _shown.WORK.update(
         "simulate": "graphsynth.kinematics.simulation:simulate",
         "modes": "graphsynth.kinematics.engine.start:assembly_modes",
         "assess jamming": "graphsynth.jamming.assess:assess_jamming",
+        "binding torque": "graphsynth.jamming.binding.torque:binding_torque",
         "static forces": "graphsynth.dynamics.inverse:static_forces",
         "embody": "graphsynth.kinematics.dimensional.api:embody",
         "draw graph": "graphsynth.drawing.methods:draw_graph",
@@ -30,6 +31,7 @@ _shown.WORK.update(
         "animate motion": "graphsynth.drawing.methods:animate_motion",
         "chart": "graphsynth.drawing.plots:Chart",
         "chart line": "graphsynth.drawing.plots:Line",
+        "chart band": "graphsynth.drawing.plots:Band",
         "motion picture": "graphsynth.drawing.methods:motion_picture",
     }
 )

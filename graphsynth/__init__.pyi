@@ -13,6 +13,13 @@ from .intervals.paving import pave as pave
 from .intervals.proving import krawczyk as krawczyk
 from .jamming.assess import JammingReport as JammingReport, assess_jamming as assess_jamming
 from .jamming.bearing.fits import Fit as Fit
+from .jamming.binding.parts import (
+    ContactFriction as ContactFriction,
+    JointStiffness as JointStiffness,
+    LinkSection as LinkSection,
+)
+from .jamming.binding.report import BindingReport as BindingReport
+from .jamming.binding.torque import binding_torque as binding_torque
 from .jamming.chance.allocation import Grade as Grade, allocate_tolerances as allocate_tolerances
 from .jamming.chance.distributions import Distribution as Distribution
 from .jamming.chance.probability import (

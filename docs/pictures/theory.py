@@ -11,7 +11,9 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+import graphsynth as gs
 from graphsynth.drawing.svg import number, painted, picture, words
+from graphsynth.jamming import Bearing
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.systems.antenna.mechanism import PointingMechanism
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
@@ -756,9 +758,40 @@ def tabled_antenna() -> str:
     return board.svg("Angles a and b of the reflector over equal crank angles; dots are values of the table")
 
 
+def binding() -> str:
+    """Draw the law of a joint, and the torque that the lambda linkage costs over a turn."""
+    board = Board(700, 300, 50 + 150j, 1.0)
+    board.arrow(0j, 200 + 0j, colour="note", width=1)
+    board.arrow(0j, 120j, colour="note", width=1)
+    board.line(0j, 90 + 0j, 180 + 95j, colour="b", width=2.4)
+    for at, text, colour in ((90 - 16j, "t", "ink"), (205 - 16j, "|τ|", "ink"), (-2 + 132j, "moment", "note")):
+        board.text(at, text, colour=colour, size=13)
+    board.text(45 + 12j, "free", colour="c", size=13)
+    board.text(112 + 62j, "k (|τ| − t)", colour="b", size=13)
+    motion = gs.Mechanism.four_bar(0.2, 0.1, 0.25, 0.25).simulate([math.radians(f) for f in range(0, 361, 2)])
+    report = motion.binding(tilt=0.0135, joints=Bearing(), stiffness=2000.0, friction=0.1)
+    left = 260.0
+    board.arrow(left + 0j, left + 385 + 0j, colour="note", width=1)
+    board.line(left - 100j, left + 110j, colour="note", width=1)
+    parts = (("friction", report.friction_torque, "c", 126j), ("elastic part", report.elastic_torque, "a", -104j))
+    for name, values, colour, at in parts:
+        most = float(abs(values).max())
+        board.curve(
+            [complex(left + 2 * k, 90.0 * float(v) / most) for k, v in enumerate(values)], colour=colour, width=2
+        )
+        board.text(left + 150 + at, f"{name}, at most {most:.2g} N m", colour=colour, size=13)
+    touching = [k for k, energy in enumerate(report.energy) if energy > 0.0]
+    for k in touching:
+        board.line(complex(left + 2 * k - 1, -125), complex(left + 2 * k + 1, -125), colour="d", width=5)
+    board.text(left + 200 - 125j, "contact", colour="d", size=13)
+    board.text(left + 372 - 16j, "360°", colour="note", size=12)
+    return board.svg("A joint is free within its limit and a spring beyond it; the torque that this costs over a turn")
+
+
 DRAWINGS = {
     "theory-arcs": jam_arcs,
     "theory-bearing": tilted_bearing,
+    "theory-binding": binding,
     "theory-body": body,
     "theory-conventions": conventions,
     "theory-cuts": cuts,

@@ -218,6 +218,15 @@ class MotionMethods(Shown):
         found: gs.CoupledReport = work("assess jamming")(self, tilt=tilt, joints=joints, **options)
         return found
 
+    def binding(self, *, tilt: Any, joints: Any, **options: Any) -> gs.BindingReport:
+        """Return what a tilted axis costs where the joints bind; see :func:`graphsynth.binding_torque`.
+
+        ``motion.binding(tilt="2 deg", joints="0.3 deg", stiffness=2000.0)``: each joint resists with 2000 N m for each
+        radian beyond 0.3 degrees.
+        """
+        found: gs.BindingReport = work("binding torque")(self, tilt=tilt, joints=joints, **options)
+        return found
+
     def forces(self, loads: Mapping[str | int, Any], **options: Any) -> gs.StaticForces:
         """Return the static forces in all joints under loads, as in ``motion.forces({"P": (0.0, -100.0)})``.
 

@@ -1,0 +1,3 @@
+from .parts import ContactFriction as ContactFriction, JointStiffness as JointStiffness, LinkSection as LinkSection
+from .report import BindingReport as BindingReport, JointWear as JointWear
+from .torque import binding_torque as binding_torque
