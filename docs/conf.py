@@ -16,6 +16,7 @@ from docutils import nodes
 from mathml import mathml
 from sphinx import addnodes
 from sphinx.domains.python import PyObject
+from sphinx.ext.napoleon.docstring import NumpyDocstring
 
 ROOT = Path(__file__).resolve().parents[1]
 META = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -26,7 +27,8 @@ project_copyright = author
 version = release = META["version"]
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-autodoc_default_options = {"members": True, "inherited-members": "Enum,Exception,int,object,str,tuple"}
+INHERITED = "BaseException,Enum,Exception,ImportError,int,object,str,tuple"  # what is theirs is not shown
+autodoc_default_options = {"members": True, "inherited-members": INHERITED}
 autodoc_member_order = "bysource"
 autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "NDArray")}
 autodoc_typehints_format = "short"
@@ -45,6 +47,7 @@ html_theme = "furo"
 html_title = f"graphsynth {version}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+CONSUME: Any = NumpyDocstring._consume_fields
 
 
 def _toctrees(text: str) -> str:
@@ -81,7 +84,9 @@ def _read(app: object, page: str, source: list[str]) -> None:
 
 def _docstring(app: object, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
     """Lead citations of the theory and of the bibliography to their pages; |x| is an absolute value."""
-    text = re.sub(r"(?<!`)\|(\w+)\|(?!`)", r"\\|\1\\|", "\n".join(lines))
+    literal_or_bars = re.compile(r"``.*?``|\|(\w+)\|", re.DOTALL)
+    text = re.sub(r"(``)?\bdocs/([\w/-]+)\.md(?(1)``)", r":doc:`/\2`", "\n".join(lines))
+    text = literal_or_bars.sub(lambda m: rf"\|{m[1]}\|" if m[1] else m[0], text)
     text = re.sub(r"(?<![`\w/])theory/([\w-]+)((?:,? (?:and |to )?\d+\b)*)", r":doc:`theory/\1\2 </theory/\1>`", text)
     for label, entry in pages.bibliography().items():
         text = text.replace(f"[{label}]", f":ref:`[{label}] <{entry['key'].lower()}>`")
@@ -128,16 +133,39 @@ def _long_cells(app: Any, doctree: nodes.document, name: str) -> None:
 
 
 def _signature(app: Any, what: str, name: str, obj: Any, options: Any, *texts: str | None) -> tuple[str | None, ...]:
-    """Write aliases of types by their names."""
-    return tuple(text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text) for text in texts)
+    """Write aliases of types by their names, and a default that is made anew as ``...``, which Sphinx can parse."""
+    texts = tuple(text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text) for text in texts)
+    return tuple(text and text.replace("<factory>", "...") for text in texts)
+
+
+def _skip(app: Any, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:
+    """Leave out the fields of named tuples: the signature has them, and their docstring is "Alias for field 0"."""
+    return True if type(obj).__name__ == "_tuplegetter" else None
+
+
+def _whole_docstring(self: Any) -> tuple[str, list[str]]:
+    """Return no type and all lines: a property whose docstring says "Mean: what it is" does not state a type."""
+    return "", self.__class__(self._dedent(self._consume_to_end()), self._config).lines()
+
+
+def _each_name(
+    self: Any, parse_type: bool = True, prefer_type: bool = False, multiple: bool = False
+) -> list[tuple[Any, ...]]:
+    """Give each name of "width, height : float" a line of its own, among attributes as among parameters."""
+    several = multiple or (parse_type and not prefer_type)
+    fields: list[tuple[Any, ...]] = CONSUME(self, parse_type, prefer_type, several)
+    return fields
 
 
 def setup(app: Any) -> dict[str, bool]:
     """Register with Sphinx."""
+    setattr(NumpyDocstring, "_consume_inline_attribute", _whole_docstring)  # noqa: B010
+    setattr(NumpyDocstring, "_consume_fields", _each_name)  # noqa: B010
     next(field for field in PyObject.doc_field_types if field.name == "variable").label = "Attributes"
     app.connect("source-read", _read)
     app.connect("autodoc-process-docstring", _docstring)
     app.connect("autodoc-process-signature", _signature)
+    app.connect("autodoc-skip-member", _skip)
     app.connect("doctree-read", _without_chance_links)
     app.connect("doctree-resolved", _whole_numbers)
     app.connect("doctree-resolved", _long_cells)

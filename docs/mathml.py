@@ -45,6 +45,7 @@ def mathml(tex: str, block: bool) -> str:
         markup = latex2mathml.tex2mathml(tex, as_block=block)
     except MathError as error:
         raise ValueError(f"formula {tex!r}: {error}") from error
+    markup = markup.replace("\N{REVERSE SOLIDUS OPERATOR}", "\\")  # many typefaces lack it
     markup = OVER.sub(lambda m: f"<mi>{_italic(m[1])}{COMBINING[m[2]]}</mi>", markup)
     markup = OVER_INDEXED.sub(lambda m: f"<msub><mi>{_italic(m[1])}{COMBINING[m[3]]}</mi>{m[2]}</msub>", markup)
     markup = AFTER.sub(lambda m: "" if m[1] else SPACE, markup)

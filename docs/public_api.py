@@ -11,6 +11,7 @@ import inspect
 import re
 from importlib import import_module
 from pathlib import Path
+from types import GenericAlias, UnionType
 
 DOCS = Path(__file__).resolve().parent
 PACKAGE = DOCS.parent / "graphsynth"
@@ -55,6 +56,8 @@ def thing_of(dotted: str) -> object:
 
 def kind_of(thing: object) -> str:
     """Kind of a name, as the Python domain of Sphinx calls it."""
+    if isinstance(thing, GenericAlias):
+        return "data"
     if inspect.isclass(thing):
         return "exception" if issubclass(thing, BaseException) else "class"
     if inspect.ismodule(thing):
@@ -93,13 +96,33 @@ def shown() -> dict[str, list[str]]:
     return pages
 
 
+def comment_of(name: str) -> str:
+    """Return what ``#:`` says above a constant or beside it, in the module from which its stub takes it or its own."""
+    room, _, last = name.rpartition(".")
+    folder = PACKAGE.parent.joinpath(*room.split("."))
+    stub = ast.parse(_text(folder / "__init__.pyi")).body
+    sources = [node for node in stub if isinstance(node, ast.ImportFrom) for name in node.names if name.name == last]
+    base = folder if not sources else folder if sources[0].level else PACKAGE.parent
+    module = base.joinpath(*(sources[0].module or "").split(".")) if sources else folder
+    text = _text(module.with_suffix(".py"))
+    beside = re.search(rf"^{last}\b.*  #: (.*)$", text, re.MULTILINE)
+    above = re.search(rf"((?:^#:.*\n)+)^{last}\b", text, re.MULTILINE)
+    lines = [beside[1]] if beside else above[1].splitlines() if above else []
+    return " ".join(line.removeprefix("#:").strip() for line in lines)
+
+
+def _text(path: Path) -> str:
+    return path.read_text("utf-8") if path.is_file() else ""
+
+
 def directive(name: str) -> str:
-    """Return what makes Sphinx show a name; a value has no docstring of its own, so its type and it are shown."""
+    """Return what makes Sphinx show a name; a value has no docstring, so its type, it and its comment are shown."""
     thing = thing_of(name)
     if kind_of(thing) != "data":
         return f".. auto{kind_of(thing)}:: {name}"
     value = f"\n   :value: {thing!r}" if len(repr(thing)) < 120 else ""
-    return f".. py:data:: {name}\n   :type: {type(thing).__name__}{value}"
+    kind = "TypeAlias" if isinstance(thing, GenericAlias | UnionType) else type(thing).__name__
+    return f".. py:data:: {name}\n   :type: {kind}{value}\n\n   {comment_of(name)}"
 
 
 def with_docstrings(text: str, page: str) -> str:
@@ -119,7 +142,8 @@ def index() -> str:
         rows = []
         for name in names:
             documented = kind_of(thing_of(name)) != "data"
-            told = " ".join((inspect.getdoc(thing_of(name)) or "").partition("\n\n")[0].split()) if documented else ""
+            text = (inspect.getdoc(thing_of(name)) or "") if documented else comment_of(name)
+            told = " ".join(text.partition("\n\n")[0].split())
             rows.append(f"| {{py:obj}}`{name}` | {told.replace('``', '`').replace('|', chr(92) + '|')} |")
         parts.append(f"## [{title}]({page}.md)\n\n| name | what |\n|---|---|\n" + "\n".join(rows))
     return "\n\n".join(parts)

@@ -76,13 +76,13 @@ class Catalogue(OpenCatalogue):
             Numbers of links, 18 at most; those without a chain of this mobility are passed over.
         mobility : int
         fractionated : bool
-            For mobility >= 2: include chains that fall apart at a link or a joint.
+            For mobility >= 2: include chains that one link or joint holds together.
         executor : concurrent.futures.Executor, optional
             Who computes the facts; one process writes.  The file holds the same rows for any.
         shard : (int, int), optional
             Part i of m of every family; labels are given when the parts are merged.
         watch : callable, optional
-            Told a :class:`BuildStep` after every piece.
+            Called with a :class:`BuildStep` after every piece.
 
         Raises
         ------
@@ -160,7 +160,7 @@ class Catalogue(OpenCatalogue):
     def entry(self, name: str) -> dict[str, Any]:
         """Return everything the catalogue knows of a chain, given by key or label, ready for JSON.
 
-        Mechanisms list their evaluations; kinds that nobody evaluated say ``"not computed"``.
+        Mechanisms list their evaluations; kinds that were not evaluated say ``"not computed"``.
 
         Raises
         ------
@@ -237,7 +237,7 @@ class Catalogue(OpenCatalogue):
         executor : concurrent.futures.Executor, optional
             Who computes; one process writes.  The same results for any.
         watch : callable, optional
-            Told an ``EvaluationStep`` after every mechanism.
+            Called with an ``EvaluationStep`` after every mechanism.
         **search
             ``seed`` (0) and ``tries`` (4) of :func:`graphsynth.embody`, with its default goals: a full turn.
 

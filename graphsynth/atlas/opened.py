@@ -156,7 +156,7 @@ class OpenCatalogue:
         """Tell of what a damaged file holds, whatever that is, in one sentence; other threads wait.
 
         With ``screened``, every value of the file is first held against what its column may hold.  Errors of SQLite,
-        and those that values cause which nobody wrote, leave the block as `FormatError`.
+        and those caused by damaged values, leave the block as `FormatError`.
         """
         with self._turn, readable(self.path, *GARBAGE):
             if screened:

@@ -138,7 +138,7 @@ _ACTIONS: dict[str, tuple[str, *tuple[Option, ...]]] = {
         "Make a catalogue file, or go on with one.",
         _option("--links N..M", "numbers of links, 18 at most", numbers, required=True),
         _option("--mobility W", "mobility, or W..V (default 1)", numbers, default=[1]),
-        _option("--fractionated", "for W >= 2: include chains that fall apart at a link or a joint"),
+        _option("--fractionated", "for W >= 2: include chains that one link or joint holds together"),
         _option("-o --output FILE", "the catalogue (default catalogue.sqlite)", Path, default=Path("catalogue.sqlite")),
         _SHARD,
         _option("--workers K", "worker processes (default: all cores)", workers),

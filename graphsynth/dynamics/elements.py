@@ -216,7 +216,7 @@ class MotorDrive:
     Parameters
     ----------
     a, b : int
-        Links with a turning joint between them.
+        Links with a revolute joint between them.
     motor : DCMotor, SynchronousMotor, LinearCharacteristic or IdealTorque
         Without inductance its limit L -> 0 is taken, which is exact.
     train : Train, optional
@@ -288,8 +288,8 @@ class JointFriction:
     """Dry friction in a joint: at rest up to ``static`` times the load, sliding ``mu(v)`` times the load.
 
     ``mu(v) = kinetic + (static - kinetic) exp(-(v/stribeck_speed)^2)``; with ``stribeck_speed=0`` the coefficient falls
-    at once.  In a turning pair v is ``radius`` times the relative speed and the friction torque ``mu radius |F|`` with
-    F the pin force; in a sliding pair the friction force is ``mu (|N1| + |N2|)``, N1 and N2 the normal forces at the
+    at once.  In a revolute joint v is ``radius`` times the relative speed and the friction torque ``mu radius |F|``, F
+    the pin force; in a prismatic joint the friction force is ``mu (|N1| + |N2|)``, N1 and N2 the normal forces at the
     ends of a shoe of the given ``length`` that carry the guide's force and couple (0: the force alone).  Sticking is a
     state with events, see ``docs/explanation/planar-dynamics.md``; ``smoothing_velocity > 0`` asks for the smooth law
     ``mu(v) tanh(v/smoothing_velocity)`` instead, which never sticks; a pin in a slot knows no other law.

@@ -160,7 +160,7 @@ class DynamicMotion:
     friction: FrictionHistory | None = None
     motors: tuple[MotorHistory, ...] = ()
 
-    #: How the numbers were had.
+    #: How the numbers were obtained.
     label = "estimated"
 
     @property

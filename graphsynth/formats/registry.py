@@ -28,9 +28,9 @@ Item = MechanismGraph | Mechanism
 LINE_MAX = 1_000_000
 #: Longest text of several graphs that is read at once.
 TEXT_MAX = 3_000_000
-#: Graphs, and joints of all of them, in a text that is read at once.
+#: Most graphs in a text that is read at once.
 GRAPHS_MAX = 20_000
-JOINTS_MAX = 120_000
+JOINTS_MAX = 120_000  #: Most joints of all graphs in a text that is read at once.
 _BLOCK = 1 << 16
 _MESSAGE = 360
 
@@ -109,7 +109,7 @@ _LISTED: tuple[tuple[str, str, str, str, dict[str, Any]], ...] = (
     ("adjacency", ".adj", "adjacency matrix", "matrices:adjacency", {"many": False, "limit": _MATRIX}),
     ("incidence", ".inc", "incidence matrix", "matrices:incidence", {"many": False, "limit": _MATRIX}),
 )
-FORMATS: dict[str, Format] = {
+FORMATS: dict[str, Format] = {  #: All formats by their names.
     name: Format(name, tuple(suffixes.split()), about, place, **{"many": True, **options})
     for name, suffixes, about, place, options in _LISTED
 }

@@ -262,7 +262,7 @@ def assess_jamming(
     Returns
     -------
     JammingReport or CoupledReport
-        Both print one sentence and a table; ``details()`` tells all.  The verdict is certified by default: for all
+        Both print one sentence and a table; ``details()`` gives all.  The verdict is certified by default: for all
         tolerances, or for the doubles given, which it says.  It never comes from the samples.
 
     Raises

@@ -25,9 +25,9 @@ __all__ = ["JSON_MAX", "TOML_MAX", "from_dict", "from_json", "from_toml", "to_di
 FORMAT = "graphsynth mechanism"
 VERSION = 1
 _KEYS = {"format", "version", "graph", "joints", "drivers", "points", "pose"}
-#: Longest texts that are read, in characters.
+#: Longest JSON text that is read, in characters.
 JSON_MAX = 3_000_000
-TOML_MAX = 400_000
+TOML_MAX = 400_000  #: Longest TOML text that is read, in characters.
 _T = TypeVar("_T")
 
 

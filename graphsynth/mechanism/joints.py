@@ -296,7 +296,7 @@ def _across(at: Seen, angle: float) -> Gradient:
     return Gradient(at.plane.left(t), at.plane.dot(t, at.d) * -1.0)
 
 
-JointGeometry = Revolute | Prismatic | PinSlot | Gear | Cam
+JointGeometry = Revolute | Prismatic | PinSlot | Gear | Cam  #: The five kinds of joints.
 
 #: Class by kind, for readers.
 KINDS: dict[str, Any] = {joint.kind: joint for joint in (Revolute, Prismatic, PinSlot, Gear, Cam)}

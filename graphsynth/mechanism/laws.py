@@ -20,7 +20,7 @@ from graphsynth.core.errors import GeometryError
 __all__ = ["LAWS", "Driver", "Harmonic", "Law", "Linear", "Polynomial", "Table"]
 
 Array = NDArray[np.float64]
-Law = Callable[[Array], tuple[Array, Array, Array]]
+Law = Callable[[Array], tuple[Array, Array, Array]]  #: Input u to coordinate q and its two derivatives by u.
 #: Sine or cosine of an arithmetic.
 Function = Callable[[Any], Any]
 
@@ -152,7 +152,7 @@ def _numbers(name: str, values: Any, least: int) -> tuple[float, ...]:
     return found
 
 
-#: Class by kind, for readers and writers.
+#: Classes of laws by the kind that files name.
 LAWS: dict[str, Any] = {law.kind: law for law in (Linear, Harmonic, Polynomial, Table)}
 
 

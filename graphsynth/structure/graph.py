@@ -175,7 +175,7 @@ class MechanismGraph:
     def mobility(self) -> int:
         """Mobility by the structural formula, W = Pi (N - 1) - sum over joints of (Pi - f) (exact count).
 
-        It equals G - v Pi for a connected graph.  :meth:`rigid_subchain` tells whether the count holds in every
+        It equals G - v Pi for a connected graph.  :meth:`rigid_subchain` says whether the count holds in every
         part; :meth:`generic_mobility` is the cross-check by rank.
         """
         joints = len(self.packed) // 3

@@ -98,7 +98,7 @@ def enumerate_chains(
     joints_by_mobility : mapping, optional
         ``{i: p_i}`` for i >= 2; p_1 follows from the structural formula.  Default: mobility-1 joints only.
     fractionated : bool
-        For W >= 2: include chains that fall apart at a link or a joint.
+        For W >= 2: include chains that one link or joint holds together.
     symmetry : int, optional
         Only chains with an automorphism of this prime order.
     executor : concurrent.futures.Executor, optional

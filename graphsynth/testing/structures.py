@@ -96,7 +96,7 @@ def _chains(
 def chains(
     min_links: int = 4, max_links: int = 8, *, mobility: int = 1, fractionated: bool = False, relabel: bool = True
 ) -> st.SearchStrategy[MechanismGraph]:
-    """Planar kinematic chains of simple turning pairs without rigid sub-chain: every one of them, with any labels.
+    """Planar kinematic chains of simple revolute joints without rigid sub-chain: every one of them, with any labels.
 
     Parameters
     ----------

@@ -175,7 +175,7 @@ class Parallelism:
         return math.nextafter(math.atan(self.diameter / self.length) * (1.0 + 1e-15), math.inf)
 
 
-PartTolerance: TypeAlias = (
+PartTolerance: TypeAlias = (  #: Everything that a list of tolerances may hold.
     LengthTolerance | HolePosition | ThermalExpansion | FitClearance | EndFloat | AxisAngle | Parallelism
 )
 

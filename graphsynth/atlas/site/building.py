@@ -82,7 +82,7 @@ def build_site(
     executor : concurrent.futures.Executor, optional
         Who computes sketches and motions; the files are the same for any.
     watch : callable, optional
-        Told what is being done, the steps done and the steps in all.
+        Called with what is being done, the steps done and the steps in all.
 
     Returns
     -------

@@ -108,10 +108,10 @@ class SlideLimits:
 
 
 Limits: TypeAlias = JointLimits | SlideLimits
-#: No clearance at all; any tilt but no slip; neither (a gear or cam contact).
+#: No clearance at all.
 RIGID = JointLimits(0.0)
-SPHERICAL = JointLimits(math.inf)
-FREE = JointLimits(math.inf, math.inf)
+SPHERICAL = JointLimits(math.inf)  #: Any tilt, but no displacement along the axis.
+FREE = JointLimits(math.inf, math.inf)  #: No limit of tilt or displacement: the contact of gears or of a cam.
 
 
 @dataclass(frozen=True)

@@ -183,7 +183,7 @@ _CONTINUED = 2
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Embodiment(Shown):
-    """Dimensions found for a mechanism graph, and how they were judged.
+    """Dimensions found for a mechanism graph, and how they were assessed.
 
     Attributes
     ----------

@@ -56,6 +56,8 @@ def _listed(name: str, values: Any) -> tuple[Any, ...]:
 class LineGoal:
     """A point of a link draws a straight segment, as straight as can be, during part of the turn.
 
+    `GeometryError` for a span outside (0, 2 pi], or numbers that are not finite.
+
     Parameters
     ----------
     length : float
@@ -68,8 +70,6 @@ class LineGoal:
         The point is to lie on the line through the link's first two joints: the link is a straight rod.
     tolerance : float
         Largest width of the strip that holds the segment, over its length.
-
-    `GeometryError` for a span outside (0, 2 pi], or numbers that are not finite.
     """
 
     length: float
@@ -89,6 +89,8 @@ class LineGoal:
 class PathGoal:
     """A point of a link passes given points in order.
 
+    `GeometryError` for fewer than three points, or all at one place.
+
     Parameters
     ----------
     points : iterable of (x, y)
@@ -99,8 +101,6 @@ class PathGoal:
         The link that carries the point; the one farthest from the frame by default.
     tolerance : float
         Largest distance from a point, over the size of the set of points.
-
-    `GeometryError` for fewer than three points, or all at one place.
     """
 
     points: tuple[tuple[float, float], ...]
@@ -120,6 +120,8 @@ class PathGoal:
 class PosesGoal:
     """A link passes given poses in order (motion generation).
 
+    `GeometryError` for fewer than three poses, or inputs missing.
+
     Parameters
     ----------
     poses : iterable of (x, y, theta)
@@ -131,8 +133,6 @@ class PosesGoal:
         By default the link farthest from the frame.
     tolerance : float
         Largest distance from a pose over the size of the set of points; angles count as arcs of that size.
-
-    `GeometryError` for fewer than three poses, or inputs missing.
     """
 
     poses: tuple[tuple[float, float, float], ...]

@@ -118,7 +118,7 @@ def simulate_batch(
     rates : bool, optional
         Also velocities and accelerations.  They are computed anyway if a group needs Newton.
     keep : sequence of int, optional
-        Links whose motion is wanted; all by default.  What nobody asks for is neither stored nor, where possible,
+        Links whose motion is wanted; all by default.  What is not asked for is neither stored nor, where possible,
         computed.
 
     Returns

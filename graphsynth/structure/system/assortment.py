@@ -28,13 +28,13 @@ class LinkAssortment:
     Attributes
     ----------
     mobility : int
-        W.
+        Mobility W.
     space : int
         Pi, the mobility of the space (3 for the plane).
     moving_links : int
         n; ``links`` (N) is n + 1.
     joints : int
-        p.
+        Joints p.
     p_i : tuple of int
         (p_1, ..., p_{Pi-1}): joints of each mobility.  ``joints_by_mobility`` is the same as a mapping.
     n_a : Counts
@@ -49,7 +49,7 @@ class LinkAssortment:
     frame_joints : int
         t0, joints on the frame.
     sub_edges : int
-        G.
+        Sub-edges G: a joint of mobility i counts i.
     frame_parts : int
         c, connected parts into which the mechanism falls when the frame is taken away: 1 unless fractionated.
 

@@ -39,14 +39,14 @@ class StructuralSpec:
         Moving links; or ``N``, ``links``: with the frame, N = n + 1.
     p, joints : int or pair
         Joints.
-    p1 ... p5, joints_by_mobility : int or pair, mapping
-        Joints of mobility i.
+    p1, p2, p3, p4, p5 : int or pair
+        Joints of mobility i; all of them as a mapping: ``joints_by_mobility``.
     t0, frame_joints : int or pair
         Joints on the frame.
-    n2, n3, ..., links_by_joints : int or pair, mapping
-        Moving links with a joints.
-    v, loops; v_ct, frame_loops; v_P, moving_loops : int or pair
-        Independent loops; those through the frame; those among moving links.
+    n2, n3 : int or pair
+        Moving links with so many joints, and so on; all of them as a mapping: ``links_by_joints``.
+    v, loops, v_ct, frame_loops, v_P, moving_loops : int or pair
+        Independent loops (v); of them those through the frame (v_ct), and those among moving links (v_P).
     G, sub_edges : int or pair
         Sub-edges, a joint of mobility i counts i.
     fractionated : bool
@@ -114,7 +114,7 @@ class StructuralSpec:
 
     @classmethod
     def from_toml(cls, path: str | Path) -> StructuralSpec:
-        """Read a TOML file; see docs/reference/structural-spec.md.
+        """Read a TOML file; see ``docs/reference/structural-spec.md``.
 
         `FormatError` if the file cannot be read, is not TOML, or has an unknown key or a bad value.
         """

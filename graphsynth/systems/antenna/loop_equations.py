@@ -256,7 +256,7 @@ def check_chart(
     s_x: int = -1,
     scaled: bool = True,
 ) -> ChartReport:
-    """Judge the coordinates of the loop equations at a pose: rank, condition, verdict (theory/antenna 4).
+    """Assess the coordinates of the loop equations at a pose: rank, condition, verdict (theory/antenna 4).
 
     A `GeometryError` refuses another chart, and a pose that cannot be assembled.
 

@@ -46,7 +46,7 @@ class PistonMasses:
 
 @dataclass(frozen=True)
 class PistonFriction:
-    """Coefficients of dry friction in the sliding pairs, and the friction of the rings.
+    """Coefficients of dry friction in the prismatic joints, and the friction of the rings.
 
     ``mu tanh(v / smoothing_velocity) |N|`` acts against the sliding, N the normal force; pins run without friction.
 

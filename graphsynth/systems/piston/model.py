@@ -147,7 +147,7 @@ class ScotchYoke:
     Parameters
     ----------
     crank : float
-        m.
+        Length, m.
     offset : float
         Distance of the yoke's axis from the centre of the crank, m.
     yoke_angle : float
@@ -397,7 +397,7 @@ class FloatingPiston:
 
     @property
     def stroke(self) -> float:
-        """Way of the piston between the dead centres, m."""
+        """Travel of the piston between the dead centres, m."""
         (_, outer), (_, inner) = self.drive.dead_centres()
         return (1.0 if self.group is None else self.group.transmission[0]) * (outer - inner)
 

@@ -66,7 +66,7 @@ class MassTable:
 
 @dataclass(frozen=True, slots=True)
 class FrictionTable:
-    """Coefficients of dry friction in the sliding pairs, friction of the rings, speed of the regularisation."""
+    """Coefficients of dry friction in the prismatic joints, friction of the rings, smoothing velocity."""
 
     guide: float = 0.0
     cylinder: float = 0.0

@@ -89,7 +89,7 @@ def link_poses(platform: SingleMotorPlatform, psi: float, pose: ArrayLike) -> Ar
 
 @checked
 def as_mechanism(platform: SingleMotorPlatform, psi: float = 0.0, pose: ArrayLike | None = None) -> Mechanism:
-    """Build the 15-link mechanism with 19 turning pairs and 3 gear pairs.
+    """Build the 15-link mechanism with 19 revolute joints and 3 gear pairs.
 
     `psi`: wheel angle at which the links' poses are given, radians. `pose` (shape (3,)): platform pose there; the home
     branch by default. Driven at the pinion with the common wheel angle psi as input; the named point "P" is the

@@ -435,7 +435,7 @@ class SingleMotorPlatform:
         return self.platform.direct(self.drive(psi).theta).poses
 
     def graph(self) -> MechanismGraph:
-        """Structural graph of the source's Figure 3: 15 links, 19 turning pairs, 3 gear pairs, link 0 the frame."""
+        """Structural graph of the source's Figure 3: 15 links (0 the frame), 19 revolute joints, 3 gear pairs."""
         from graphsynth.structure.graph import MechanismGraph
 
         pairs = [(pair.split("-"), f) for text, f in ((_TURNING, 1), (_GEARED, 2)) for pair in text.split()]
