@@ -31,7 +31,7 @@ FROM_SCENES = {
     "antenna": {
         "antenna-scan": "A scan",
         "antenna-in-space": "The mechanism in space, cranks at 35° and 25°",
-        "antenna-two-models": "Figure 4: two models over equal crank angles",
+        "antenna-two-models": "Two models over equal crank angles",
         "antenna-difference-map": "Map of the difference of the two models",
         "antenna-tolerances": "Map of the certified deviations",
     },
@@ -48,7 +48,7 @@ FROM_SCENES = {
     },
     "tribometer": {
         "tribometer-motion": "In motion",
-        "tribometer-figure-7b": "Figure 7b: both platforms over time",
+        "tribometer-figure-7b": "Both platforms over time",
         "tribometer-limit-cycle": "Limit cycle",
     },
 }

@@ -15,7 +15,7 @@ from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from graphsynth.pipeline.products import Finding, Picture, Quantity, Table
-from graphsynth.pipeline.units import Unit
+from graphsynth.pipeline.units import Unit, behind
 
 if TYPE_CHECKING:
     from graphsynth.drawing.plots import Line
@@ -82,7 +82,7 @@ def quantity_table(title: str, quantities: Iterable[Quantity], note: str = "", *
     >>> quantity_table("Motion", [Quantity("speed", 2.0, "rad/s", "estimated", 1e-9)]).rows
     (('speed', '2 rad/s', 'estimated', '1e-09 rad/s'),)
     """
-    rows = [(q.name, q, q.guarantee, "" if q.error is None else f"{q.error:.1g} {q.unit}".rstrip()) for q in quantities]
+    rows = [(q.name, q, q.guarantee, "" if q.error is None else f"{q.error:.1g}{behind(q.unit)}") for q in quantities]
     return table(title, ("quantity", "value", "guarantee", "error"), rows, note, *findings)
 
 
@@ -115,9 +115,8 @@ def chart(
 
 def balance_rows(run: DriveRun) -> tuple[tuple[str, str], ...]:
     """Return model, method, errors, balances and cost of a run."""
-    names = ("angle", "speed", *(f"current {k}" for k in range(1, run.currents.shape[1] + 1)))
-    units = ("rad", "rad/s", *("A",) * run.currents.shape[1])
-    errors = ", ".join(f"{name} {value:.1e} {unit}" for name, value, unit in zip(names, run.error, units))
+    units = ("angle", "rad"), ("speed", "rad/s"), ("current", "A"), ("second current", "A")
+    errors = ", ".join(f"{name} {value:.1e} {unit}" for (name, unit), value in zip(units, run.error))
     balanced = run.energy_error <= 1e-9 and run.electric_error <= 1e-9
     warning = "" if balanced or not run.complete else " (WARNING)"
     return (
@@ -126,7 +125,7 @@ def balance_rows(run: DriveRun) -> tuple[tuple[str, str], ...]:
         ("estimated error", f"{errors} (second run at a hundred times the tolerance)"),
         ("energy balance, mechanical", f"{run.energy_error:.1e} of the energy moved{warning}"),
         ("energy balance, electrical", f"{run.electric_error:.1e} of the energy moved{warning}"),
-        ("steps, rejected", f"{run.steps}, {run.rejected} at tolerance {run.rtol:g}"),
+        ("steps", f"{run.steps}, {run.rejected} more rejected, at tolerance {run.rtol:g}"),
         ("time of the run", f"{run.seconds * 1e3:.1f} ms, measured once"),
         *(("note", note) for note in run.notes),
     )
@@ -145,7 +144,7 @@ def limit_table(study: ReductionStudy) -> Table:
     rows = zip(study.inductance, study.angle, study.speed, (None, *study.order), map(str, study.steps))
     columns = ("inductance [H] | .0e", "angle [rad] | .3e", "speed [rad/s] | .3e", "order | .3f", "steps")
     note = "Largest differences from the motor with L = 0 after the electrical transient; the order is 1 in the limit."
-    return table("The limit L -> 0", columns, rows, note)
+    return table("The limit L → 0", columns, rows, note)
 
 
 def shown_motion(mechanism: Any, inputs: Any, poses: Any, *, closed: bool) -> Motion:

@@ -26,7 +26,7 @@ h2{font-size:1.2rem;margin:2.2rem 0 .6rem;border-bottom:1px solid var(--rule);pa
 h3{font-size:1rem;margin:1.4rem 0 .4rem}
 p{margin:.4rem 0 .8rem;max-width:46rem}
 .soft,figcaption,caption{color:var(--soft);font-size:.875rem}
-.scroll{overflow-x:auto}
+.scroll{overflow-x:auto}tbody:first-child{border-top:1px solid var(--rule)}
 table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
 th,td{text-align:left;vertical-align:top;padding:.3rem .9rem .3rem 0;border-bottom:1px solid var(--rule)}
 th{font-weight:600;color:var(--soft)}
@@ -44,7 +44,7 @@ figure.wide{grid-column:1/-1}
 figure.small{grid-column:span 4}
 .sheet figure.small{grid-column:span 3}
 @media (max-width:50rem){.facts{gap:.4rem}.facts li{padding:.35rem .6rem;min-width:0;flex:1 1 40%}
-.facts b{font-size:1.05rem}.verdict b{font-size:1rem}table{font-size:.8rem}td:not(.num){min-width:6.5rem}
+.facts b{font-size:1.05rem}.verdict b{font-size:1rem}table{font-size:.8rem}td.text{min-width:6.5rem}
 td.long{min-width:13rem}figure{grid-column:1/-1}
 figure.small{grid-column:span 6}.sheet figure.small{grid-column:span 6}}
 figure svg{display:block;max-width:100%;height:auto;margin:0 auto}
@@ -65,12 +65,12 @@ _HEADINGS = {"animations": "In motion", "mechanism_pictures": "The mechanism", "
 
 _PAGE = """
 {%- macro grid(columns, rows) -%}
-<div class="scroll"><table><thead><tr>
+<div class="scroll"><table>{% if columns | join %}<thead><tr>
 {%- for column in columns %}<th scope="col">{{ column }}</th>{% endfor -%}
-</tr></thead><tbody>
-{%- for row in rows -%}
+</tr></thead>{% endif %}<tbody>{% for row in rows -%}
 <tr>{% for cell in row %}<td{% if cell and cell | length < 40 and cell[0] in "0123456789-+" %} class="num"
-{%- elif cell | length > 60 %} class="long"{% endif %}>{{ cell }}</td>{% endfor %}</tr>
+{%- elif cell | length > 60 %} class="long"
+{%- elif cell | length > 14 %} class="text"{% endif %}>{{ cell }}</td>{% endfor %}</tr>
 {%- endfor -%}
 </tbody></table></div>
 {%- endmacro -%}
@@ -119,10 +119,7 @@ results.csv</summary>{{ grid(("no.", "assortment", "status", "verdict or reason"
 
 
 def report_html(report: Report) -> str:
-    """Return the page of a run.
-
-    Everything is in the one string: styles, tables, pictures as inline SVG. Values are escaped.
-    """
+    """Return the page of a run, all in one string: styles, tables, pictures as inline SVG; values are escaped."""
     scene, products = report.scene, report.products
     found = sentences(report)
     first = next((k for k, item in enumerate(found) if item.good is None), 0) or len(found)

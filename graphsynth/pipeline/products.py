@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.core.shown import Shown
-from graphsynth.pipeline.units import Unit
+from graphsynth.pipeline.units import Unit, behind
 
 Guarantee = Literal["exact", "certified", "estimated"]
 
@@ -31,7 +31,7 @@ class Rejected(Exception):  # noqa: N818  # not an error: a candidate that does 
     """Raised by a stage for each candidate: this one does not meet a goal, and later stages need not look at it.
 
     ``cause`` is the reason in words that are the same for all candidates it holds for, since causes are counted;
-    ``detail`` holds for this candidate only, as in ``"transmission angle 12.3 deg, at least 30 deg is asked"``.
+    ``detail`` holds for this candidate only, as in ``"transmission angle 12.3°, at least 30° is asked"``.
     """
 
     def __init__(self, cause: str, detail: str = "") -> None:
@@ -94,7 +94,7 @@ class Quantity:
     @property
     def text(self) -> str:
         """The value with its unit, to a readable number of digits."""
-        return f"{self.value:.10g}{'' if self.unit in ('', '°', '′', '″') else ' '}{self.unit}"
+        return f"{self.value:.10g}{behind(self.unit)}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -99,6 +99,7 @@ def _fitted(table: Table, width: int) -> Group | Text:
         size = f"{len(table.rows)} x {count} cells"
         return Text.assemble((table.title, "italic"), f"\n{size} are too wide for this terminal; see report.html.")
     shown = Grid(box=HEAVY_HEAD) if framed else Grid(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    shown.show_header = any(table.columns)
     for column, columns in zip(table.columns, framed or bare, strict=True):
         shown.add_column(escape(column), overflow="fold", width=columns)
     for row in table.rows:

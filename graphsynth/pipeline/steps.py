@@ -205,9 +205,7 @@ def recognise_by_key(candidates: tuple[Candidate, ...], known: MechanismGraph, m
 
 
 def records_of(
-    recognised: tuple[Recognised, ...],
-    outcomes: tuple[Attempt, ...],
-    verdict: Verdict,
+    recognised: tuple[Recognised, ...], outcomes: tuple[Attempt, ...], verdict: Verdict
 ) -> tuple[Record, ...]:
     """Return one record per candidate, in their order; `verdict` reads the value of an outcome."""
     by_number = {outcome.candidate.number: outcome for outcome in outcomes}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.pipeline.display import table
 from graphsynth.pipeline.products import Finding, Ranking, Record, Table
+from graphsynth.pipeline.units import behind, grouped
 
 if TYPE_CHECKING:
     from graphsynth.pipeline.stages import Report
@@ -24,10 +25,7 @@ _MARGINS = 6
 
 
 def sentences(report: Report) -> tuple[Finding, ...]:
-    """Return the answer in words, the most important sentence first.
-
-    Without the products ``records``, ``ranking`` or ``tables`` there is nothing to say.
-    """
+    """Return the answer in words, the most important first; nothing without ``records``, ``ranking`` or ``tables``."""
     records: tuple[Record, ...] = report.products.get("records", ())
     rankings = [value for value in report.products.values() if isinstance(value, Ranking)]
     found = [told for ranking in rankings for told in _best(ranking, records)]
@@ -47,8 +45,8 @@ def facts(report: Report) -> tuple[Finding, ...]:
     counts: Counter[str] = Counter(record.status for record in records)
     if counts["assessed"] == 1 and not counts["rejected"] + counts["failed"]:
         for margin in next(record for record in records if record.status == "assessed").margins[:_MARGINS]:
-            unit = margin.unit if margin.unit in ("", "°", "′", "″") else f" {margin.unit}"
-            found.append(Finding(f"{margin.name} ({margin.guarantee})", value=f"{margin.value:.4g}{unit}"))
+            number = f"{margin.value:.4g}{behind(margin.unit)}"
+            found.append(Finding(f"{margin.name} ({margin.guarantee})", value=number))
     plain = len(records) == counts["assessed"] == 1  # one answer: nothing was chosen from
     if "solutions" in products and not (plain and len(products["solutions"]) == 1):
         count = len(products["solutions"])
@@ -77,7 +75,7 @@ def _best(ranking: Ranking, records: Sequence[Record]) -> list[Finding]:
     order = [by_number[number] for number in ranking.numbers if number in by_number]
     if not order:
         return []
-    which = f"Best of {ranking.ranked} ranked" if ranking.ranked > 1 else "The only one left"
+    which = f"Best of {grouped(ranking.ranked)} ranked" if ranking.ranked > 1 else "The only one left"
     found = [Finding(f"{which}: {_one(ranking, order[0])}.", order[0].good)]
     if order[0].good is not True:
         better = next((record for record in order if record.good), None)
@@ -94,7 +92,7 @@ def _one(ranking: Ranking, record: Record) -> str:
     A place is how a value stands among all ranked ones: ``"smallest"``, ``"3rd largest"``, ``"2nd nearest to 5"``.
     """
     place = ranking.numbers.index(record.number)
-    units = {margin.name: f" {margin.unit}" for margin in record.margins if margin.unit}
+    units = {margin.name: behind(margin.unit) for margin in record.margins}
     words: dict[object, str] = {"min": "smallest", "max": "largest"}
     told = []
     for objective, value, better in zip(ranking.objectives, ranking.values[place], ranking.places[place], strict=True):
@@ -212,11 +210,14 @@ def _ranking_table(ranking: Ranking, report: Report) -> Table:
     most = report.scene.ranking.show if report.scene.ranking else len(ranking.numbers)
     places = list(enumerate(zip(ranking.numbers, ranking.scores, ranking.values), 1))[:most]
     rows = ((place, number, score, number in ranking.front, *row) for place, (number, score, row) in places)
-    goals = (f"{o.quantity} ({o.goal if isinstance(o.goal, str) else f'near {o.goal:g}'})" for o in ranking.objectives)
+    margins = (margin for record in report.products.get("records", ()) for margin in record.margins if margin.unit)
+    units = {margin.name: f" [{behind(margin.unit).strip()}]" for margin in margins}
+    sought = (o.goal if isinstance(o.goal, str) else f"near {o.goal:g}" for o in ranking.objectives)
+    goals = (f"{o.quantity}{units.get(o.quantity, '')} ({goal})" for o, goal in zip(ranking.objectives, sought))
     weights = ", ".join(f"{o.weight:g}" for o in ranking.objectives)
     note = (
-        f"{ranking.front_size} of {ranking.ranked} ranked candidates are on the Pareto front: no other one is at "
-        f"least as good in every objective and better in one. Score: weighted mean (weights {weights}) of the "
+        f"On the Pareto front: {grouped(ranking.front_size)} of {grouped(ranking.ranked)} ranked; no other candidate "
+        f"is at least as good in every objective and better in one. Score: weighted mean (weights {weights}) of the "
         "objectives, each scaled from 0 (worst of all) to 1 (best of all)."
     )
     if ranking.unranked:

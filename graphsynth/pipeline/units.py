@@ -108,6 +108,17 @@ def _parse(text: str) -> Unit:
     return Unit(text, *_meaning(text, _UNITS))
 
 
+def behind(unit: str) -> str:
+    """Return a unit as print writes it behind a number, as in ``" kg m²"`` or ``"°"``."""
+    sign = {"deg": "°"}.get(unit) or re.sub(r"\^([234])", lambda power: "²³⁴"[int(power[1]) - 2], unit)
+    return sign if sign in ("", "°", "′", "″") else f" {sign}"
+
+
+def grouped(count: int) -> str:
+    """Return a count with thin spaces between thousands, as ISO 80000 does."""
+    return f"{count:,}".replace(",", "\u202f")
+
+
 def _listed(text: str) -> list[tuple[str, str]]:
     """Read ``"name = value; name = value"``; a name without a value stands for itself."""
     pairs = [entry.partition(" = ") for entry in text.split("; ")]

@@ -64,7 +64,7 @@ def test_sensors_and_second_way(tables: dict[str, Any]) -> None:
     assert largest == pytest.approx([max(joint) for joint in sizes], rel=6e-4)
     second = next(t for t in report["tables"] if t.title == "Reactions, independent cross-check")
     assert float(second.rows[0][1]) < 1e-12
-    limit = next(t for t in report["tables"] if t.title == "The limit L -> 0")
+    limit = next(t for t in report["tables"] if t.title == "The limit L → 0")
     assert [float(row[3]) for row in limit.rows[3:]] == pytest.approx([1.0] * 4, abs=0.02)
     assert len(limit.rows) == 7
 

@@ -143,7 +143,7 @@ def run(
     if status is RunStatus.DONE and not (energy <= _WARN and electric <= _WARN):
         off = float(np.fmax(energy, electric))  # NaN without a second output time only
         notes = (*notes, f"the energy balance is off by {off:.1e}; tighten rtol")
-    unit = f"{n - 2} current(s)" if n > 2 else "currents negligible"
+    unit = f"{n - 2} current{'s' * (n > 3)}" if n > 2 else "currents negligible"
     name = "S (regularised, without inertia)" if regular else "J (with inertia)"
     return DriveRun(
         time=out,

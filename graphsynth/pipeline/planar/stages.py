@@ -179,7 +179,7 @@ def move(context: Context, built: Built) -> Moved:
     angle = smallest_transmission(motion)
     if angle < table.motion.min_transmission:
         degrees, least = math.degrees(angle), math.degrees(table.motion.min_transmission)
-        raise Rejected("the transmission angle is too small", f"{degrees:.2f} deg, {least:.10g} is asked")
+        raise Rejected("the transmission angle is too small", f"{degrees:.2f}°, at least {least:.10g}° is asked")
     # the size: the diagonal of the box that holds all joints and named points over the range
     places = [motion.point(joint.a, joint.at_a).position for joint in built.mechanism.joints]
     places += [motion.point(name).position for name in built.mechanism.points]
@@ -267,12 +267,7 @@ def jamming(context: Context, moved: Moved) -> Part:
     verdict, reason = report.verdict, report.reason
     if table.certify:
         proof = certify_coupled(
-            moved.motion,
-            limits,
-            tilt,
-            **given,
-            max_pieces=context.scene.budget.boxes or _PIECES,
-            seconds=math.inf,
+            moved.motion, limits, tilt, **given, max_pieces=context.scene.budget.boxes or _PIECES, seconds=math.inf
         )
         verdict, reason = proof.verdict, proof.reason
     good = True if verdict.is_free else False if verdict.is_jammed else None

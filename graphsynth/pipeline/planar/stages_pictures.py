@@ -8,6 +8,7 @@ from graphsynth.pipeline.planar.stages import restored
 from graphsynth.pipeline.planar.tables import PlanarTable
 from graphsynth.pipeline.products import Outcome, Picture, Ranking, Record
 from graphsynth.pipeline.stages import Context
+from graphsynth.pipeline.units import behind
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
@@ -44,7 +45,7 @@ def sketches(
         clear = int(apart.min(axis=(1, 2)).argmax())
         svg = mechanism_svg(motion, clear, width=420, height=320, title=f"Place {place}")
         record = by_number[number]
-        margins = ", ".join(f"{m.name} {m.value:.3g}{' ' + m.unit if m.unit else ''}" for m in record.margins[:5])
+        margins = ", ".join(f"{m.name} {m.value:.3g}{behind(m.unit)}" for m in record.margins[:5])
         text = f"{record.verdict[:1].upper()}{record.verdict[1:]}: {margins}."
         pictures.append(Picture(f"Place {place}: candidate {number}", svg, text))
     return tuple(pictures)

@@ -68,10 +68,11 @@ def pointing_picture(
         set_limits(centre - reach, centre + reach)
     axes.set_box_aspect((1, 1, 1), zoom=0.9 if plain else 1.08)
     axes.view_init(elev=22, azim=38)
-    axes.set(xlabel="x", ylabel="y", zlabel="z")
+    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
     axes.tick_params(labelsize=7)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MaxNLocator(4))
+        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))  # the paper of the page, light or dark
     if plain:
         axes.set_axis_off()
     else:
@@ -148,10 +149,10 @@ def comparison_picture(
     for axes in panels:
         axes.axvline(math.degrees(working), color=_REST, lw=0.8, ls=":")
         axes.grid(alpha=0.25)
-        axes.set_xlabel("crank angle [deg]")
+        axes.set_xlabel("crank angle [°]")
         axes.set_xlim(0.0, degrees[-1])
         axes.set_ylim(bottom=0.0)
-    panels[0].set_ylabel("reflector angle [deg]")
+    panels[0].set_ylabel("reflector angle [°]")
     for axes in panels[:2]:
         axes.legend(loc="upper left", fontsize=8, frameon=False)
     return figure
@@ -166,7 +167,7 @@ def _means(axes: Any, degrees: Array, found: ModelComparison, orders: tuple[str,
     own = axes.get_lines()[-2:]
     twin = axes.twinx()
     twin.plot(degrees, difference, color=LIGHT["note"], lw=1.2, label="difference")
-    twin.set_ylabel("difference of means [arc-minutes]", color=LIGHT["note"])
+    twin.set_ylabel("difference of means [′]", color=LIGHT["note"])
     seen = difference[np.isfinite(difference)]
     size = max(1.0, float(np.abs(seen).max(initial=0.0)))
     twin.set_ylim((-1.2 * size if seen.min(initial=0.0) < -0.05 * size else 0.0), 4.0 * size)
@@ -205,7 +206,7 @@ def difference_map_picture(
     ):
         largest = max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-9)
         drawn.append((values, title, {"cmap": colours, "vmin": below * largest, "vmax": largest}))
-    return _maps(grid, drawn, "arc-minutes", size)
+    return _maps(grid, drawn, "angle [′]", size)
 
 
 def _maps(grid: Array, drawn: Any, label: str, size: tuple[float, float]) -> Figure:
@@ -216,9 +217,9 @@ def _maps(grid: Array, drawn: Any, label: str, size: tuple[float, float]) -> Fig
         image = axes.pcolormesh(degrees, degrees, values.T, rasterized=True, **options)
         figure.colorbar(image, ax=axes, label=label)
         axes.set_title(title, fontsize=10)
-        axes.set_xlabel("φx, crank of leg Y [deg]")
+        axes.set_xlabel("φx, crank of leg Y [°]")
         axes.set_aspect("equal")
-    figure.axes[0].set_ylabel("φy, crank of leg X [deg]")
+    figure.axes[0].set_ylabel("φy, crank of leg X [°]")
     return figure
 
 
@@ -252,7 +253,7 @@ def fold_map_picture(
     share = 100.0 * float(poses.assembled.mean())
     title = f"order {mechanism.order}, {mode}: {share:.1f} % of this square can be assembled"
     drawn = [(margin, title, {"cmap": "viridis", "vmin": 0.0, "vmax": 1.0})]
-    figure = _maps(grid, drawn, "sine of the angle to the nearest fold [–]", size)
+    figure = _maps(grid, drawn, "sine of the angle to the nearest fold", size)
     axes = figure.axes[0]
     axes.set_facecolor(WHITE)
     _singular_points(axes, mechanism, grid, s_y, s_x)
@@ -307,12 +308,12 @@ def tolerance_map_picture(
             worst[:, i, j] = [max(map(abs, bounds.deviation)) for bounds in (found.a, found.b)]
     names = (f"{name}, order {mechanism.order}" for name in ("elevation", "azimuth"))
     drawn = [(values, name, {"cmap": "magma_r", "shading": "nearest"}) for values, name in zip(worst, names)]
-    figure = _maps(grid, drawn, "largest certified deviation [arc-seconds]", size)
+    figure = _maps(grid, drawn, "largest certified deviation [″]", size)
     for axes in figure.axes[:2]:
         axes.patch.set_hatch("////")
     given = (widths,) if isinstance(widths, int | float) else tuple(dict.fromkeys(widths))
-    text = f"{given[0]:g}" if len(given) == 1 else ", ".join(f"{w:g}" for w in np.ravel(widths))
-    figure.suptitle(f"lengths ±{text}; hatched: undecided", fontsize=11)
+    text = ", ".join(f"{1e3 * w:g}" for w in (given if len(given) == 1 else np.ravel(widths)))
+    figure.suptitle(f"lengths ±{text} mm; hatched: undecided", fontsize=11)
     return figure
 
 
@@ -365,8 +366,8 @@ def plots(context: Context, motion: AntennaMotion, comparison: ModelComparison) 
     largest = table.sweep.largest
     given: dict[str, Any] = {"samples": table.sweep.samples, "working": table.sweep.working, "size": (8.6, 3.7)}
     figure = comparison_picture(antenna, other, other_reading=reading, largest=largest, **given)
-    words = "a: second model; b: first model; c: the means of both and their difference. Dotted: working limit."
-    pictures = [Picture("Figure 4: two models over equal crank angles", themed_svg(figure), words, "wide")]
+    words = "As Figure 4 of the article; a: second model, b: first, c: means and difference. Dotted: working limit."
+    pictures = [Picture("Two models over equal crank angles", themed_svg(figure), words, "wide")]
     pictures += _curves(motion, comparison)
     figure = difference_map_picture(antenna, other, other_reading=reading, span=largest)
     words = "Left: what the article compares. Right: how far apart the two models really point."
@@ -377,8 +378,7 @@ def plots(context: Context, motion: AntennaMotion, comparison: ModelComparison) 
         words = "Mean-value form at every node."
         pictures.append(Picture("Map of the certified deviations", themed_svg(figure), words, "wide"))
     figure = fold_map_picture(antenna, nodes=61, size=(6.4, 6.2))
-    words = "Of the mode of the rest pose."
-    pictures.append(Picture("Map of folds and dead centres", themed_svg(figure), words, "wide"))
+    pictures.append(Picture("Map of folds and dead centres", themed_svg(figure), "Mode of the rest pose.", "wide"))
     return tuple(pictures)
 
 

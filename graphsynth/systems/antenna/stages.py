@@ -320,7 +320,7 @@ def _tolerance_table(context: Context, bounds: Bounds) -> Table:
         "too wide by",
     )
     widths = ", ".join(
-        f"{name.replace('_', ' ')} ±{unit_in('[mm]').from_si(w):g} mm"
+        f"{name.replace('_', ' ').replace('cardan', 'universal joints')} ±{unit_in('[mm]').from_si(w):g} mm"
         for name, w in zip(LENGTH_NAMES, widths_of(context))
     )
     note = (

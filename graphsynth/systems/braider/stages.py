@@ -316,7 +316,7 @@ def plots(context: Context, run: DriveRun, turn: JointForces, study: ReductionSt
     if study is not None:
         svg = themed_svg(reduction_picture(study, size=(5.4, 3.4)))
         words = "Largest differences from the motor without inductance after the electrical transient"
-        pictures.append(Picture("The limit L -> 0", svg, f"{words}: of first order in L."))
+        pictures.append(Picture("The limit L → 0", svg, f"{words}: of first order in L."))
     return tuple(pictures)
 
 
@@ -341,12 +341,12 @@ def _start_pictures(context: Context, braider: Braider, run: DriveRun) -> list[P
     shown: tuple[tuple[Any, ...], ...] = (
         ("currents of the motor", _lines(t, run.currents, ("i_d", "i_q")), x, "current [A]", _ROTOR),
         ("phase portrait", phase, "current i_q [A]", "crank speed [rad/s]", rest),
-        ("angular velocities of the links", _lines(t, links, names), x, "[rad/s]", ""),
+        ("angular velocities of the links", _lines(t, links, names), x, "angular velocity [rad/s]", ""),
         ("reactions in the joints", _lines(t, found.magnitudes(), _SHORT), x, _SIZE, ""),
         ("torque", torques, x, "torque [mN m]", "Behind the train, and of the motor before it."),
     )
     band = [replace(high, label="band"), low]
-    first = chart("Start-up: crank speed", crank, x, "[rad/s]", step, levels=band)
+    first = chart("Start-up: crank speed", crank, x, "crank speed [rad/s]", step, levels=band)
     return [first, *(chart(f"Start-up: {title}", lines, *labels) for title, lines, *labels in shown)]
 
 
@@ -370,7 +370,7 @@ def _turn_pictures(braider: Braider, turn: JointForces) -> list[Picture]:
     over, polar = {"xticks": TURN}, {"equal": True, "size": (5.4, 4.2)}
     vectors = f"{at} Paths of the force vectors in the fixed frame."
     shown: list[tuple[Any, ...]] = [
-        ("Sensors: relative angular velocities", relative, _CRANK, "[rad/s]", pairs, over),
+        ("Sensors: relative angular velocities", relative, _CRANK, _RATE, pairs, over),
         ("Sensors: reactions", sizes, _CRANK, _SIZE, f"{at} {'; '.join(JOINTS)}.", over),
         ("Sensors: polar plot of the reactions", paths, "F_x [mN]", "F_y [mN]", vectors, polar),
         ("Sensors: torque on the crank", [Line(theta, turn.torque)], _CRANK, torque, at, over),

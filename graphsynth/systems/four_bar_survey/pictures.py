@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from graphsynth.drawing.palette import WHITE
+from graphsynth.drawing.palette import LIGHT, WHITE
 from graphsynth.drawing.plots import new_figure, themed_svg
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.mechanism.rotatability import TYPES
 from graphsynth.pipeline.products import Picture, Ranking, Record
 from graphsynth.pipeline.stages import Context
-from graphsynth.pipeline.units import Unit
+from graphsynth.pipeline.units import Unit, behind
 from graphsynth.systems.four_bar_survey.results import Survey
 from graphsynth.systems.four_bar_survey.stages import Lattice, classify, evaluate_sets, lattice_of
 
@@ -123,7 +123,7 @@ def _front(context: Context, survey: Survey) -> Picture:
     figure = new_figure((5.4, 4.2))
     ax = figure.add_subplot()
     x, y = done.quantity("transmission angle"), done.quantity("largest axis tilt")
-    dots = ax.scatter(x, y, c=done.size, cmap="viridis", s=14, linewidths=0)
+    dots = ax.scatter(x, y, c=done.size, cmap="viridis", s=14, linewidths=0.4, edgecolors=LIGHT["soft"])
     figure.colorbar(dots, ax=ax, label="longest length / crank")
     ax.set_xlabel(_ANGLE)
     ax.set_ylabel("critical tilt of the axis [°]")
@@ -155,9 +155,9 @@ def sketches(context: Context, records: tuple[Record, ...], ranking: Ranking) ->
 
     pictures = []
     for place, (record, mechanism) in enumerate(_best(context, records, ranking, _SKETCHED), 1):
-        margins = ", ".join(f"{m.name} {m.value:.3g}{' ' + m.unit if m.unit else ''}" for m in record.margins[:4])
+        margins = ", ".join(f"{m.name} {m.value:.3g}{behind(m.unit)}" for m in record.margins[:4])
         lengths = record.solution.partition(": ")[2]
-        caption = f"{lengths}. {record.recognised_as}; {margins}; {record.verdict}."
+        caption = f"{record.recognised_as.capitalize()}: {lengths}; {margins}; {record.verdict}."
         motion = simulate(mechanism, [1.0], modes={0: 1}, events=False)
         svg = mechanism_svg(mechanism, motion.poses[0], width=300, height=220, title=f"Place {place}")
         pictures.append(Picture(f"Place {place}", svg, caption, "small"))
@@ -173,5 +173,5 @@ def animations(context: Context, records: tuple[Record, ...], ranking: Ranking) 
     for place, (record, mechanism) in enumerate(_best(context, records, ranking, _ANIMATED), 1):
         motion = simulate(mechanism, np.linspace(0.0, math.tau, 61), modes={0: 1})
         svg = animated_svg(motion, frames=60, title=f"Place {place}", seconds=4, width=300, height=220)
-        pictures.append(Picture(f"Place {place}", svg, record.solution.partition(": ")[2], "small"))
+        pictures.append(Picture(f"Place {place}", svg, f"{record.solution.partition(': ')[2].capitalize()}.", "small"))
     return tuple(pictures)

@@ -17,6 +17,7 @@ from graphsynth.pipeline.display import table
 from graphsynth.pipeline.products import Finding, Outcome, Quantity, Ranking, Record, Table, exact
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.steps import DIGITS
+from graphsynth.pipeline.units import grouped
 from graphsynth.systems.four_bar_survey.stages import (
     QUANTITIES,
     Lattice,
@@ -199,13 +200,13 @@ def _summary(context: Context, survey: Survey, certificates: tuple[Certificate, 
         for name, r in (("frame", lattice.frame), ("coupler", lattice.coupler), ("rocker", lattice.rocker))
     ]
     rows = (
-        ("dimension sets", survey.sets),
+        ("dimension sets", grouped(survey.sets)),
         ("lengths", f"crank {float(lattice.crank * lattice.unit):g}, {', '.join(spans)}"),
-        ("crank positions computed", survey.positions),
-        ("motion against the exact class", f"{survey.disagreements} sets of {survey.sets} disagree"),
-        ("keep all limits", survey.passing),
-        ("of these, on the Pareto front", len(survey.front)),
-        ("certified", len(survey.chosen)),
+        ("crank positions computed", grouped(survey.positions)),
+        ("motion against the exact class", f"{grouped(survey.disagreements)} sets of {grouped(survey.sets)} disagree"),
+        ("keep all limits", grouped(survey.passing)),
+        ("of these, on the Pareto front", grouped(len(survey.front))),
+        ("certified", grouped(len(survey.chosen))),
     )
     positions = context.scene.mechanism.positions
     note = f"{positions} crank positions a rotation; the front is that of all sets, not only of the certified ones."
@@ -218,10 +219,10 @@ def assess(
     """Give one record per certified set, and the tables of the survey, the first with its answer."""
     records = _records(context, survey, certificates)
     classes = (
-        (TYPES[type_], KINDS[kind], KINDS[found], count, "yes" if kind == found else "NO")
+        (TYPES[type_], KINDS[kind], KINDS[found], grouped(count), "yes" if kind == found else "NO")
         for (type_, kind, found), count in sorted(survey.classes.items())
     )
-    limits = ((count, reason) for reason, count in (*survey.rejected.items(), ("none", survey.passing)))
+    limits = ((grouped(count), reason) for reason, count in (*survey.rejected.items(), ("none", survey.passing)))
     counts = Counter((proof.verdict, proof.assembles, proof.reason) for proof in certificates)
     proved = ((count, *what) for what, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])))
     tables = [
@@ -240,16 +241,16 @@ def findings(survey: Survey, certificates: tuple[Certificate, ...]) -> tuple[Fin
     """Return the numbers of the survey and, in words, what was rejected and how sure all that is."""
     proved = Counter(certificate.free for certificate in certificates)
     found = [
-        Finding("dimension sets looked at", value=_number(survey.sets)),
-        Finding("keep all limits", value=_number(survey.passing)),
-        Finding("of the best proved free", True if proved[True] else None, _number(proved[True])),
+        Finding("dimension sets looked at", value=grouped(survey.sets)),
+        Finding("keep all limits", value=grouped(survey.passing)),
+        Finding("of the best proved free", True if proved[True] else None, grouped(proved[True])),
     ]
     if proved[False]:
-        found.append(Finding("of the best proved to bind within the tolerances", False, _number(proved[False])))
+        found.append(Finding("of the best proved to bind within the tolerances", False, grouped(proved[False])))
     if proved[None]:
-        found.append(Finding("of the best undecided", None, _number(proved[None])))
+        found.append(Finding("of the best undecided", None, grouped(proved[None])))
     if survey.failed:
-        found.append(Finding("shards failed", False, _number(len(survey.failed))))
+        found.append(Finding("shards failed", False, grouped(len(survey.failed))))
     # lengths of the best set that are the first or last of their ranges
     lattice, edges = survey.lattice, []
     for frame, _, coupler, rocker in lattice.lengths(np.array(survey.chosen[:1], dtype=np.int64)).tolist():
@@ -264,32 +265,27 @@ def findings(survey: Survey, certificates: tuple[Certificate, ...]) -> tuple[Fin
     return (*found, *_sentences(survey))
 
 
-def _number(count: int) -> str:
-    """Group thousands with a thin space, as ISO 80000 does."""
-    return f"{count:,}".replace(",", "\u202f")
-
-
 def _sentences(survey: Survey) -> tuple[Finding, Finding]:
     """Say what was rejected; compare the motion with the exact class, and say what rests on floating point."""
     counts = sorted(survey.rejected.items(), key=lambda item: (-item[1], item[0]))
-    reasons = "; ".join(f"{_number(count)} because {reason}" for reason, count in counts if count)
+    reasons = "; ".join(f"{grouped(count)} because {reason}" for reason, count in counts if count)
     total = sum(survey.rejected.values())
     share = f"{100.0 * survey.passing / survey.sets:.3g} %" if survey.sets else "none"
     agree = survey.disagreements == 0
     words = (
         "in every set the computed motion agrees with the exact class"
         if agree
-        else f"in {_number(survey.disagreements)} sets the computed motion disagrees with the exact class"
+        else f"in {grouped(survey.disagreements)} sets the computed motion disagrees with the exact class"
     )
     return (
         Finding(
-            f"Of {_number(survey.sets)} sets {_number(survey.passing)} ({share}) keep all limits. "
-            f"Rejected: {_number(total)}{': ' + reasons if reasons else ''} "
+            f"Of {grouped(survey.sets)} sets {grouped(survey.passing)} ({share}) keep all limits. "
+            f"Rejected: {grouped(total)}{': ' + reasons if reasons else ''} "
             "(each counted at the first limit it misses)."
         ),
         Finding(
             f"Whether a crank turns is decided exactly; {words}. The bearing is certified for the "
-            f"{_number(len(survey.chosen))} best, tolerances included; for the others it is estimated in closed form.",
+            f"{grouped(len(survey.chosen))} best, tolerances included; for the others it is estimated in closed form.",
             None if agree else False,
         ),
     )

@@ -96,7 +96,6 @@ def assess(
 ) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
     """Give one record per candidate and the tables of the first one assessed."""
     condition = context.scene.mechanism.bearing.condition
-
     limits: dict[_C, dict[str, CertifiedLimit]] = {}
 
     def verdict(reports: dict[_C, JammingReport]) -> tuple[str, bool, tuple[Quantity, ...]]:
@@ -111,9 +110,8 @@ def assess(
         return records, ()
     motion = next(m.value for m in motions if m.candidate.number == done.candidate.number)
     proved = _proof_table(context, done.value, limits)
-    jam = replace(
-        _binding_table(context, done.value, limits), findings=_findings(done.value[condition], limits[condition])
-    )
+    findings = _findings(done.value[condition], limits[condition])
+    jam = replace(_binding_table(context, done.value, limits), findings=findings)
     return records, (_motion_table(motion), jam, proved, _fit_table(context))
 
 
@@ -205,9 +203,11 @@ def _proof_table(
         )
         rows.append((f"{name}: works, fails", *texts))
     box = tolerance_box(context)
-    ranges = ", ".join(f"{name} {value}" for name, value in box.describe().items() if not box[name].is_point)
-    given = "exact decimals" if box.exact_input else "some inputs are rounded numbers"
-    note = f"Certified with outward rounding; {given}. "
+    units = {"l2": "", "l3": "", "alpha": " rad", "azimuth": " rad"}  # the rest are lengths of the bearing
+    given = ((name, text) for name, text in box.describe().items() if not box[name].is_point)
+    ranges = ", ".join(f"{name} {text}{units.get(name, ' mm')}" for name, text in given)
+    inputs = "all inputs are exact" if box.exact_input else "some inputs are rounded numbers"
+    note = f"Certified with outward rounding; {inputs}. "
     note += f"Ranges: {ranges}." if ranges else "No tolerances are given."
     return Table("What is proved about the bearing", ("", *(f"condition {c}" for c in found)), tuple(rows), note)
 

@@ -231,13 +231,13 @@ def _load_table(turns: tuple[Turn, ...]) -> Table:
     }
     held = max(own.found.floating.peak_held for own in turns)
     note = (
-        "Forces at the ends are those of a crowned slot, which carries no couple. A sliding pair may send back to the "
-        "cylinder any share of the couple on the crosshead: what share, rigid bodies cannot tell."
+        "Forces at the ends are those of a crowned slot, which carries no couple. A slot with flat faces may return "
+        "any share of the couple on the crosshead to the cylinder; rigid bodies cannot tell how large a share."
     )
     if held > 0.0:
         note += (
             f" Where the slot does not slide, its static friction can hold up to {held:.4g} N across the cylinder, and "
-            "the wall may carry so much more."
+            "the wall may carry that much more."
         )
     return _of_pistons("Side loads over one rotation", turns, columns, note)
 

@@ -140,7 +140,7 @@ def claim(context: Context) -> Claim:
     first, last = c.resistances[0], c.resistances[-1]
     with _refused(context, "claim"):
         effects = {
-            f"L = {L:g} H, w_d = {speed:g} rad/s": resistance_effect(
+            f"L = {L:g} H, ω_d = {speed:g} rad/s": resistance_effect(
                 drive_of(context, first, L, speed), c.resistances, simulate=True, revolutions=c.revolutions
             )
             for L, speed in c.cases
@@ -247,11 +247,12 @@ def _claim_tables(context: Context, found: Claim) -> tuple[Table, ...]:
     truth = (
         "The claim is that a larger armature resistance calms both. On the map the linear condition tells the sign of "
         f"the simulated trend of the speed on {100 * found.map.agreement:.0f} % of the cells; the rest have ripples "
-        "that are not small."
+        "that are not small. Ω is the frequency at which the inertia varies, ω_n the natural frequency of motor and "
+        "control, ω_d the speed asked for; last to first: ripple at the largest resistance over that at the smallest."
     )
     note = (
         "Ripples peak to peak in steady motion. Linear, exact for small ripples: the torque ripple always falls with "
-        "r, the speed ripple if and only if Om/w_n > 0.7071. Simulated: estimated, the full model over the second half "
+        "r, the speed ripple if and only if Ω/ω_n > 0.7071. Simulated: estimated, the full model over the second half "
         f"of {table_of(context).claim.revolutions} mean revolutions."
     )
     count = len(found.effects)
@@ -259,7 +260,7 @@ def _claim_tables(context: Context, found: Claim) -> tuple[Table, ...]:
     calms = "calms" if falls == [count, count] else "does not always calm"
     finding = Finding(
         f"A larger armature resistance {calms} the machine: of {count} cases the ripple of the speed falls throughout "
-        f"in {falls[0]}, that of the torque in {falls[1]} (estimated)."
+        f"in {falls[0] or 'none'}, that of the torque in {falls[1] or 'none'} (estimated)."
     )
     return (
         table("Does a larger resistance calm the machine?", _TREND_COLUMNS, trends, truth, finding),
@@ -269,18 +270,18 @@ def _claim_tables(context: Context, found: Claim) -> tuple[Table, ...]:
 
 _TREND_COLUMNS = (
     "case",
-    "Om/w_n | .3f",
+    "Ω/ω_n | .3f",
     "speed ripple, linear",
     "speed ripple, simulated",
-    "last/first | .3g",
+    "last to first | .3g",
     "current ripple, simulated",
-    "last/first | .3g",
+    "last to first | .3g",
 )
 _RIPPLE_COLUMNS = (
     "case",
-    "Om/w_n | .3f",
+    "Ω/ω_n | .3f",
     "r [ohm] | g",
-    "zeta | .3f",
+    "ζ | .3f",
     "speed, linear [rad/s] | .4g",
     "simulated | .4g",
     "current, linear [A] | .4g",
@@ -340,7 +341,7 @@ def _bare_tables(context: Context, bare: WithoutInertia) -> tuple[Table, ...]:
 
 _EVENT_COLUMNS = (
     "event",
-    "angle/pi | .12g",
+    "angle/π | .12g",
     "time t [s] | .14g",
     "fictitious time s [s] | .14g",
     "speed of the platform [m/s] | .13g",
@@ -389,7 +390,7 @@ def tables(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Table, ...]
     rounding = max(model.inertia.truncation, 1e-13) * high
     quantities = [
         Quantity(f"{name} inertia of the platform at the crank", value, "kg m^2", "estimated", rounding)
-        for name, value in (("least", low), ("largest", high), ("mean", mean))
+        for name, value in (("smallest", low), ("largest", high), ("mean", mean))
     ]
     quantities += [
         Quantity("constant inertia of rotor, pinion and wheels", model.constant_inertia, "kg m^2", "exact"),

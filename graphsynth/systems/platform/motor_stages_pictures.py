@@ -88,10 +88,10 @@ def animations(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Picture
     motion = shown_motion(mechanism, q, poses, closed=True)
     svg = animated_svg(motion, title=title, seconds=seconds, width=460, height=400)
     caption = (
-        f"The last rotation of the run with {item.label}, {slow:g} times slower than real: the crank hurries through "
-        "the dead centres, where it has hardly any inertia to move."
+        f"The last rotation of the run with {item.label}, {slow:g} times slower than in reality: the crank hurries "
+        "through the dead centres, where it has hardly any inertia to move."
     )
-    return (Picture("One rotation at the real speed", svg, caption, "wide"),)
+    return (Picture("One rotation of the steady motion", svg, caption, "wide"),)
 
 
 def plots(
@@ -104,17 +104,17 @@ def plots(
     pictures = [*run_pictures(runs), *_bare_pictures(context, bare)]
     map_caption = (
         "Blue: a larger resistance lowers the speed ripple of the full model, red: it raises it. The bar is the linear "
-        "condition Om = w_n/√2: blue above and red below it is what small ripples obey."
+        "condition Ω = ω_n/√2: blue above and red below it is what small ripples obey."
     )
     pictures.append(
         Picture("The claim about the resistance as a map", themed_svg(ripple_map_picture(found.map)), map_caption)
     )
-    for of, said in (("speed", "rises where Om/w_n < 0.71"), ("current", "always falls, and the torque with it")):
+    for of, said in (("speed", "rises where Ω/ω_n < 0.71"), ("current", "always falls, and the torque with it")):
         svg = themed_svg(ripple_picture(found.effects, of))
         pictures.append(Picture(f"Ripple of the {of} over the resistance", svg, f"Linear theory: it {said}."))
     if study is not None:
         caption = "Largest differences from the motor without inductance, after the electrical transient."
-        pictures.append(Picture("The limit L -> 0", themed_svg(reduction_picture(study, size=(5.4, 3.4))), caption))
+        pictures.append(Picture("The limit L → 0", themed_svg(reduction_picture(study, size=(5.4, 3.4))), caption))
     return tuple(pictures)
 
 

@@ -154,8 +154,5 @@ SYSTEM = System(
         Stage("plot", f"{_STEPS}_pictures:plots", ("runs", "without_inertia", "claim", "limit"), ("plots",)),
         Stage("compare solvers", f"{_STEPS}:solvers", (), ("solvers",)),
     ),
-    evidence=(
-        Plan("drive", f"{_HERE}.evidence:motor_drive"),
-        *plans(f"{_HERE}.evidence", "small-inductance"),
-    ),
+    evidence=(Plan("drive", f"{_HERE}.evidence:motor_drive"), *plans(f"{_HERE}.evidence", "small-inductance")),
 )

@@ -326,7 +326,7 @@ def ripple_map_picture(found: RippleMap, *, size: tuple[float, float] = (5.4, 4.
     axes.axhline(1.0 / math.sqrt(2.0), color="#111111", lw=2.0)
     axes.text(axes.get_xlim()[0] * 1.1, 0.73, "linear: falls above", fontsize=8, color="#111111")
     ticks = ((0.5, 1, 2, 5, 10, 20), (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2))
-    _log_axes(axes, "armature resistance [ohm]", "Om / w_n", *ticks)
+    _log_axes(axes, "armature resistance [ohm]", "Ω/ω_n", *ticks)
     return figure
 
 
@@ -349,5 +349,5 @@ def _gain_map(figure: Figure, axes: Any) -> None:
         axes.text(x, 0.024, text, color=WHITE, fontsize=8, ha="center")
     axes.set_xlim(nu[0], nu[-1])
     axes.set_ylim(zeta[0], zeta[-1])
-    _log_axes(axes, "Om / w_n", "damping ratio zeta", (0.1, 0.2, 0.5, 1, 2, 3), (0.02, 0.1, 0.5, 1, 5))
-    axes.set_title("speed gain; bar: Om = w_n / √2", fontsize=10)
+    _log_axes(axes, "Ω/ω_n", "damping ratio ζ", (0.1, 0.2, 0.5, 1, 2, 3), (0.02, 0.1, 0.5, 1, 5))
+    axes.set_title("speed gain; bar: Ω = ω_n/√2", fontsize=10)

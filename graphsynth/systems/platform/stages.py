@@ -150,7 +150,7 @@ def _margins(motion: TurnMotion) -> tuple[Quantity, ...]:
         of_si("distance to the nearest other assembly mode", motion.gap.min() * motion.Lc, "mm"),
         of_si("smallest |det JX|, relative to the start", least),
         exact("wheel positions computed", len(motion.psi)),
-        of_si("least |leg Jacobian|", np.abs(motion.leg).min(), "mm^2"),
+        of_si("smallest |leg Jacobian|", np.abs(motion.leg).min(), "mm^2"),
         of_si("closure error after one rotation", closure, "mm"),
         of_si("relative closure residual", motion.residual),
     )

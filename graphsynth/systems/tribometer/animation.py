@@ -57,8 +57,7 @@ def tribometer_sketch(motion: StickSlipMotion, at: float = 0.0) -> str:
 def tribometer_animation(motion: StickSlipMotion, *, frames: int = 240, seconds: float = 0.0) -> str:
     """Draw the tribometer over the run as one SVG, with the displacements of both platforms below.
 
-    ``frames`` are 2 to 2000 pictures, ``seconds`` the time of one pass (0 for real time); `SpecError` if nothing of the
-    motion is known, or the number of frames is out of bounds.
+    ``frames`` are 2 to 2000 pictures, ``seconds`` the time of one pass (0: real time). `SpecError` if nothing is known.
     """
     if not 2 <= frames <= 2000:
         raise SpecError(f"The number of frames is {frames}; give 2 to 2000.")
@@ -183,7 +182,8 @@ class _Stage:
             named.append((60.0, floor + 26.0, "belt", "start"))
         else:
             named.append((x1, floor + 26.0, "lower platform", "middle"))
-            named.append((24.0, floor + 26.0, "crank and rod" if self.rod else "cosine", "start"))
+            crank = self.zero - 1.8 * unit - self.scale * self.rod, floor - 32.0 - self.scale * self.radius
+            named.append((*crank, "crank and rod", "middle") if self.rod else (24.0, floor + 26.0, "cosine", "start"))
         for x, y, text, anchor in named:
             drawing.fixed(words(text, x, y, anchor=anchor))
 
@@ -193,7 +193,7 @@ def _curves(drawing: Moving, motion: StickSlipMotion, known: NDArray[np.intp], c
     t = motion.t
     shown = [(motion.x2, "b")] if not math.isfinite(motion.model.drive.period) else [(motion.x1, "a"), (motion.x2, "b")]
     largest = max(float(np.nanmax(np.abs(x))) for x, _ in shown) or 1.0
-    left, width, middle = 46.0, _WIDTH - 66.0, _SCENE + 0.5 * _CURVES
+    left, width, middle = 64.0, _WIDTH - 84.0, _SCENE + 0.5 * _CURVES
 
     def place(times: Any, x: Any) -> Array:
         along = left + width * (np.asarray(times) - t[0]) / float(t[-1] - t[0])
@@ -210,7 +210,7 @@ def _curves(drawing: Moving, motion: StickSlipMotion, known: NDArray[np.intp], c
         drawing.circle(place(t[chosen], x[chosen]), 4.0, painted(colour))
     label = f"{1e3 * largest:.3g} mm"
     for text, y in ((label, middle - 0.46 * _CURVES), (f"-{label}", middle + 0.46 * _CURVES)):
-        drawing.fixed(words(text, left + 6.0, y + 4.0, size=12.0))
+        drawing.fixed(words(text, left - 5.0, y + 4.0, size=12.0, anchor="end"))
     for k in range(6):
         time = f"{t[0] + (t[-1] - t[0]) * k / 5.0:.3g} s"
         drawing.fixed(words(time, left + width * k / 5.0, _SCENE + _CURVES + 20.0, size=12.0, anchor="middle"))

@@ -37,10 +37,10 @@ def plots(context: Context, motion: StickSlipMotion, cycle: LimitCycle, study: P
     """Draw Figure 7b, friction, phase portraits, energies and errors."""
     if not np.isfinite(motion.x2).sum() > 1:
         return ()
-    stuck = "Shaded: the platforms stick. Below: the force of friction."
+    stuck = "As Figure 7b of the article. Shaded: the platforms stick. Below: the force of friction."
     colours = "Of the upper platform: stick and slip in two colours."
     pictures = [
-        _shown("Figure 7b: both platforms over time", platforms_picture(motion, size=(8.4, 5.4)), stuck, wide=True),
+        _shown("Both platforms over time", platforms_picture(motion, size=(8.4, 5.4)), stuck, wide=True),
         _shown("Phase portrait of the run", phase_picture(motion, size=(5.2, 4.4)), colours),
     ]
     if math.isfinite(cycle.period) and cycle.kind not in ("none found", "steady"):
@@ -86,7 +86,9 @@ def _curves(motion: StickSlipMotion) -> list[Picture]:
     return [
         *pictures,
         chart("Energies since the start", energies, "time [s]", "energy [J]", spent),
-        chart("Gap of the energy balance", [Line(c.t[few], gap[few])], "time [s]", "gap of the balance [J]", residual),
+        chart(
+            "Error of the energy balance", [Line(c.t[few], gap[few])], "time [s]", "error of the balance [J]", residual
+        ),
     ]
 
 
