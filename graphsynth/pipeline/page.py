@@ -68,7 +68,7 @@ _PAGE = """
 <div class="scroll"><table>{% if columns | join %}<thead><tr>
 {%- for column in columns %}<th scope="col">{{ column }}</th>{% endfor -%}
 </tr></thead>{% endif %}<tbody>{% for row in rows -%}
-<tr>{% for cell in row %}<td{% if cell and cell | length < 40 and cell[0] in "0123456789-+" %} class="num"
+<tr>{% for cell in row %}<td{% if cell | length < 10 or cell | length < 40 and cell[0] in "0123456789-+" %} class="num"
 {%- elif cell | length > 60 %} class="long"
 {%- elif cell | length > 14 %} class="text"{% endif %}>{{ cell }}</td>{% endfor %}</tr>
 {%- endfor -%}

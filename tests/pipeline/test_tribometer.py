@@ -92,7 +92,7 @@ def test_the_page(tmp_path: Any) -> None:
     run(changed("records", "tables", "mechanism_pictures", "animations", "plots"), out=tmp_path)
     page = (tmp_path / "report.html").read_text("utf-8")
     assert page.count("<figure") == 1 + 1 + 10
-    for words in ("Figure 7b", "Limit cycle", "Phase portrait", "Error of the energy balance", "prefers-reduced-motion"):
+    for words in ("Figure 7b", "Limit cycle", "Phase portrait", "Error of the energy", "prefers-reduced-motion"):
         assert words in page
 
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from graphsynth.jamming.bearing.parameters import ToleranceBox
 
 _PIECE = 20  # certificates made in one go
+_SHOWN = tuple(kind.replace("turn", "rotation") for kind in KINDS)
 _CLASS_COLUMNS = ("type (exact)", "crank (exact)", "crank (found in motion)", "sets", "agree")
 _CLASS_NOTE = (
     "Type and kind are decided in exact arithmetic (Grashof's rule, exact); the motion is that of the engine in "
@@ -219,7 +220,7 @@ def assess(
     """Give one record per certified set, and the tables of the survey, the first with its answer."""
     records = _records(context, survey, certificates)
     classes = (
-        (TYPES[type_], KINDS[kind], KINDS[found], grouped(count), "yes" if kind == found else "NO")
+        (TYPES[type_], _SHOWN[kind], _SHOWN[found], grouped(count), "yes" if kind == found else "NO")
         for (type_, kind, found), count in sorted(survey.classes.items())
     )
     limits = ((grouped(count), reason) for reason, count in (*survey.rejected.items(), ("none", survey.passing)))
