@@ -67,4 +67,10 @@ from .chance.probability import (
     ToleranceEffect as ToleranceEffect,
     probability_of_jamming as probability_of_jamming,
 )
+from .questions import (
+    certified_arcs as certified_arcs,
+    compare_sensitivities as compare_sensitivities,
+    direction_map as direction_map,
+    largest_scale as largest_scale,
+)
 from .verdict import Verdict as Verdict

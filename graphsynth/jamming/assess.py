@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.angles import angle
-from graphsynth.core.checks import checked, choice, finite_array
+from graphsynth.core.checks import checked, finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.arcs import JamArcs, covers, jam_arcs
 from graphsynth.jamming.bearing.areas import CrescentAreas, lid_area, rim_area, surrogate_areas
 from graphsynth.jamming.bearing.bearing import Bearing, Condition
 from graphsynth.jamming.bearing.limits import Limit, largest_misalignment, smallest_clearance
 from graphsynth.jamming.bearing.parameters import ToleranceBox
+from graphsynth.jamming.questions import asked, is_exact
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, METHOD_CLOSED_FORM, Assessment, Verdict
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.rotatability import FullTurn
@@ -257,7 +257,8 @@ def assess_jamming(
         ``tolerances``, one relative number for all lengths (0), or tolerances of parts (`graphsynth.tolerances`), where
         fits may stand for ``joints``; ``seconds``, the time of the proof (20).
         ``model``: "small" (L1), or "exact", which closes every loop in space with finite tilts and is slower
-        (theory/closure-in-space); the tables are those of small tilts in both.
+        (theory/closure-in-space); verdict and tables are then about that, every sample takes some 0.1 s, and
+        ``tolerances`` are not yet for it.  With small tilts the report states the error of its figures.
 
     Returns
     -------
@@ -306,29 +307,21 @@ def _of_a_motion(
 ) -> CoupledReport:
     """Assess a motion; refuse what is none, and one without limits of its joints or tilted axes."""
     from graphsynth.jamming.joints.assess import assess_coupled
-    from graphsynth.jamming.joints.limits import JointLimits, Misalignment
-    from graphsynth.kinematics.engine.result import Motion
 
-    if not isinstance(motion, Motion):
-        raise GeometryError(
-            f"subject = {motion!r} is neither a Motion (simulate) nor a TiltedFourBar or ToleranceBox; give one"
-        )
     if unknown := set(options) - {"condition", "certify", "tolerances", "seconds", "model"}:
         raise GeometryError(f"{unknown.pop()} is no argument of an assessment; give tilt, joints, tolerances")
-    if tilt is None:
-        raise GeometryError('no axis is misaligned; give tilt="0.5 deg" or tilt=Misalignment(base, link, alpha)')
-    if joints is None and not isinstance(options.get("tolerances", 0.0), Iterable):
-        raise GeometryError('the joints have no limits; give joints="1 deg", a Bearing or JointLimits, or a mapping')
-    if isinstance(tilt, float | int | str):
-        driver = motion.mechanism.drivers[0]
-        tilt = Misalignment(driver.base, driver.link, angle("tilt", tilt))
-    if isinstance(joints, float | int | str):
-        joints = JointLimits(angle("joints", joints))
-    if choice("model", options.pop("model", "small"), ("small", "exact")) == "exact":
-        from graphsynth.jamming.space.turn import assess_in_space
+    tolerances = options.get("tolerances", 0.0)
+    motion, limits, axes = asked(motion, tilt, joints, isinstance(tolerances, Iterable))
+    if is_exact(options.pop("model", "small")):
+        from graphsynth.jamming.space.assess import assess_in_space
 
-        return assess_in_space(motion, joints, tilt, **options)
-    return assess_coupled(motion, joints, tilt, **options)
+        return assess_in_space(motion, limits, axes, **options)
+    report = assess_coupled(motion, limits, axes, **options)
+    if report.verdict is Verdict.CANNOT_ASSEMBLE:
+        return report
+    from graphsynth.jamming.space.assess import small_tilt_error
+
+    return replace(report, small_tilt_error=small_tilt_error(motion, report, options.get("condition", "A")))
 
 
 def assess_bearing(

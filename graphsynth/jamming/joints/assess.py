@@ -70,6 +70,9 @@ class CoupledReport(Assessment):
         Limits in the order of their shadow prices at ``smallest_scale_input``.
     certificate : TurnCertificate or None
         The proof, if it was asked for; verdict, reason and model are then those of the proof.
+    small_tilts, small_tilt_error : str, float
+        What the tables are about; the relative error of those of small tilts at the worst input (estimated from the
+        exact closure there), NaN if it was not asked for or the tables are exact.
     """
 
     verdict: Verdict
@@ -96,6 +99,7 @@ class CoupledReport(Assessment):
     notes: tuple[str, ...] = ()
     seconds: float = field(default=0.0, compare=False)
     small_tilts: str = "L1 with small tilts (first order): neglects terms of relative order alpha squared"
+    small_tilt_error: float = math.nan
 
     def _figures(self) -> list[tuple[str, str]]:
         growth = f"may be {self.smallest_scale:.6g} times as large, by input {self.smallest_scale_input:.6g}"
@@ -105,7 +109,10 @@ class CoupledReport(Assessment):
         ]
         for (a, b), what, gain in self.sensitivities[:3]:
             rows.append((f"joint {a}-{b}", f"1 % more {what} allows at most {gain:.3f} % more misalignment"))
-        return rows
+        about = self.small_tilts.partition(":")[0]
+        if not math.isnan(self.small_tilt_error):
+            about = f"{about}, off by about {100.0 * self.small_tilt_error:.2g} % at that input"
+        return [*rows, ("figures", about)]
 
     @property
     def model(self) -> str:
@@ -132,6 +139,7 @@ class CoupledReport(Assessment):
         return {
             "verdict": self.verdict.name,
             **{name: getattr(self, name) for name in ("statement", "method", "model", "condition", *_EXTREMES)},
+            "small_tilt_error": None if math.isnan(self.small_tilt_error) else self.small_tilt_error,
             "largest_duality_gap": float(np.nanmax(self.duality_gap, initial=0.0)),
             "sensitivities": [one._asdict() | {"joint": list(one.joint)} for one in self.sensitivities],
             "certificate": None if self.certificate is None else self.certificate.summary(),

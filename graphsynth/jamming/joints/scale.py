@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
 Array = NDArray[np.float64]
+SMALL_TILTS = "L1 with small tilts (first order): neglects terms of relative order alpha squared"
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,6 +196,7 @@ class DirectionMap:
     worst_input: float
     smallest_scale: float
     bound: float
+    model: str = SMALL_TILTS
 
 
 def direction_map(
@@ -278,10 +280,12 @@ class SensitivityTable:
     scale: float
     worst_input: float
     rows: tuple[LimitSensitivity, ...]
+    model: str = SMALL_TILTS
 
     def __str__(self) -> str:
         """Return a table in plain text; limits that gain nothing are counted."""
-        lines = [f"smallest allowed scale {self.scale:.6g} at the input {self.worst_input:.6g}"]
+        name = self.model.partition(":")[0].partition(" (")[0]
+        lines = [f"smallest allowed scale {self.scale:.6g} at the input {self.worst_input:.6g}, {name}"]
         for (a, b), what, scale, gain, _, binds_at, without in self.rows:
             if gain > 0.0:
                 lines.append(

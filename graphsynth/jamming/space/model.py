@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
+#: What estimates and proofs of this model are about.
+MODEL = "exact closure in space: every loop closes in three dimensions, with joints that turn, tilt and slide"
 #: Coordinates of a joint, in this order.
 TURN, TILT_X, TILT_Y, SHIFT_X, SHIFT_Y, SLIDE = range(6)
 #: Tilts from here on are as good as none: the chart of T ends at pi.

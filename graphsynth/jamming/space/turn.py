@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import replace
 from itertools import pairwise
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval
 from graphsynth.jamming.bearing.bearing import Condition
-from graphsynth.jamming.joints.assess import CoupledReport, assess_coupled
 from graphsynth.jamming.joints.certify import TurnCertificate
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.pieces import check_range
 from graphsynth.jamming.joints.program import Bearings, problem
-from graphsynth.jamming.space.model import SpaceModel, Unsupported, driven_at, in_space, start
+from graphsynth.jamming.space.model import MODEL, SpaceModel, Unsupported, driven_at, in_space, start
 from graphsynth.jamming.space.pose import REACHES, PoseProof, prove_pose
 from graphsynth.jamming.verdict import Verdict
 
@@ -28,8 +25,6 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
 Array = NDArray[np.float64]
-#: What the verdict is about.
-MODEL = "exact closure in space: every loop closes in three dimensions, with joints that turn, tilt and slide"
 #: Pieces of a full rotation at first, of any range at least; parts into which one is cut; half width of the
 #: branch in unlimited turns and travels.
 _FIRST, _FEWEST, _PARTS, _REACH = 96, 4, 3, 0.03
@@ -103,32 +98,6 @@ def certify_in_space(
     verdict, reason = _verdict(motion, pieces, stopped)
     spent = perf_counter() - begin
     return TurnCertificate(verdict, reason, *_columns(pieces), False, None, work.evaluated, spent, model=MODEL)
-
-
-def assess_in_space(
-    motion: Motion,
-    bearings: Bearings | None,
-    tilts: Misalignment | Iterable[Misalignment],
-    *,
-    condition: Condition = "A",
-    certify: bool = True,
-    tolerances: Any = 0.0,
-    seconds: float = 20.0,
-) -> CoupledReport:
-    """Assess a motion with every loop closed in space; the tables are those of small tilts."""
-    if bearings is None or not certify or not isinstance(tolerances, int | float) or tolerances:
-        raise GeometryError(
-            f'certify = {certify}, tolerances = {tolerances}: model="exact" is always proved, for sharp '
-            'lengths and given limits of joints; leave both out, or give model="small"'
-        )
-    begin = perf_counter()
-    report = assess_coupled(motion, bearings, tilts, condition=condition)
-    if int(motion.assembled.sum()) < 2:
-        return replace(report, verdict=Verdict.UNDECIDED, reason="a proof needs a range of inputs, two samples or more")
-    proof = certify_in_space(motion, bearings, tilts, condition=condition, seconds=seconds)
-    notes = (*report.notes, "the tables are those of small tilts (first order); the verdict is not")
-    changes: Any = {"verdict": proof.verdict, "reason": proof.reason, "notes": notes, "certificate": proof}
-    return replace(report, **changes, seconds=perf_counter() - begin)
 
 
 class _Work:

@@ -1,0 +1,270 @@
+"""How far misalignments may grow, and how small limits may be, with every loop closed in space: proved on both sides.
+
+The worst input is found in floats: the small-tilt model over a fine grid, the exact least factor round its peaks.
+There a jam is proved for a factor a little beyond; freedom over the whole range for one a little before.
+
+Larger limits never hurt, so that a proof for one factor on the limits holds for all larger or all smaller ones.  The
+exact closure is not linear in the misalignments: there a proof is about the factor itself.
+See theory/closure-in-space 7.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.jamming.bearing.bearing import Condition
+from graphsynth.jamming.joints.limits import Misalignment
+from graphsynth.jamming.joints.pieces import check_range
+from graphsynth.jamming.joints.program import Bearings, problem
+from graphsynth.jamming.joints.scale import ScaleCertificate
+from graphsynth.jamming.space.along import NOTHING, Along, Change, arguments, changed
+from graphsynth.jamming.space.model import MODEL, Unsupported
+from graphsynth.jamming.space.pose import prove_pose
+from graphsynth.jamming.space.turn import certify_in_space
+from graphsynth.jamming.verdict import Verdict
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.result import Motion
+
+Array = NDArray[np.float64]
+#: Inputs of the grid of the small-tilt model; peaks of it that are looked at; how much lower these may be.
+_GRID, _PEAKS, _LOWER = 721, 4, 0.97
+#: Steps of the search round a peak, and how near it comes (parts of the distance of the grid).
+_ROUND, _FINE = 7, 1e-2
+#: Parts of the gap that either side keeps from the estimate; growth of that after a proof that fails, and how often.
+_SIDE, _WIDER, _TRIES = 0.45, 4.0, 5
+SCALE = (
+    f"{MODEL}; freedom is proved for the factor low itself, and a jam for the factor high: "
+    "the closure is not linear in the misalignments, so that the factors between and below are not proved"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class FactorCertificate:
+    """Least common factor on all limits of joints with which the whole range is free, between two proved bounds.
+
+    ``high``: with this factor or a larger one every input is proved free.  ``low``: with this one or a smaller one the
+    input ``at`` is proved to bind, within the reach that theory/closure-in-space 5 names.  ``reason`` says why the gap
+    is not smaller, or is empty.
+    """
+
+    low: float
+    high: float
+    at: float
+    reason: str
+    seconds: float
+    model: str = MODEL
+
+    @property
+    def relative_gap(self) -> float:
+        """``high / low - 1``."""
+        return self.high / self.low - 1.0 if self.low > 0.0 else math.inf
+
+
+_Found = TypeVar("_Found", ScaleCertificate, FactorCertificate)
+
+
+class _Worst(NamedTuple):
+    """Input with the largest factor on all limits, its plane pose, and the estimate there."""
+
+    u: float
+    pose: Array
+    value: float
+
+
+def worst_input(along: Along, change: Change = NOTHING) -> _Worst:
+    """Input of the motion with the largest least factor on all limits (estimated)."""
+    ends = along.motion.inputs[along.keep]
+    grid = np.linspace(float(ends.min()), float(ends.max()), _GRID)
+    poses, assembled = along.poses(grid)
+    small = np.full(_GRID, -math.inf)
+    small[assembled] = changed(along.given, change).solve(poses[assembled], "scale").lower
+    padded = np.concatenate([[-math.inf], small, [-math.inf]])
+    peaks = np.flatnonzero((small >= padded[:-2]) & (small >= padded[2:]) & assembled)
+    peaks = peaks[np.argsort(-small[peaks], kind="stable")][:_PEAKS]
+    most = float(small[peaks[0]])
+    if not 0.0 < most < math.inf:  # as good as any
+        return _Worst(float(grid[peaks[0]]), poses[peaks[0]], most)
+    peaks = peaks[small[peaks] >= _LOWER * most]
+    return max((_round_a_peak(along, change, grid, poses, int(k)) for k in peaks), key=lambda one: one.value)
+
+
+def _round_a_peak(along: Along, change: Change, grid: Array, poses: Array, k: int) -> _Worst:
+    """Search for the largest exact factor between the neighbours of an input of the grid."""
+    from scipy.optimize import minimize_scalar
+
+    found = _Worst(float(grid[k]), poses[k], along.least(float(grid[k]), poses[k], change).scale)
+    if not math.isfinite(found.value):
+        return found._replace(value=math.inf if math.isnan(found.value) else found.value)
+
+    def value(u: float) -> float:
+        nonlocal found
+        pose, assembled = along.poses(np.array([u]))
+        scale = along.least(u, pose[0], change).scale if assembled[0] else math.nan
+        if scale > found.value:
+            found = _Worst(float(u), pose[0], scale)
+        return 0.0 if math.isnan(scale) else -scale
+
+    low, high = grid[max(k - 2, 0)], grid[min(k + 2, _GRID - 1)]
+    options = {"maxiter": _ROUND, "xatol": _FINE * (grid[1] - grid[0])}
+    minimize_scalar(value, bounds=(float(low), float(high)), method="bounded", options=options)
+    return found
+
+
+class _Sides(NamedTuple):
+    """What was proved of a factor: free with one, binding with the other, at an input."""
+
+    free: float
+    binds: float
+    at: float
+    reasons: tuple[str, ...]
+
+
+def _proved(
+    along: Along, worst: _Worst, estimate: float, up: float, change: Callable[[float], Change], gap: float, end: float
+) -> _Sides:
+    """Prove freedom and a jam round an estimate; a jam comes with larger factors (``up`` = 1) or smaller ones (-1)."""
+    binds, free, reasons = math.nan, math.nan, []
+    side = _SIDE * gap
+    for _ in range(_TRIES):
+        factor = estimate * (1.0 + side) ** up
+        q, given = along.start(worst.u, worst.pose, change(factor))
+        proof = prove_pose(along.model(change(factor)), q, given=given)
+        if proof.state < 0:
+            binds = factor
+            break
+        side *= _WIDER
+    else:
+        reasons.append(f"a jam at the input {worst.u!r} is not proved: {proof.reason}")
+    side, why = _SIDE * gap, ""
+    for _ in range(_TRIES):
+        factor, left = estimate * (1.0 + side) ** -up, end - perf_counter()
+        if left <= 0.0:
+            why = why or "the time was up"
+            break
+        proved = certify_in_space(along.motion, *arguments(changed(along.given, change(factor))), seconds=left)
+        if proved.verdict is Verdict.CERTIFIED_FREE:
+            free = factor
+            break
+        why, side = proved.reason, side * _WIDER
+    if math.isnan(free):
+        reasons.append(f"freedom is not proved: {why}")
+    return _Sides(free, binds, worst.u, tuple(reasons))
+
+
+def largest_scale(
+    motion: Motion,
+    bearings: Bearings,
+    tilts: Misalignment | Iterable[Misalignment],
+    *,
+    condition: Condition = "A",
+    relative_gap: float = 1e-3,
+    seconds: float = 60.0,
+) -> ScaleCertificate:
+    """Enclose the factor on all misalignments at which a motion begins to bind, with exact closure in space.
+
+    Parameters
+    ----------
+    motion, bearings, tilts, condition
+        As for `certify_in_space`; ranges of limits and narrow ranges of misalignments count.
+    relative_gap : float
+        Wanted ``high / low - 1``.
+    seconds : float
+        Time after which no further proof of freedom is begun or goes on.
+
+    Returns
+    -------
+    ScaleCertificate
+        Certified: with all misalignments ``low`` times as large every input is free, with ``high`` times the input
+        ``at`` binds.  Unlike with small tilts nothing is proved for the factors between or below.  ``low`` is 0, or
+        ``high`` infinite, where nothing is proved, and ``reason`` says why.
+
+    Examples
+    --------
+    >>> from graphsynth import Mechanism
+    >>> from graphsynth.jamming.joints import JointLimits
+    >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate(np.linspace(1.5, 1.6, 3))
+    >>> found = largest_scale(motion, JointLimits(0.1), Misalignment(0, 1, 0.1))
+    >>> 1.99 < found.low < 2.01 and found.relative_gap < 1e-3
+    True
+    """
+    begin = perf_counter()
+    check_range(motion, relative_gap=relative_gap, seconds=seconds)
+    try:
+        along = Along(problem(motion.mechanism, bearings, tilts, condition), motion)
+        worst = worst_input(along)
+        least = along.least(worst.u, worst.pose)
+        estimate = along.allowed(worst.u, worst.pose, NOTHING, least)
+        if 0.0 < estimate < math.inf:  # another input may be the worst at the factor found
+            worst = worst_input(along, Change(phi=estimate))
+            least = along.least(worst.u, worst.pose, Change(phi=estimate))
+            estimate *= along.allowed(worst.u, worst.pose, Change(phi=estimate), least)
+    except Unsupported as error:
+        return ScaleCertificate(0.0, math.inf, math.nan, 0, str(error), perf_counter() - begin, SCALE)
+    if not 0.0 < estimate < math.inf:
+        why = {0.0: "it binds with any misalignment", math.inf: "no misalignment up to 0.5 rad binds"}
+        reason = f"{why.get(estimate, 'no closure was found')} (estimated)"
+        return ScaleCertificate(0.0, math.inf, worst.u, 0, reason, perf_counter() - begin, SCALE)
+    gap, end = max(relative_gap, 1e-9), begin + seconds
+    found = _proved(along, worst, estimate, 1.0, lambda factor: Change(phi=factor), gap, end)
+    low, high = 0.0 if math.isnan(found.free) else found.free, math.inf if math.isnan(found.binds) else found.binds
+    return _told(ScaleCertificate(low, high, found.at, 0, "; ".join(found.reasons), 0.0, SCALE), relative_gap, begin)
+
+
+def least_factor(
+    motion: Motion,
+    bearings: Bearings,
+    tilts: Misalignment | Iterable[Misalignment],
+    *,
+    condition: Condition = "A",
+    relative_gap: float = 1e-3,
+    seconds: float = 60.0,
+) -> FactorCertificate:
+    """Enclose the least common factor on all limits of joints with which a motion is free, with exact closure in space.
+
+    Parameters
+    ----------
+    motion, bearings, tilts, condition, relative_gap, seconds
+        As for `largest_scale`.
+
+    Returns
+    -------
+    FactorCertificate
+        Certified on both sides, and for all factors beyond them.
+
+    Examples
+    --------
+    >>> from graphsynth import Mechanism
+    >>> from graphsynth.jamming.joints import JointLimits
+    >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate(np.linspace(1.5, 1.6, 3))
+    >>> found = least_factor(motion, JointLimits(0.1), Misalignment(0, 1, 0.1))
+    >>> 0.49 < found.low < found.high < 0.51
+    True
+    """
+    begin = perf_counter()
+    check_range(motion, relative_gap=relative_gap, seconds=seconds)
+    try:
+        along = Along(problem(motion.mechanism, bearings, tilts, condition), motion)
+        worst = worst_input(along)
+    except Unsupported as error:
+        return FactorCertificate(0.0, math.inf, math.nan, str(error), perf_counter() - begin)
+    if not 0.0 < worst.value < math.inf:
+        why = {0.0: "nothing is misaligned: any limits will do", math.inf: "no limits are large enough"}
+        return FactorCertificate(0.0, math.inf, worst.u, f"{why[worst.value]} (estimated)", perf_counter() - begin)
+    gap, end = max(relative_gap, 1e-9), begin + seconds
+    found = _proved(along, worst, worst.value, -1.0, lambda factor: Change(limits=factor), gap, end)
+    low, high = 0.0 if math.isnan(found.binds) else found.binds, math.inf if math.isnan(found.free) else found.free
+    return _told(FactorCertificate(low, high, found.at, "; ".join(found.reasons), 0.0), relative_gap, begin)
+
+
+def _told(found: _Found, gap: float, begin: float) -> _Found:
+    """Add the time, and why the gap is wider than wanted."""
+    wide = "" if found.reason or found.relative_gap <= gap else "nearer to the verge nothing was proved"
+    return replace(found, reason=found.reason or wide, seconds=perf_counter() - begin)
