@@ -18,78 +18,36 @@ def is_nearest(one):
     return (one + _PART == _NEXT) & (-one - _PART == -_NEXT) & (one * NORMAL_MIN * 0.5 != 0.0)
 
 
-@kernel
-def add(al, ah, bl, bh, one):
-    """Sum."""
-    lo, hi = arithmetic.add(al, ah, bl, bh)
-    return lo if is_nearest(one) else NAN, hi
+def _of_one(name, operation):
+    """Return the kernel that applies an operation of one interval, known by its name."""
+
+    def single(al, ah, one):
+        lo, hi = operation(al, ah)
+        return lo if is_nearest(one) else NAN, hi
+
+    single.__name__ = single.__qualname__ = name
+    return kernel(single)
 
 
-@kernel
-def subtract(al, ah, bl, bh, one):
-    """Difference."""
-    lo, hi = arithmetic.subtract(al, ah, bl, bh)
-    return lo if is_nearest(one) else NAN, hi
+def _of_two(name, operation):
+    """Return the kernel that applies an operation of two intervals, known by its name."""
+
+    def single(al, ah, bl, bh, one):
+        lo, hi = operation(al, ah, bl, bh)
+        return lo if is_nearest(one) else NAN, hi
+
+    single.__name__ = single.__qualname__ = name
+    return kernel(single)
 
 
-@kernel
-def multiply(al, ah, bl, bh, one):
-    """Product."""
-    lo, hi = arithmetic.multiply(al, ah, bl, bh)
-    return lo if is_nearest(one) else NAN, hi
-
-
-@kernel
-def divide(al, ah, bl, bh, one):
-    """Quotients by the nonzero part of the divisor."""
-    lo, hi = arithmetic.divide(al, ah, bl, bh)
-    return lo if is_nearest(one) else NAN, hi
-
-
-@kernel
-def square(al, ah, one):
-    """Square."""
-    lo, hi = arithmetic.square(al, ah)
-    return lo if is_nearest(one) else NAN, hi
-
-
-@kernel
-def root(al, ah, one):
-    """Square roots of the part at or above 0."""
-    lo, hi = arithmetic.root(al, ah)
-    return lo if is_nearest(one) else NAN, hi
-
-
-@kernel
-def exp(al, ah, one):
-    """Exponential."""
-    lo, hi = exponential.exp(al, ah)
-    return lo if is_nearest(one) else NAN, hi
-
-
-@kernel
-def log(al, ah, one):
-    """Logarithm of the part above 0."""
-    lo, hi = exponential.log(al, ah)
-    return lo if is_nearest(one) else NAN, hi
-
-
-@kernel
-def atan(al, ah, one):
-    """Arctangent."""
-    lo, hi = inverse.atan(al, ah)
-    return lo if is_nearest(one) else NAN, hi
-
-
-@kernel
-def sin(al, ah, one):
-    """Sine."""
-    lo, hi = trigonometry.sin(al, ah)
-    return lo if is_nearest(one) else NAN, hi
-
-
-@kernel
-def cos(al, ah, one):
-    """Cosine."""
-    lo, hi = trigonometry.cos(al, ah)
-    return lo if is_nearest(one) else NAN, hi
+add = _of_two("add", arithmetic.add)
+subtract = _of_two("subtract", arithmetic.subtract)
+multiply = _of_two("multiply", arithmetic.multiply)
+divide = _of_two("divide", arithmetic.divide)
+square = _of_one("square", arithmetic.square)
+root = _of_one("root", arithmetic.root)
+exp = _of_one("exp", exponential.exp)
+log = _of_one("log", exponential.log)
+atan = _of_one("atan", inverse.atan)
+sin = _of_one("sin", trigonometry.sin)
+cos = _of_one("cos", trigonometry.cos)
