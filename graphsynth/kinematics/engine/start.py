@@ -170,7 +170,7 @@ def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
     random = np.random.default_rng(20190 + k)
     reached = trace.X[0, sorted({link for s in p.steps[:k] for link in s.links} | {p.mechanism.frame}), :2]
     centre, size = reached.mean(axis=0), 2.0 * max(p.Lc, float(np.ptp(reached, axis=0).max()))
-    room = make_room(count, p.mechanism.graph.links, len(trace.PHI[0]), len(p.steps), len(trace.q), 1)
+    room = make_room.py_func(count, p.mechanism.graph.links, len(trace.PHI[0]), len(p.steps), len(trace.q), 1)
     state, room.phi[:], room.ql[:] = room.x, trace.PHI[0], trace.q[:, :3, 0]
     found: list[Array] = []
     for _ in range(_STARTS * cores):

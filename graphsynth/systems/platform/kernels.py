@@ -2,7 +2,7 @@
 
 See theory/platform-jacobians 2 and theory/platform-drive 3, 6.  A step is accepted only if the corrector moves little
 and converges fast, and if ``det JX`` keeps its sign and half its size; otherwise it is cut.  A step that becomes too
-small ends the branch: there is no jump.
+small ends the branch, and so do a thousand tiny ones between two samples: there is no jump.
 
 A machine is one array (3, 21), a row per leg: axis minus pivot of the drive (x, y), crank, phase, rocker, tau, six
 constants of `length_constants`, the fixed turn of the bell-crank (cos, sin, angle), pivot (x, y), arm l1, platform
@@ -19,15 +19,14 @@ from graphsynth.kinematics.triad.kernels.leg import ROUND, angle_of, cross_sum, 
 
 COMPLETE, NO_HOME, HOME_ENDS, DRIVE_ENDS, SINGULAR, NO_START = 0, 1, 2, 3, 4, 5
 SMALLEST = 1e-11  # step over the whole range
+TINY, MOST = 1e-6, 1000  # so many tiny steps between two samples are no motion of the machine
 TAU = 2.0 * math.pi
 BLOCK = 128
-# rows of a leg in a block: arm cos, sin, theta', theta'', theta; then those of the platform: pose, velocity and
-# determinant, acceleration
+# rows of a leg in a block: arm cos, sin, theta', theta'', theta; of the platform: pose, velocity, determinant, push
 LEG = 5 * BLOCK
 PX, PY, PA, SPEED, PUSH = (row * BLOCK for row in (0, 1, 2, 3, 7))
 QUICK = 1e-7  # scaled correction after which one more pass, in bulk, is enough
 FINAL = 1e-13  # scaled correction of that pass above which the block is done again, step by step
-
 
 # state: pose x, y, cos, sin, running angle; velocity; det; parameter; previous pose (x, y, angle), velocity, parameter
 X, Y, C, S, A, VX, VY, VA, DET, AT, OX, OY, OA, OVX, OVY, OVA, OAT, OLD = range(18)
@@ -312,7 +311,7 @@ def turns(machines, psi, stops, guess, grown, Lc, found):
                             break
                         if j == 0:
                             q[AT], q[OLD] = target, 0.0
-                        step, sampled, arrived = target - q[AT], not growing, False
+                        step, sampled, arrived, tiny = target - q[AT], not growing, False, 0
                         # longer steps after every success, halved where `advance` does not trust one
                         while not arrived:
                             whole = step >= target - q[AT]
@@ -324,10 +323,11 @@ def turns(machines, psi, stops, guess, grown, Lc, found):
                                 drive_at(p, growing, psi[0], goal, e)
                             if advance(p, e, goal, q, Lc, j > 0, sampled and attempt == 0):
                                 arrived = whole
+                                tiny += 1 if step < TINY else 0
                                 step = min(2.0 * step, total / 8.0)
                             else:
                                 step = 0.5 * (goal - q[AT])
-                                if j == 0 or step < SMALLEST * total:
+                                if j == 0 or step < SMALLEST * total or tiny > MOST:
                                     break
                             sampled = False  # what lies between two samples is computed there
                         if not arrived:

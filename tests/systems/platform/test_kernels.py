@@ -18,7 +18,7 @@ from graphsynth.kinematics.triad.assembly_modes import assembly_modes, assembly_
 from graphsynth.kinematics.triad.kernels.leg import cross_sum
 from graphsynth.kinematics.triad.leg import LegStatus, solve_leg
 from graphsynth.systems.platform.drive import FourBarDrive
-from graphsynth.systems.platform.motion import BranchEnd
+from graphsynth.systems.platform.motion import BranchEnd, track
 from graphsynth.systems.platform.parallel_platform import WORKING_MODES, ParallelPlatform
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
@@ -461,6 +461,17 @@ def test_limit_of_the_drives(cranks):
         w = 45 - (105 + 45j)
         away = (np.angle(w) - (0.0 - LEG_PHASES[event.leg - 1])) % math.tau
         assert circle(event.psi, away) < 0.02
+
+
+def test_a_drive_whose_constants_disagree_ends_the_branch_at_once():
+    """A sign of the rocker that is not +1 or -1 makes its rate wrong: steps stay tiny, 1e8 of them over a turn."""
+    machine = SingleMotorPlatform()
+    for sign, end in ((1.0, BranchEnd.COMPLETE), (1.1, BranchEnd.HOME_ENDS), (0.9, BranchEnd.HOME_ENDS)):
+        own = machine._machine[None].copy()
+        own[:, :, 5] *= sign
+        psi, home, never = np.linspace(0.0, math.tau, 9), np.array(machine.home)[None], np.full(1, np.inf)
+        found = track(own, psi, never, home, machine.Lc, grown=True, accelerations=False)
+        assert found.status.tolist() == [end]
 
 
 # --- extreme cases of theory/extreme-cases 2
