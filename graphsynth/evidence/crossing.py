@@ -224,9 +224,9 @@ def area_problem(bearing: Bearing, sine: str, effort: Effort | None = None) -> P
     rows = []
     for method, unit, made, sizes in (
         ("closed form, enclosed", "at once", enclosed, (1, 10, 100)),
-        ("closed form, doubles", "at once", stable, many),
-        ("direct formula, doubles", "at once", direct, many),
-        ("polygon, doubles", "corners", polygon, corners),
+        ("closed form, double precision", "at once", stable, many),
+        ("direct formula, double precision", "at once", direct, many),
+        ("polygon, double precision", "corners", polygon, corners),
         ("interval shoelace sum", "boxes", shoelace, corners),
     ):
         for n in sizes:

@@ -149,7 +149,7 @@ def arc_problem(box: ToleranceBox, condition: Condition = "A", effort: Effort | 
         # ends that share a step hide each other
         seen = changes == len({math.floor(end * count / math.tau) for end in ends}) == len(ends)
         why = "" if seen else "an arc lies between two samples and is not seen"
-        rows.append(Row.of("samples, doubles", f"{count} angles", changes * math.tau / count, timed, why, **given))
+        rows.append(Row.of("samples, float64", f"{count} angles", changes * math.tau / count, timed, why, **given))
     question = f"At which crank angles the bearing begins and ceases to jam (condition {condition}, {len(ends)} ends)"
     return Problem("arc-ends", question, "rad", tuple(rows))
 

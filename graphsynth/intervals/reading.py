@@ -82,9 +82,7 @@ def fraction(text: str) -> Fraction:
         raise FormatError(f"a number of {len(text)} characters; at most {_LONGEST} are read: shorten it")
     exponent = _EXPONENT.search(text)
     if exponent and abs(int(exponent[1].replace("_", ""))) > _LONGEST:
-        raise FormatError(
-            f"{text.strip()[:60]!r} has an exponent beyond +-{_LONGEST}: bring it into the range of doubles"
-        )
+        raise FormatError(f"{text.strip()[:60]!r} has an exponent beyond +-{_LONGEST}: bring it into that of float64")
     try:
         return Fraction(text.strip())
     except (ValueError, ZeroDivisionError):
@@ -136,7 +134,7 @@ def read_one(value: Any) -> tuple[float, float, bool]:
         raise IntervalError(f"{value} is not a point; give a finite number, or bounds that may be infinite")
     if isinstance(value, int | np.integer | Fraction | Decimal):
         if isinstance(value, Decimal) and abs(value.adjusted()) > _LONGEST:
-            raise FormatError(f"{value} has an exponent beyond +-{_LONGEST}: bring it into the range of doubles")
+            raise FormatError(f"{value} has an exponent beyond +-{_LONGEST}: bring it into that of float64")
         return *enclose(Fraction(int(value) if isinstance(value, np.integer) else value)), True
     raise FormatError(f"{type(value).__name__} is not a number; give a number, a Fraction, a Decimal or text")
 

@@ -109,7 +109,7 @@ def test_a_certificate_beside_the_reference_or_too_wide_is_a_failure():
 
 def test_areas():
     problem = area_problem(Bearing(), SINE, QUICK)
-    polygon = by(problem, "polygon, doubles")
+    polygon = by(problem, "polygon, double precision")
     # of second order in the corners, so the errors fall with their square
     corners = [int(row.setting.split()[0]) for row in polygon]
     orders = [
@@ -145,7 +145,7 @@ def test_arcs_that_miss_an_end_are_failures(monkeypatch):
 def test_samples_that_jump_over_an_arc_are_unreliable():
     # a tilt just above the critical one: arcs of 2.5 degrees, in the middle of a step of 3.6 degrees
     problem = arc_problem(ToleranceBox(alpha="0.015165", azimuth="0.0314159"), "A", QUICK)
-    coarse = by(problem, "samples, doubles")[0]
+    coarse = by(problem, "samples, float64")[0]
     assert coarse.status is RowStatus.UNRELIABLE
     assert by(problem, "closed form, enclosed")[0].good
 
@@ -188,14 +188,14 @@ def test_a_proof_of_something_else_is_a_failure(monkeypatch):
     real = direct.precise_modes
     monkeypatch.setattr(direct, "precise_modes", lambda *given: real(*given) + 1e-8)
     problem = direct.mode_problem(ParallelPlatform.g1(), np.zeros((1, 3)), 0.5, "G1", QUICK)
-    for method in ("certified, balls of doubles", "certified, one by one"):
+    for method in ("certified, balls of floats", "certified, one by one"):
         assert {row.status for row in by(problem, method)} == {RowStatus.FAILED}
 
 
 def test_near_a_double_root_doubles_give_up_and_say_so():
     problem = double_root_problem(QUICK)
     assert all(row.good for row in by(problem, "sextic and Newton"))
-    doubles = by(problem, "the same, doubles only")
+    doubles = by(problem, "the same, double precision only")
     assert doubles[0].good and not doubles[-1].good and doubles[-1].reason
     assert all(row.good for row in by(problem, "certified, up to 512 bits"))
     assert "right down to a distance 1e-13" in problem.sentences["sextic and Newton"]

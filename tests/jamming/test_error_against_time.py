@@ -35,8 +35,8 @@ def test_crossings():
 def test_areas():
     problem = area_problem(Bearing(), WORST, ONCE)
     assert problem.of("closed form, enclosed")[0].error < 1e-13
-    assert problem.of("closed form, doubles")[0].error < 1e-14
-    errors = [row.error for row in problem.of("polygon, doubles")]
+    assert problem.of("closed form, double precision")[0].error < 1e-14
+    errors = [row.error for row in problem.of("polygon, double precision")]
     assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.05)  # chords: second order
     assert all(row.error > 800.0 for row in problem.of("interval shoelace sum"))  # finer boxes do not help
     with pytest.raises(GeometryError, match="do not cross"):
@@ -48,7 +48,7 @@ def test_arcs():
     assert problem.of("closed form, enclosed")[0].error < 1e-13
     widths = {row.setting: row.error for row in problem.of("interval sweep")}
     assert 0.0 < widths["0.01 rad"] < 4.1e-2 and widths["0.0001 rad"] < min(4.1e-4, widths["0.01 rad"])
-    samples = [row.error for row in problem.of("samples, doubles")]
+    samples = [row.error for row in problem.of("samples, float64")]
     assert samples == pytest.approx([4 * math.tau / n for n in (100, 1000, 10_000, 100_000)])
     box = ToleranceBox(alpha=spread("1/30", relative="1e-2"))
     swept = math.tau * sweep_linkage(box, resolution=1e-3).undecided_part

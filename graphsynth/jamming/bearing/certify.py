@@ -97,7 +97,7 @@ class JamCertificate:
     def statement(self) -> str:
         """The sentence that is proved, or what is missing; lengths rounded so that it stays true."""
         who = "the bearing" if self.box.is_point else "every bearing of the tolerance box"
-        given = "" if self.exact_input else " (for the doubles given: floats came in, decimals are not guaranteed)"
+        given = "" if self.exact_input else " (of floating-point numbers: floats came in, decimals are not guaranteed)"
         # of a position that can be assembled: the largest interference of all may lie beyond a dead centre
         missing = shortened(self.witness.interference.lo, -1) if self.witness else "0"
         match self.verdict:

@@ -249,7 +249,7 @@ class JammingProbability(Shown):
     def statement(self) -> str:
         """The sentence that is proved."""
         low, high = shortened(self.lower, -1, 6), shortened(self.upper, 1, 6)
-        given = "" if self.problem.exact_input else " (for the doubles given)"
+        given = "" if self.problem.exact_input else " (for the floating-point numbers given)"
         if self.upper == 0.0:
             return f"Proved: no mechanism of the tolerances binds{given}."
         return f"Proved: a mechanism of these tolerances binds with a probability between {low} and {high}{given}."

@@ -182,11 +182,11 @@ def double_root_problem(effort: Effort | None = None) -> Problem:
         truth = [precise_modes(anchors.tolist(), corner.tolist(), lengths.tolist())]
         setting = f"distance {d:g}"
         given = anchors, corner, lengths
-        for method, escalate in (("sextic and Newton", True), ("the same, doubles only", False)):
+        for method, escalate in (("sextic and Newton", True), ("the same, double precision only", False)):
             batch, *timed = best_of(partial(assembly_modes_batch, *given, escalate=escalate), effort)
             row = assessed(method, setting, [batch.poses], truth, 1.0, timed, more={_AWAY: d})
             if not escalate and bool(batch.near_double_root[0]):
-                why = row.reason or "it flags the problem as undecided in doubles"
+                why = row.reason or "it flags the problem as undecided in double precision"
                 row = replace(row, status=RowStatus.FAILED, error=math.nan, reason=why)
             rows.append(row)
         for band in (1e-6, 1e-9):

@@ -128,7 +128,7 @@ def _proved_rows(
     n, rows = len(theta), []
     for many in (n, 4 * n) if effort.quick else (1, n, 10 * n):
         run = partial(_batch, platform, np.resize(theta, (many, 3)), size)
-        rows.append(proof_row("certified, balls of doubles", f"{many} at once", run, truth, size, many, effort))
+        rows.append(proof_row("certified, balls of floats", f"{many} at once", run, truth, size, many, effort))
     few, usual = min(n, 2 if effort.quick else 6), signature(certify_direct).parameters["max_bits"].default
     for bits in (64, 128, 512):
         run = partial(_singly, platform, theta[:few], bits, size)
