@@ -203,7 +203,7 @@ def work_row(layout: Layout, r: Array, d: Array) -> Array:
     C = layout.incidence
     rows[:, :, 0], rows[:, :, 1] = d[:, :, 0] @ C.T, d[:, :, 1] @ C.T
     rows[:, :, 2] = (d[:, :, 1] * r[:, :, 0] - d[:, :, 0] * r[:, :, 1]) @ C.T
-    return rows.reshape(len(r), -1)
+    return rows.reshape(len(r), 3 * layout.loops)
 
 
 def by_joint(values: Interval) -> Columns:

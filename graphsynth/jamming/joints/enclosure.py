@@ -408,17 +408,18 @@ def _directions(layout: Layout, r: Array, e: Array, start: tuple[Array, Array], 
     weight = np.where(np.isinf(layout.limit), 100.0, (layout.limit / finite) ** 2)
     tilts = rows * weight[:, None, None]
     size = np.hypot(start[0][..., 0], start[0][..., 1])
-    use = size / np.where((layout.limit > 0.0) & np.isfinite(layout.limit), layout.limit, np.inf)
-    slack = 1.0 - use / np.maximum(use.max(axis=1, keepdims=True, initial=0.0), 1e-300)
+    limits, plays = (np.where((own > 0.0) & np.isfinite(own), own, np.inf) for own in (layout.limit, layout.end_float))
+    use = np.concatenate([size / limits, np.abs(start[1]) / plays], axis=1)
+    left = np.clip(4.0 - 4.0 * use / np.maximum(use.max(axis=1, keepdims=True, initial=0.0), 1e-300), _STIFF, 1.0)
     unit = start[0] / np.where(size > 0.0, size, 1.0)[..., None]
-    unit = unit * np.sqrt(1.0 - np.clip(4.0 * slack, _STIFF, 1.0))[..., None]
+    unit = unit * np.sqrt(1.0 - left[:, : len(layout.limit)])[..., None]
     tilts -= unit[..., None] * (unit[..., None] * tilts).sum(axis=2, keepdims=True)
     play = np.where(
         np.isinf(layout.end_float), 10.0 * finite * length, np.minimum(layout.end_float, 10.0 * finite * length)
     )
     share = (play / (length * finite)) ** 2
     slips = np.zeros((len(r), len(layout.joints), 3 * loops))
-    slips[:, :, 2::3] = layout.incidence.T * (share * length)[:, None]
+    slips[:, :, 2::3] = layout.incidence.T * (share * length * left[:, len(layout.limit) :])[..., None]
     flat, lifts = rows.reshape(len(r), -1, 3 * loops), layout.incidence.T / length
     effect = flat.transpose(0, 2, 1) @ tilts.reshape(flat.shape)
     effect[:, 2::3] += lifts.T @ slips
