@@ -27,6 +27,7 @@ project_copyright = author
 version = release = META["version"]
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+highlight_language = "none"  # of blocks that name no language: text, not Python
 INHERITED = "BaseException,Enum,Exception,ImportError,int,object,str,tuple"  # what is theirs is not shown
 autodoc_default_options = {"members": True, "inherited-members": INHERITED}
 autodoc_member_order = "bysource"

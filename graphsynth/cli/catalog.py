@@ -90,7 +90,7 @@ def _summary(options: argparse.Namespace, begin: float) -> int:
         return 0
     _put_frame(families)
     part = "" if getattr(options, "shard", None) is None else ", part {}/{}: merge all parts".format(*options.shard)
-    console.put(f"{options.output}: {chains} chains{part}, {size / 1e6:.1f} MB ({seconds:.1f} s)")
+    console.put(f"{options.output}: {chains} chain{'s' * (chains != 1)}{part}, {size / 1e6:.1f} MB ({seconds:.1f} s)")
     return 0
 
 

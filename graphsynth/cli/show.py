@@ -85,7 +85,7 @@ def read_graph(text: str, line: int = 1) -> MechanismGraph:
     except FormatError as error:
         if set(text) & {"/", "."}:  # never part of a key or a text form
             raise FormatError("there is no such file, nor is this a key or the text form of a graph", text) from None
-        raise error
+        raise FormatError(f"no such file, and no text form of a graph: {error}", text) from None
 
 
 def _one(text: str, place: str) -> MechanismGraph:

@@ -20,7 +20,8 @@ def run(options: argparse.Namespace) -> int:
         return 0
     header, rows = solutions_table(solutions)
     console.put(spec.describe())
-    title, cells = f"{len(solutions)} integer solutions", [list(map(str, row)) for row in rows]
+    title = f"{len(solutions)} integer solution{'s' * (len(solutions) != 1)}"
+    cells = [list(map(str, row)) for row in rows]
     if len(rows) <= MOST_DRAWN:
         console.table(title, list(header), cells)
         return 0

@@ -74,7 +74,7 @@ def _show(report: StressReport) -> None:
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
     for name, width in (("case", 16), ("status", 7), ("error", 7), ("allowed", 7), ("s", 5), ("what", None)):
         words = name in ("case", "status", "what")
-        table.add_column(name, justify="left" if words else "right", no_wrap=True, overflow="ellipsis", min_width=width)
+        table.add_column(name, justify="left" if words else "right", no_wrap=width is not None, min_width=width)
     colours = {"ok": "green", "flagged": "cyan", "WRONG": "bold red", "not run": "yellow"}
     for outcome in report.outcomes:
         worst, status = outcome.worst, outcome.status.value

@@ -207,7 +207,7 @@ def _sentence(problem: Problem, method: str, best: tuple[Row, ...], proved: tupl
     good = [row for row in rows if row.good]
     if not good:
         why = next((row.reason for row in rows if row.reason), "no result")
-        return f"{method}: not usable here, every setting failed ({why}){_settings(rows)}."
+        return f"{method}: not usable here, no setting gave a reliable result ({why}){_settings(rows)}."
     mine = [row for row in best if row.method == method]
     if mine:
         text = f"fastest {_range(mine, best, problem.unit)}"

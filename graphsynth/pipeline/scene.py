@@ -186,17 +186,15 @@ class Scene:
 
     @classmethod
     def from_mapping(cls, tables: object, source: str = "<mapping>", digest: str = "", text: str = "") -> Scene:
-        """Read a scene from the tables of a TOML document.
-
-        A `SceneError` names the file, the key, what was expected and the nearest valid key.
-        """
+        """Read a scene from the tables of a TOML document; a `SceneError` names file, key and the nearest valid key."""
         place = Place(source, (), text)
         if not isinstance(tables, Mapping):
             raise place.error("must hold tables")
         known: dict[str, type] = {**TABLES, "mechanism": object}
         for key in tables:
             if key not in known:
-                raise place.error(f"has an unknown table [{key}]{suggest(str(key), known)}", str(key))
+                other = "; it holds a mechanism, not a scene" if key == "format" else suggest(str(key), known)
+                raise place.error(f"has an unknown table [{key}]{other}", str(key))
         for key in ("scene", "mechanism", "outputs"):
             if key not in tables:
                 raise place.error(f"lacks the table [{key}]")

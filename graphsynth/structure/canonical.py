@@ -174,7 +174,7 @@ def decode_key(text: object) -> tuple[int, list[tuple[int, int, int]], int | Non
     pairs = pairs_of(stream[:size])
     total = size + (3 * len(pairs) if coloured else 0)
     if len(stream) != -(-total // 8) * 8 or "1" in stream[total:]:
-        raise FormatError(f"{len(data) - 2} bytes of joints, not {-(-total // 8)}, or bits after the end", "key")
+        raise FormatError(f"the joints of {links} links are cut short, or bits follow their end", "key")
     if not coloured:
         return links, [(a, b, 1) for a, b in pairs], 0 if framed else None, space
     places = range(size, total, 3)

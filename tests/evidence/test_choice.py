@@ -71,7 +71,7 @@ def test_sentences_of_a_small_table():
     assert said["sweep"].startswith("sweep: fastest with a proof, for errors down to 1e-06 mm (fine, 100 ms)")
     assert said["sweep"].endswith("; 1 of 3 settings failed or gave a wrong result (finest).")
     assert said["guess"] == (
-        "guess: not usable here, every setting failed (it never converges); measured at 1 setting only."
+        "guess: not usable here, no setting gave a reliable result (it never converges); measured at 1 setting only."
     )
     assert "closed form is better: 1e-15 mm in 100 µs, 10000 times faster" in said["slow"]
 
