@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
 
@@ -74,7 +74,8 @@ def _show(report: StressReport) -> None:
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
     for name, width in (("case", 16), ("status", 7), ("error", 7), ("allowed", 7), ("s", 5), ("what", None)):
         words = name in ("case", "status", "what")
-        table.add_column(name, justify="left" if words else "right", no_wrap=width is not None, min_width=width)
+        given: Any = {"min_width": width} if width else {"max_width": max((console.columns() or 132) - 53, 8)}
+        table.add_column(name, justify="left" if words else "right", no_wrap=True, overflow="ellipsis", **given)
     colours = {"ok": "green", "flagged": "cyan", "WRONG": "bold red", "not run": "yellow"}
     for outcome in report.outcomes:
         worst, status = outcome.worst, outcome.status.value
