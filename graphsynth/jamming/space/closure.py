@@ -65,7 +65,8 @@ def _each(A: Any, change: Any) -> Any:
     return Balls(change(A.mid), change(A.rad)) if isinstance(A, Balls) else change(A)
 
 
-def _joined_rows(rows: list[list[Any]]) -> Any:
+def joined_rows(rows: list[list[Any]]) -> Any:
+    """Join entries to matrices over two new last axes."""
     flat = _joined([entry for row in rows for entry in row])
     return _each(flat, lambda part: part.reshape(*part.shape[:-1], len(rows), len(rows[0])))
 
@@ -91,12 +92,15 @@ class _Local(NamedTuple):
     push: Any
 
 
-def _tilt_rates(x: Any, y: Any) -> tuple[Any, list[Any], list[Any]]:
-    """T of the chart, its angular velocities ``k (dx + x cross dx / 2)``, and their derivatives xx, xy, yx, yy."""
-    k = 1.0 / (1.0 + 0.25 * (x * x + y * y))
+def tilt_rates(x: Any, y: Any, xx: Any, yy: Any) -> tuple[Any, list[Any], list[Any]]:
+    """T of the chart, its angular velocities ``k (dx + x cross dx / 2)``, and their derivatives xx, xy, yx, yy.
+
+    ``xx`` and ``yy`` are the squares, which balls may know better than as products.
+    """
+    k = 1.0 / (1.0 + 0.25 * (xx + yy))
     zero = 0.0 * k
-    a, b, c, u, v = 0.5 * k * (y * y), 0.5 * k * (x * x), 0.5 * k * (x * y), k * x, k * y
-    T = _joined_rows([[1.0 - a, c, v], [c, 1.0 - b, -u], [-v, u, 1.0 - (a + b)]])
+    a, b, c, u, v = 0.5 * k * yy, 0.5 * k * xx, 0.5 * k * (x * y), k * x, k * y
+    T = joined_rows([[1.0 - a, c, v], [c, 1.0 - b, -u], [-v, u, 1.0 - (a + b)]])
     first, second = [k, zero, -0.5 * v], [zero, k, 0.5 * u]
     # dk/dx = - k k x / 2
     sx, sy = -0.5 * k * u, -0.5 * k * v
@@ -148,7 +152,7 @@ class Loop(NamedTuple):
     def bend(self, by: Any) -> Any:
         """Second derivative of the left sides weighed by multipliers (N, 6), shape (N, k, k)."""
         r, p = by[..., :3], by[..., 3:]
-        hat = _joined_rows([[sum_of(_HAT[:, i, j], r) for j in range(3)] for i in range(3)])
+        hat = joined_rows([[sum_of(_HAT[:, i, j], r) for j in range(3)] for i in range(3)])
         G = 0.5 * times(self.R, swapped(hat))
         pt = p * self.t
         c = G[..., 0, 0] + G[..., 1, 1] + G[..., 2, 2] + (pt[..., 0] + pt[..., 1] + pt[..., 2])
@@ -251,21 +255,21 @@ class Closure:
         c = self._coordinates(plan.joints, q)
         e = c[..., SHIFT_X : SLIDE + 1]
         x, y = c[..., TILT_X], c[..., TILT_Y]
-        T, rates, bends = _tilt_rates(x, y)
+        T, rates, bends = tilt_rates(x, y, x * x, y * y)
         turned = unit(c[..., TURN]) if self.exact else np.exp(1j * c[..., TURN])
         C, S = turned.real, turned.imag
         zero = 0.0 * x
-        R = times(T, _joined_rows([[C, -S, zero], [S, C, zero], [zero, zero, zero + 1.0]]))
+        R = times(T, joined_rows([[C, -S, zero], [S, C, zero], [zero, zero, zero + 1.0]]))
         axis = T[..., :, 2]
         still = [zero, zero, zero]
         rows = [[axis[..., k] for k in range(3)], *rates, still, still, still]
-        omega = _joined_rows(rows)
+        omega = joined_rows(rows)
         v = cross(e[..., None, :], omega)
         shift = np.zeros((6, 3))
         shift[SHIFT_X:] = _EYE
-        bend = _joined_rows(bends)
+        bend = joined_rows(bends)
         if (plan.sign < 0).any():  # back: of T(-x), seen from seat a
-            own = times(_joined_rows(_tilt_rates(-x, -y)[2]), swapped(T))
+            own = times(joined_rows(tilt_rates(-x, -y, x * x, y * y)[2]), swapped(T))
             bend = _mixed((plan.sign > 0)[:, None, None], bend, own)
         return _Local(R, e, omega, v + shift, bend, cross(e[..., None, :], bend))
 

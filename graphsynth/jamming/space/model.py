@@ -205,26 +205,41 @@ class SpaceModel:
         return np.array([[float(b.lo) for b in both], [float(b.hi) for b in both]])
 
     @cached_property
-    def leans(self) -> Array:
-        """Upper bounds of the tilt of every joint in the chart, (joints,): its limit, or what the links' axes leave.
-
-        The axis of a link is at most so far from that of the frame as the tilts and misalignments on any way from the
-        frame add up to.
-        """
+    def _steps(self) -> tuple[Array, Array]:
+        """Upper bounds of the tilt of every joint and of the misalignment of its seats, (joints,) each, in radians."""
         tilt, seat = np.full(len(self.joints), math.inf), np.zeros(len(self.joints))
         for k, joint in enumerate(self.joints):
             tilt[k] = math.hypot(*(bounds(joint.limits, name)[1] for name in joint.limits.tilts))
             for own in (joint.seat_a, joint.seat_b):
                 turn = own.turn[:2] if own.turn_box is None else own.turn_box.mag[:2].tolist()
                 seat[k] += math.hypot(*own.turn) if own.turn[2] != 0.0 and any(own.turn[:2]) else math.hypot(*turn)
+        return tilt, seat
+
+    @cached_property
+    def link_leans(self) -> Array:
+        """Upper bounds of the angle between the z axis of every link and that of the frame, (links,), in radians.
+
+        Tilts and misalignments on any way from the frame add up.
+        """
+        tilt, seat = self._steps
+        return self.least_sums(tilt + seat)
+
+    @cached_property
+    def leans(self) -> Array:
+        """Upper bounds of the tilt of every joint in the chart, (joints,): its limit, or what the links' axes leave."""
+        (tilt, seat), link = self._steps, self.link_leans
+        between = np.array([link[j.a] + link[j.b] for j in self.joints]) + seat
+        return np.asarray(2.0 * np.tan(0.5 * np.minimum(np.minimum(tilt, between) * (1.0 + 1e-12), _FREE)))
+
+    def least_sums(self, steps: Array) -> Array:
+        """Least sum of steps (joints,) on any way from the frame to every link, (links,); rounded up a little."""
         link = np.full(self.links, math.inf)
         link[self.frame] = 0.0
         for _ in range(self.links):
-            for k, joint in enumerate(self.joints):
+            for joint, step in zip(self.joints, steps):
                 for here, there in ((joint.a, joint.b), (joint.b, joint.a)):
-                    link[there] = min(link[there], link[here] + tilt[k] + seat[k])
-        between = np.array([link[j.a] + link[j.b] for j in self.joints]) + seat
-        return np.asarray(2.0 * np.tan(0.5 * np.minimum(np.minimum(tilt, between) * (1.0 + 1e-12), _FREE)))
+                    link[there] = min(link[there], (link[here] + step) * (1.0 + 1e-15))
+        return link
 
     @cached_property
     def seats(self) -> list[tuple[tuple[Interval, Interval], tuple[Interval, Interval]]]:
@@ -238,15 +253,17 @@ class SpaceModel:
     @cached_property
     def loops(self) -> tuple[tuple[Step, ...], ...]:
         """Loops of the joint graph, each a round of steps; those within flat parts of the mechanism first."""
-        return tuple(self._round(path) for path in self._paths[0])
+        return tuple(self._round(path) for path in self.paths)
 
     @cached_property
     def rows(self) -> tuple[tuple[int, ...], ...]:
         """Equations of every loop, of rotations x, y, z and places x, y, z: three in a flat part, else six."""
-        return tuple((2, 3, 4) if flat else (0, 1, 2, 3, 4, 5) for flat in self._paths[1])
+        flat = [_is_flat(joint) for joint in self.joints]
+        return tuple((2, 3, 4) if all(flat[k] for k, _ in path) else (0, 1, 2, 3, 4, 5) for path in self.paths)
 
     @cached_property
-    def _paths(self) -> tuple[list[list[tuple[int, bool]]], list[bool]]:
+    def paths(self) -> list[list[tuple[int, bool]]]:
+        """Joints passed once round every loop, and whether from a to b."""
         flat = [_is_flat(joint) for joint in self.joints]
         part = list(range(self.links))
         tree: list[list[tuple[int, int]]] = [[] for _ in range(self.links)]
@@ -259,8 +276,7 @@ class SpaceModel:
                 tree[b].append((k, a))
             else:
                 closing.append(k)
-        paths = [[(k, True), *self._way(tree, self.joints[k].b, self.joints[k].a)] for k in closing]
-        return paths, [all(flat[k] for k, _ in path) for path in paths]
+        return [[(k, True), *self._way(tree, self.joints[k].b, self.joints[k].a)] for k in closing]
 
     def _way(self, tree: list[list[tuple[int, int]]], start: int, end: int) -> list[tuple[int, bool]]:
         """Joints passed on the way through the tree."""

@@ -15,11 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.jamming.joints.cones import ConeSolution, polish, solve_cones
-from graphsynth.jamming.space.closure import Closure
+from graphsynth.jamming.space.closure import Closure, Loop
 
 Array = NDArray[np.float64]
 _ROUNDS = 60
+#: Rounds after which Newton's method is tried before the programs come to rest.
+_TRIES = (6, 10, 16, 26, 40)
 _RANK = 1e-11
+_PROJECTIONS = 100
 #: Largest step of an unknown in one round (radians, units).
 _STEP = 0.3
 
@@ -56,11 +59,11 @@ def least_scale(closure: Closure, q: Array) -> Optimum:
     scale, reach, before = 1.0, _STEP, math.inf
     q, converged = _nearer(closure, q), False
     found = _Linear(math.inf, q, np.zeros(len(closure.rows)), math.inf)
-    for _ in range(_ROUNDS):
+    for rounds in range(_ROUNDS):
         radii = np.array([b.chart(scale) / scale for b in bounds])
         found = _linearised(closure, q, radii)
         if not math.isfinite(found.factor):
-            break
+            return _finished(closure, q, math.inf, found.by, False)
         step = found.q - q
         size = float(np.abs(step).max(initial=0.0))
         if size > 0.9 * before:
@@ -68,22 +71,79 @@ def least_scale(closure: Closure, q: Array) -> Optimum:
         q = q + step * min(1.0, reach / max(size, 1e-300))
         change, scale = abs(found.factor - scale), max(found.factor, 1e-12)
         # idle joints may share out their tilts in more than one way, so that the unknowns need not come to rest
-        if change < 1e-9 * scale and (size < 1e-9 or found.missed < 1e-12):
+        if change < 1e-9 * scale + 1e-12 and (size < 1e-9 or found.missed < 1e-12):
             converged = True
             break
         before = min(size, reach)
+        if rounds in _TRIES and change < 1e-4 * scale:
+            early = _finished(closure, q, scale, found.by, False)
+            if early.converged:
+                return early
+    last = _finished(closure, q, scale, found.by, converged)
+    return last if last.converged else _general(closure, last)
+
+
+def _general(closure: Closure, found: Optimum) -> Optimum:
+    """Try a general optimiser where the linearised programs do not come to rest, as beside dead centres."""
+    from scipy.optimize import minimize
+
+    bounds, n = closure.model.bounds, closure.model.size
+    given = found.q[n:]
+
+    def room(x: Array) -> Array:
+        return np.array([(b.chart(x[n]) ** 2 - float((x[list(b.columns)] ** 2).sum())) / b.chart(1.0) for b in bounds])
+
+    def room_slope(x: Array) -> Array:
+        slope = np.zeros((len(bounds), n + 1))
+        for k, b in enumerate(bounds):
+            slope[k, list(b.columns)] = -2.0 * x[list(b.columns)] / b.chart(1.0)
+            slope[k, n] = 2.0 * b.chart(x[n]) * b.slope(x[n]) / b.chart(1.0)
+        return slope
+
+    def loops(x: Array) -> list[Loop]:
+        return closure.loops(np.concatenate([x[:n], given])[None])
+
+    def slopes(x: Array) -> Array:
+        J = closure.jacobian(loops(x))[0][:, :n]
+        return np.concatenate([J, np.zeros((len(J), 1))], 1)
+
+    closes = {"type": "eq", "fun": lambda x: closure.values(loops(x))[0], "jac": slopes}
+    limits = {"type": "ineq", "fun": room, "jac": room_slope}
+    start, last = np.append(found.q[:n], found.scale), np.eye(n + 1)[n]
+    solved = minimize(
+        lambda x: x[n],
+        start,
+        jac=lambda x: last,
+        method="SLSQP",
+        constraints=[closes, limits],
+        options={"ftol": 1e-12, "maxiter": 200},
+    )
+    q, scale = np.concatenate([solved.x[:n], given]), float(solved.x[n])
+    if not (np.isfinite(q).all() and 0.0 < scale < math.inf):
+        return found
+    J, tight = slopes(solved.x)[:, :n], room(solved.x) < 1e-6
+    normals = -room_slope(solved.x)[tight]
+    rows = np.concatenate([np.concatenate([J, normals[:, :n]]).T, [np.append(np.zeros(len(J)), normals[:, n])]])
+    by = np.linalg.lstsq(rows, -last, rcond=1e-10)[0][: len(J)]
+    own = _finished(closure, q, scale, by, False)
+    return own if own.converged or own.missed < found.missed else found
+
+
+def _finished(closure: Closure, q: Array, scale: float, by: Array, converged: bool) -> Optimum:
+    """Give every loaded limit its multiplier, and add the last digits."""
+    bounds = closure.model.bounds
     loops = closure.loops(q[None])
     missed = float(np.abs(closure.values(loops)).max(initial=0.0))
     weight = np.zeros(len(bounds))
-    if not math.isfinite(found.factor):
-        return Optimum(math.inf, q, found.by, weight, missed, False)
-    slope = closure.jacobian(loops)[0].T @ found.by
+    if not math.isfinite(scale):
+        return Optimum(math.inf, q, by, weight, missed, False)
+    slope = closure.jacobian(loops)[0].T @ by
     for k, bound in enumerate(bounds):
         columns, radius = list(bound.columns), bound.chart(scale)
         inside = float(np.linalg.norm(q[columns])) if radius > 0.0 else 0.0
-        if inside > radius * (1.0 - 1e-6):
+        if inside > radius * (1.0 - (1e-6 if converged else 1e-2)):
             weight[k] = max(0.0, -float(slope[columns] @ q[columns]) / (2.0 * radius**2))
-    return _polished(closure, Optimum(scale, q, found.by, weight, missed, converged))
+    return _polished(closure, Optimum(scale, q, by, weight, missed, converged))
 
 
 def _nearer(closure: Closure, q: Array) -> Array:
@@ -120,6 +180,11 @@ def _linearised(closure: Closure, q: Array, radii: Array) -> _Linear:
             blocks[k, axis] = radii[k] * (J[:, column] @ null)
     work = (values - J[:, tied] @ q[tied]) @ null
     factor, x, wrench = _cone(blocks, work)
+    if math.isfinite(factor):
+        now = np.zeros_like(x)
+        for k, bound in enumerate(bounds):
+            now[k, : len(bound.columns)] = q[list(bound.columns)] / radii[k]
+        x = _calmed(blocks, work, x, now, np.linalg.norm(blocks @ wrench, axis=-1))
     found = q.copy()
     for k, bound in enumerate(bounds):
         for axis, column in enumerate(bound.columns):
@@ -128,6 +193,30 @@ def _linearised(closure: Closure, q: Array, radii: Array) -> _Linear:
         rest = values + J @ np.where(tied, found - q, 0.0)
         found[slack] = q[slack] - np.linalg.lstsq(free, rest, rcond=_RANK)[0]
     return _Linear(factor, found, null @ wrench, float(np.abs(values).max(initial=0.0)))
+
+
+def _calmed(blocks: Array, work: Array, x: Array, now: Array, load: Array) -> Array:
+    """Take idle joints to the nearest of their optimal tilts instead of any; all over radii, (bounds, 2).
+
+    Projections in turn on the closure and on the limits, the loaded joints held.
+    """
+    factor = float(np.linalg.norm(x, axis=-1).max(initial=0.0))
+    idle = load < 1e-7 * load.max(initial=0.0)
+    if not idle.any():
+        return x
+    flat = blocks[idle].reshape(-1, blocks.shape[-1])
+    held = work + blocks[~idle].reshape(-1, blocks.shape[-1]).T @ x[~idle].ravel()
+    inverse = np.linalg.pinv(flat.T, rcond=_RANK)
+    found = now[idle]
+    for _ in range(_PROJECTIONS):
+        size = np.linalg.norm(found, axis=-1, keepdims=True)
+        found = found * np.minimum(1.0, (1.0 - 1e-9) * factor / np.maximum(size, 1e-300))
+        found = found - (inverse @ (held + flat.T @ found.ravel())).reshape(found.shape)
+        if np.linalg.norm(found, axis=-1).max() <= factor:
+            x = x.copy()
+            x[idle] = found
+            return x
+    return x
 
 
 def _left_null(A: Array) -> Array:
@@ -194,7 +283,7 @@ def _polished(closure: Closure, found: Optimum) -> Optimum:
         size = max(float(np.abs(right[:n]).max()) / max(1.0, np.abs(state.by).max()), float(np.abs(right[n:]).max()))
         if not size < least:
             break
-        best, least = state, size
+        best, least = state._replace(converged=state.converged or size < 1e-12), size
         if size < 1e-15:
             break
         size_of = np.ones(len(right))  # unknowns with limits move by parts of these

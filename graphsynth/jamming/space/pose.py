@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals import check_rounding
+from graphsynth.jamming.space.binding import binds, body_box, multipliers
+from graphsynth.jamming.space.bodies import Bodies, stands_apart
 from graphsynth.jamming.space.closure import Closure
 from graphsynth.jamming.space.model import SHIFT_X, TURN, SpaceModel
 from graphsynth.jamming.space.optimum import Optimum, least_scale
@@ -71,18 +73,52 @@ def prove_pose(
         free = closes(enclosed, found.q, _rates(floats, found.q), given)
         reason = "closes within all limits" if free else "a closure is found, but not proved"
         return PoseProof(int(free), found.scale, math.inf, reason, found)
+    if stands_apart(model):
+        reach = _bound_apart(model, q, found, given, reaches, boxes)
+        boxes = 0  # where this fails, cuts of the coordinates of the joints do not help
+    else:
+        reach = 0.0
+    if reach == 0.0:
+        reach = _bound_joints(enclosed, q, found, given, reaches, boxes)
+    if reach > 0.0:
+        return PoseProof(-1, found.scale, reach, "does not close within the limits", found)
+    return PoseProof(0, found.scale, 0.0, "neither a closure nor its absence is proved", found)
+
+
+def _bound_apart(
+    model: SpaceModel, q: Array, found: Optimum, given: Array, reaches: tuple[float, ...], boxes: int
+) -> float:
+    """Largest reach with a proof of binding in which the links are bodies that turn by themselves, or 0."""
+    bodies = Bodies(model, q)
+    proof = multipliers(bodies, found)
+    if proof is None:
+        return 0.0
+    least = max(2.0 * bodies.away(proof.at), LEAST)
+    tried = [*(reach for reach in reaches if reach > least), least]
+    for most in (1, boxes):
+        for reach in tried:
+            box = body_box(bodies, reach, given)
+            if box is not None and most and binds(bodies, proof, box, most):
+                return reach
+    return 0.0
+
+
+def _bound_joints(
+    enclosed: Closure, q: Array, found: Optimum, given: Array, reaches: tuple[float, ...], boxes: int
+) -> float:
+    """Largest reach with a proof of binding in the coordinates of the joints, or 0; first without cuts."""
+    model = enclosed.model
+    floats = Closure(model, False)
     tried, rate = [], _rates(floats, q, free=True)
-    for reach in _reaches(model, q, found, reaches):  # first without cuts, from the largest box
+    for reach in _reaches(model, q, found, reaches):
         box, empty = contract(enclosed, branch_box(model, q, reach, given, rate))
         proofs = certificates(floats, found, box)
         bound = lower_bounds(enclosed, proofs, box)[:, 0]
         if empty[0] or bound.max() > 0.0:
-            return PoseProof(-1, found.scale, reach, "does not close within the limits", found)
+            return reach
         tried.append((float(bound.max()), reach, box, proofs[int(bound.argmax())]))
     _, reach, box, proof = max(tried, key=lambda one: one[0])
-    if boxes and _cut(enclosed, proof, box, boxes):
-        return PoseProof(-1, found.scale, reach, "does not close within the limits", found)
-    return PoseProof(0, found.scale, reach, "neither a closure nor its absence is proved", found)
+    return reach if boxes and _cut(enclosed, proof, box, boxes) else 0.0
 
 
 def _reaches(model: SpaceModel, q: Array, found: Optimum, reaches: tuple[float, ...]) -> tuple[float, ...]:

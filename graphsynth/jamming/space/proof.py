@@ -262,12 +262,11 @@ def lower_bounds(closure: Closure, proofs: list[Certificate], box: Box) -> Array
     g, J, everywhere = closure.values(loops), closure.jacobian(loops), closure.jacobian(wide)
     weighed = _weighed(closure.model, proofs[0].weight, near)
     below, above = box.low - z, box.high - z
-    reach = np.maximum(-below, above) * _UP
     found = []
     for proof in proofs:
         K = exact(proof.K[None])
         own = by + times(K, (near - at)[..., None])[..., 0]
-        value = _total(own * g) + weighed[0]
+        value = total(own * g) + weighed[0]
         slope = times(swapped(J), own[..., None])[..., 0] + times(swapped(K), g[..., None])[..., 0] + weighed[1]
         slope = times(swapped(shear), slope[..., None])[..., 0]
         product = times(swapped(K), everywhere)
@@ -278,12 +277,23 @@ def lower_bounds(closure: Closure, proofs: list[Certificate], box: Box) -> Array
             + weighed[2]
         )
         H = times(swapped(shear), times(H, shear))
-        ends = [(slope.mid + sign * slope.rad) * side for sign in (-1.0, 1.0) for side in (below, above)]
-        first = np.minimum(np.min(ends, axis=0), 0.0).sum(-1)
-        second = np.array([shift(*part) for part in zip(H.mid, H.rad, reach)])
-        least = value.mid - value.rad * _UP + first * _UP - 0.5 * second * _UP
-        found.append(least - 1e-15 * (np.abs(value.mid) - first + second))
+        found.append(least(value, slope, H, below, above)[0])
     return np.array(found)
+
+
+def least(value: Balls, slope: Balls, H: Balls, below: Array, above: Array) -> tuple[Array, Array]:
+    """Lower bounds of functions (N,) with the value and slope at a point and H over the box around it (certified).
+
+    The box reaches from ``below`` to ``above`` (N, width) of the point, H (N, width, width).  The second result
+    (N, width) says how much every coordinate takes off.
+    """
+    reach = np.maximum(-below, above) * _UP
+    ends = [(slope.mid + sign * slope.rad) * side for sign in (-1.0, 1.0) for side in (below, above)]
+    first = np.minimum(np.min(ends, axis=0), 0.0)
+    second = np.array([shift(*part) for part in zip(H.mid, H.rad, reach)]).reshape(reach.shape)
+    lost, bent = first.sum(-1), second.sum(-1)
+    found = value.mid - value.rad * _UP + lost * _UP - 0.5 * bent * _UP
+    return found - 1e-15 * (np.abs(value.mid) - lost + bent), 0.5 * second - first
 
 
 def _weighed(model: SpaceModel, weight: Array, q: Balls) -> tuple[Balls, Balls, Balls]:
@@ -302,20 +312,21 @@ def _weighed(model: SpaceModel, weight: Array, q: Balls) -> tuple[Balls, Balls, 
     return value, Balls(*slope), exact(bend[None])
 
 
-def _total(a: Balls) -> Balls:
+def total(a: Balls) -> Balls:
     """Sum over the last axis."""
     rounding = a.mid.shape[-1] * 4e-16 * np.abs(a.mid).sum(-1)
     return Balls(a.mid.sum(-1), (a.rad.sum(-1) + rounding) * _UP)
 
 
-def shift(mid: Array, rad: Array, far: Array) -> float:
-    """Return ``sum D far^2`` for a diagonal D >= 0 with H + D positive semidefinite for all H in the ball (certified).
+def shift(mid: Array, rad: Array, far: Array) -> Array:
+    """Return ``D far^2`` for a diagonal D >= 0 with H + D positive semidefinite for all H in the ball (certified).
 
     Infinite where none is found.  In unknowns over ``far``; rows of radii go to the diagonal (Gershgorin).
     """
     keep = np.flatnonzero(far > 0.0)
+    best = np.where(far > 0.0, math.inf, 0.0)
     if not np.isfinite(mid).all() or not np.isfinite(rad).all():
-        return math.inf
+        return best
     scale = far[keep]
     A = mid[np.ix_(keep, keep)] * scale[:, None] * scale
     A = 0.5 * (A + A.T)
@@ -323,24 +334,25 @@ def shift(mid: Array, rad: Array, far: Array) -> float:
     spread = (rad[np.ix_(keep, keep)] * scale[:, None] * scale) * _UP + 1e-15 * np.abs(A)
     spread = np.maximum(spread, spread.T)
     unit = float(np.abs(A).max(initial=0.0))
-    best = math.inf
     for floor in (1.0, 1e-2, 1e-4, 1e-6):
         weight = 1.0 / np.sqrt(np.maximum(np.diag(A), floor * unit) + 1e-300)
-        best = min(best, _diagonal(A - np.diag(spread @ weight / weight * _UP), unit))
+        own = _diagonal(A - np.diag(spread @ weight / weight * _UP), unit)
+        if own.sum() < best[keep].sum():
+            best[keep] = own
     return best
 
 
-def _diagonal(A: Array, unit: float) -> float:
-    """Return the trace of a diagonal D >= 0 with A + D positive semidefinite (certified); infinite if none is found."""
+def _diagonal(A: Array, unit: float) -> Array:
+    """Return a diagonal D >= 0 with A + D positive semidefinite (certified); infinite if none is found."""
     values, vectors = np.linalg.eigh(A)
     least = 1e-13 * unit * len(A) + 1e-300
     negative = np.minimum(values - 2.0 * least, 0.0)
     D = np.abs((vectors * negative) @ vectors.T).sum(1)
     for _ in range(4):
         if _positive(A + np.diag(D)):
-            return float(D.sum()) * _UP
+            return np.asarray(D * _UP)
         D = 1.5 * D + 4.0 * least
-    return math.inf
+    return np.full(len(A), math.inf)
 
 
 def _positive(A: Array) -> bool:

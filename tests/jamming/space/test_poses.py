@@ -160,7 +160,7 @@ def exact_values(model, x):
     from space_oracles import inverse, moved, product
 
     values = []
-    for path in model._paths[0]:
+    for path in model.paths:
         at = (mpmath.eye(3), mpmath.matrix(3, 1))
         first = None
         for k, forward in path:
@@ -250,12 +250,12 @@ def test_a_shifted_matrix_is_proved_positive():
         least = float(np.linalg.eigvalsh(A)[0])
         assert not _positive(A - (least + 1e-12) * np.eye(n)) or least >= 0.0
         assert _positive(A - (least - 1e-9) * np.eye(n))
-        cost = shift(A, np.zeros((n, n)), np.ones(n))
+        cost = shift(A, np.zeros((n, n)), np.ones(n)).sum()
         assert math.isfinite(cost) and cost >= max(0.0, -least)
-        assert shift(A - (least - 1.0) * np.eye(n), np.zeros((n, n)), np.ones(n)) < 1e-9
-        wider = shift(A - (least - 1.0) * np.eye(n), np.full((n, n), 2.0 / n), np.ones(n))
+        assert shift(A - (least - 1.0) * np.eye(n), np.zeros((n, n)), np.ones(n)).sum() < 1e-9
+        wider = shift(A - (least - 1.0) * np.eye(n), np.full((n, n), 2.0 / n), np.ones(n)).sum()
         assert wider >= 0.5  # members with an eigenvalue below -1 + ... are in the ball
-    assert shift(np.full((2, 2), np.nan), np.zeros((2, 2)), np.ones(2)) == math.inf
+    assert shift(np.full((2, 2), np.nan), np.zeros((2, 2)), np.ones(2)).sum() == math.inf
 
 
 def test_guides_are_in_space_too():
