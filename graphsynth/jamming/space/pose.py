@@ -27,7 +27,8 @@ class PoseProof:
     """What is proved about one pose.
 
     ``state``: +1 free, -1 jammed, 0 undecided.  ``scale``: least factor on all limits (estimated).  ``reach``: a jam is
-    proved for all closures whose unlimited turns (radians) and travels (units) lie within it of the reference.
+    proved for all closures in which the spins of links (where `stands_apart`; else unlimited turns, radians) and
+    unlimited travels (units) lie within it of the reference.
     """
 
     state: int
@@ -63,7 +64,7 @@ def prove_pose(
     -------
     PoseProof
         +1: a closure within all limits for each of the given coordinates.  -1: for none of them a closure within the
-        limits whose unlimited turns and travels lie within ``reach`` of the reference.
+        limits within ``reach`` of the reference.
     """
     check_rounding()
     floats, enclosed = Closure(model, False), Closure(model, True)

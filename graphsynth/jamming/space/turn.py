@@ -70,8 +70,8 @@ def certify_in_space(
     -------
     TurnCertificate
         Certified.  State +1: for every input of the piece there is a closure within all limits.  State -1: for none of
-        them there is one whose unlimited turns and travels move with the plane mechanism, within 0.03 (radians, or
-        parts of its size).  ``lower`` and ``upper`` bound the factor on all limits by 1 where
+        them there is one whose links spin (of guides: whose joints turn and travel) with the plane mechanism, within
+        0.03 (radians, or parts of its size).  ``lower`` and ``upper`` bound the factor on all limits by 1 where
         that is proved.  `GeometryError` for limits or misalignments that do not fit the mechanism.
 
     Examples

@@ -118,15 +118,14 @@ def test_one_bearing_has_its_closed_form(lengths, alpha, away):
         assert prove_pose(model, q).state == side
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("lengths", "alpha"), [((2, 1, 2.5, 2.5), 0.3), ((1, 3, 2, 3.5), 0.4)])
-def test_large_tilts_at_a_spherical_joint_are_right_or_open(lengths, alpha):
-    """A jam beside a spherical joint that tilts by 0.3 rad and more is left undecided."""
+@pytest.mark.parametrize(("lengths", "alpha"), [
+    ((2, 1, 2.5, 2.5), 0.3), pytest.param((1, 3, 2, 3.5), 0.4, marks=pytest.mark.slow)])  # fmt: skip
+def test_large_tilts_at_a_spherical_joint_are_decided(lengths, alpha):
     wanted = math.asin(lengths[1] / lengths[2] * math.sin(alpha) * math.sin(1.3))
     for away in (1e-6, 0.01, -1e-6, -0.01, -0.5):
         model, q = one_bearing(lengths, alpha, wanted * (1.0 + away), 1.3)
         assert least_scale(Closure(model, False), q).scale == pytest.approx(1.0 / (1.0 + away), rel=1e-8)
-        assert prove_pose(model, q).state in ((1,) if away > 0.0 else (-1, 0))
+        assert prove_pose(model, q).state == (1 if away > 0.0 else -1)
 
 
 def decided(rng, links, away):
@@ -188,7 +187,7 @@ def test_proofs_of_random_mechanisms(links, count):
         if proof.state == -1 and (links == 4 or seed % 10 == 0):
             least, missed = judge.least_factor(3)
             assert least > 1.0 - 1e-8 or missed > 1e-9
-    assert undecided <= {4: 0.1, 6: 0.25, 8: 0.5}[links] * count
+    assert undecided <= 0.02 * count
 
 
 def spherical(limit, off):
