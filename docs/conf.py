@@ -133,6 +133,17 @@ def _long_cells(app: Any, doctree: nodes.document, name: str) -> None:
             cell["classes"].append("long")
 
 
+def _dotted_names(app: Any, doctree: nodes.document, name: str) -> None:
+    """Let the dotted names of tables and headings break behind a dot, not in a word."""
+    places = [place for kind in (nodes.entry, nodes.title) for place in doctree.findall(kind)]
+    for literal in [found for place in places for found in place.findall(nodes.literal)]:
+        parts = re.split(r"(?<=[\w\]]\.)(?=[A-Za-z_])", literal.astext())
+        if len(parts) > 1 and len(literal.children) == 1:
+            literal.clear()
+            for part in parts:
+                literal.extend([nodes.Text(part), nodes.raw("", "<wbr>", format="html")])
+
+
 def _signature(app: Any, what: str, name: str, obj: Any, options: Any, *texts: str | None) -> tuple[str | None, ...]:
     """Write aliases of types by their names, and a default that is made anew as ``...``, which Sphinx can parse."""
     texts = tuple(text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text) for text in texts)
@@ -170,6 +181,7 @@ def setup(app: Any) -> dict[str, bool]:
     app.connect("doctree-read", _without_chance_links)
     app.connect("doctree-resolved", _whole_numbers)
     app.connect("doctree-resolved", _long_cells)
+    app.connect("doctree-resolved", _dotted_names)
     app.connect("env-updated", _note_other_names)
     app.add_html_math_renderer("mathml", (_formula, None), (_formula, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

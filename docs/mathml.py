@@ -37,8 +37,16 @@ def _italic(letter: str) -> str:
     return letter
 
 
+def _accented(letter: str, accent: str) -> str:
+    """Return a letter with its accent; mathematical capitals have it inside of them, those of a text face above."""
+    if "A" <= letter <= "Z":
+        return f'<mi class="accented">{letter}{COMBINING[accent]}</mi>'
+    return f"<mi>{_italic(letter)}{COMBINING[accent]}</mi>"
+
+
 def mathml(tex: str, block: bool) -> str:
     """Markup of a formula; a ValueError names one that docutils cannot read, or would misread."""
+    tex = re.sub(r"\\vert(?![a-zA-Z])\s*", "|", tex)  # inside a table of Markdown a bar has to be written in letters
     if re.search(r"frac\s*[0-9]", tex):
         raise ValueError(f"formula {tex!r}: numerator and denominator want braces")
     try:
@@ -46,7 +54,8 @@ def mathml(tex: str, block: bool) -> str:
     except MathError as error:
         raise ValueError(f"formula {tex!r}: {error}") from error
     markup = markup.replace("\N{REVERSE SOLIDUS OPERATOR}", "\\")  # many typefaces lack it
-    markup = OVER.sub(lambda m: f"<mi>{_italic(m[1])}{COMBINING[m[2]]}</mi>", markup)
-    markup = OVER_INDEXED.sub(lambda m: f"<msub><mi>{_italic(m[1])}{COMBINING[m[3]]}</mi>{m[2]}</msub>", markup)
+    markup = OVER.sub(lambda m: _accented(m[1], m[2]), markup)
+    markup = OVER_INDEXED.sub(lambda m: f"<msub>{_accented(m[1], m[3])}{m[2]}</msub>", markup)
+    markup = markup.replace('<mo stretchy="false">|</mo>', '<mo stretchy="false" lspace="0" rspace="0">|</mo>')
     markup = AFTER.sub(lambda m: "" if m[1] else SPACE, markup)
     return BEFORE.sub(rf"\1{SPACE}", markup)
