@@ -77,7 +77,7 @@ def run_session(source, page, line, namespace):
 #: Pages whose examples search or sweep for seconds, or repeat what tests/test_newcomer.py, atlas and testing run.
 SLOW_PAGES = (
     *("embody", "point-an-antenna", "jamming-of-any-mechanism", "the-deck-reproduced", "bearing-jamming"),
-    *("certificates", "stick-slip", "gallery", "choose-a-method", "intervals"),
+    *("certificates", "jamming-in-space", "stick-slip", "gallery", "choose-a-method", "intervals"),
     *("README", "build-a-catalogue", "browse-the-atlas", "draw-and-animate", "property-tests"),
 )
 
