@@ -41,7 +41,7 @@ def clearance_picture(report: CoupledReport) -> Figure:
     _uses(figure, table, report, used[:, shown].T, shown)
     proof = report.certificate
     if proof is not None:
-        for state, colour, label in ((-1, "jam", "jams, proved"), (0, "soft", "undecided"), (1, "c", "free, proved")):
+        for state, colour, label in ((-1, "jam", "binds, proved"), (0, "soft", "undecided"), (1, "c", "free, proved")):
             for k, (a, b) in enumerate(proof.arcs(state)):
                 axes.axvspan(a, b, color=LIGHT[colour], alpha=0.16, lw=0, label=label if k == 0 else None)
     axes.plot(report.inputs, report.allowed_scale, color=LIGHT["a"], lw=1.7)
@@ -66,7 +66,7 @@ def _uses(figure: Figure, axes: Any, report: CoupledReport, used: Any, shown: li
     names = [f"{a}-{b} {what}".removesuffix(" tilt") for (a, b), what in (report.names[k] for k in shown)]
     axes.set_yticks(np.arange(len(shown)) + 0.5, names, fontsize=8)
     axes.invert_yaxis()
-    axes.set_xlabel("input")
+    axes.set_xlabel("input (rad, or a length)")
     figure.colorbar(picture, ax=axes, label="use of the limit\n(dots: binding)", fraction=0.06, pad=0.01)
 
 

@@ -132,7 +132,7 @@ def _unrolled_region(axes: Any, problem: CircleEllipse, points: Array, hull: Int
         if np.ptp(height) > 0.0:
             axes.set_ylim(height.min() - 0.6 * np.ptp(height), height.max() + 0.6 * np.ptp(height))
     axes.set_xlim(np.degrees(t[0]), np.degrees(t[-1]))
-    dress(axes, "box 1 unrolled", "direction from the centre, degrees", "distance from the circle")
+    dress(axes, "box 1 unrolled", "direction from the centre [°]", "distance from the circle")
 
 
 def _clipped(problem: CircleEllipse) -> Array:
@@ -212,7 +212,7 @@ def region_picture(problem: CircleEllipse, exaggeration: float | None = None) ->
     unrolled.plot(np.degrees(turn), distance, color=LIGHT["b"], lw=1.2)
     unrolled.margins(x=0)
     unrolled.set_xticks(np.arange(0.0, 361.0, 45.0))
-    dress(unrolled, "unrolled, not exaggerated", "direction from the centre, degrees", "distance from the circle")
+    dress(unrolled, "unrolled, not exaggerated", "direction from the centre [°]", "distance from the circle")
     return figure
 
 

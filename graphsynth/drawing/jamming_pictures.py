@@ -60,7 +60,7 @@ def section_picture(
     panels = np.atleast_1d(figure.subplots(1, len(tilts), sharey=True))
     for axes, tilt, title in zip(panels, tilts, (*titles, *[""] * len(tilts))):
         _section(axes, bearing, tilt, exaggeration)
-        dress(axes, panel_title(bearing, tilt, title), "distance from the bearing's wall, mm", "z, mm")
+        dress(axes, panel_title(bearing, tilt, title), "distance from the bearing's wall [mm]", "z [mm]")
     figure.suptitle(
         f"radial distances from the wall × {exaggeration:g}, heights to scale, middle of the bearing left out",
         fontsize=9,
@@ -129,13 +129,13 @@ def area_picture(curve: AreaCurve, zooms: tuple[tuple[float, float], ...] | None
     whole = figure.add_subplot(grid[0, :])
     _areas(whole, curve, f)
     whole.set_xticks(np.arange(90.0, 451.0, 45.0))
-    dress(whole, "areas over the crank angle", "crank angle, degrees", "area, mm²")
+    dress(whole, "areas over the crank angle", "crank angle [°]", "area [mm²]")
     whole.legend(fontsize=8, ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.12), frameon=False, borderaxespad=0)
     for k, (start, stop) in enumerate(windows):
         axes = figure.add_subplot(grid[1, k])
         _areas(axes, curve, f)
         axes.set_xlim(start, stop)
-        dress(axes, f"detail, {start:g} to {stop:g} degrees", "crank angle, degrees", "area, mm²")
+        dress(axes, f"detail, {start:g} to {stop:g} degrees", "crank angle [°]", "area [mm²]")
         whole.axvspan(start, stop, color=LIGHT["soft"], alpha=0.15, lw=0)
     figure.supxlabel(_SOURCE_NOTE, fontsize=8.5, color=LIGHT["note"])
     return figure
@@ -175,7 +175,7 @@ def area_chart(curve: AreaCurve, window: tuple[float, float] | None = None) -> C
         Line(f[use], curve.rim.mid[use], "rim (A)", "d"),
         Line(f[use], curve.source_ordinate[use], "ordinate of the source", "ink", "--"),
     ]
-    return Chart(lines, "crank angle, degrees", "area, mm²")
+    return Chart(lines, "crank angle [°]", "area [mm²]")
 
 
 # -- a report ----------------------------------------------------------------------------------------------------------
@@ -204,8 +204,8 @@ def report_picture(report: JammingReport) -> Figure:
     gaps.axhline(0.0, color=LIGHT["soft"], lw=1.0)
     if report.certificate is not None:
         _bands((tilts, gaps), report, (float(f.min()), float(f.max())))
-    dress(tilts, fill(report.statement, 110), "", "tilt of the coupler, mrad")
-    dress(gaps, "", "crank angle, degrees", f"interference (condition {report.condition}), mm")
+    dress(tilts, fill(report.statement, 110), "", "tilt of the coupler [mrad]")
+    dress(gaps, "", "crank angle [°]", f"interference (condition {report.condition}) [mm]")
     for axes in (tilts, gaps):
         axes.margins(x=0)
     handles, labels = gaps.get_legend_handles_labels()

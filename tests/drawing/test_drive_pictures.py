@@ -71,7 +71,7 @@ def test_map_shows_the_simulated_slopes() -> None:
     (mesh,) = figure.axes[0].collections
     order = np.argsort(found.frequency_ratio)  # the slow forcing is drawn below
     np.testing.assert_array_equal(np.asarray(mesh.get_array()).ravel(), found.speed_slope[order].ravel())
-    assert figure.axes[0].get_ylabel() == "Om / w_n" and drawn(figure)
+    assert figure.axes[0].get_ylabel() == "Ω/ω_n" and drawn(figure)
 
 
 @pytest.mark.parametrize("of", ["speed", "current"])

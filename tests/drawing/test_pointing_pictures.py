@@ -51,8 +51,8 @@ def test_comparison_shows_the_published_curves():
     assert (means[0] - means[1]) * 60.0 == pytest.approx(30.9895760535, abs=1e-9)
     twin = figure.axes[3]
     assert twin.lines[0].get_ydata()[-1] == pytest.approx(30.9895760535, abs=1e-9)
-    assert "arc-minutes" in twin.get_ylabel() and twin.texts[0].get_text() == "30.99′"
-    assert a.get_xlabel() == "crank angle [deg]"
+    assert "[′]" in twin.get_ylabel() and twin.texts[0].get_text() == "30.99′"
+    assert a.get_xlabel() == "crank angle [°]"
 
 
 def test_comparison_of_other_conventions():
@@ -85,7 +85,7 @@ def test_tolerance_map_hatches_what_is_undecided():
     want = PARALLELOGRAM.tolerance(0.0, 0.0, method="mean_value").a.deviation
     assert values[1, 1] == pytest.approx(max(map(abs, want)))
     assert axes.patch.get_hatch()
-    assert "arc-seconds" in figure.axes[-1].get_ylabel()
+    assert "[″]" in figure.axes[-1].get_ylabel()
 
 
 def test_pictures_can_be_written():
