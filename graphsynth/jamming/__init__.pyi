@@ -67,6 +67,7 @@ from .chance.probability import (
     ToleranceEffect as ToleranceEffect,
     probability_of_jamming as probability_of_jamming,
 )
+from .margins.margin import JointsMargin as JointsMargin, joints_margin as joints_margin
 from .questions import (
     certified_arcs as certified_arcs,
     compare_sensitivities as compare_sensitivities,

@@ -7,7 +7,7 @@ asks of it, so that other models of jamming can take the place of the single bea
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,18 @@ class Margin(Protocol):
         """Return the margin, of shape (N,), for one `Interval` or `Dual` of shape (N,) for each quantity.
 
         Of duals a `Dual`, whose derivatives hold those anywhere in the box, or an `Interval` if they are not known.
+        """
+
+
+@runtime_checkable
+class LinearMargin(Protocol):
+    """A margin that bounds itself over boxes by linear functions, better than by its derivatives."""
+
+    def lines(self, at: Sequence[Any], over: Sequence[Any], half: Array, known: Sequence[Any]) -> tuple[Any, list[Any]]:
+        """Return an `Affine` of N boxes, and what is worth knowing of their parts.
+
+        ``at``, ``over``: the quantities at the middles, and over the boxes as duals by the sources; ``half`` (N, n);
+        ``known`` of each box, None for nothing.
         """
 
 

@@ -21,9 +21,10 @@ from graphsynth.intervals.dual import variables
 from graphsynth.intervals.reading import enclose
 from graphsynth.jamming.chance.distributions import Bracket, Distribution, Trapezoids
 from graphsynth.jamming.chance.halfspace import Sums, measures_below
-from graphsynth.jamming.chance.margin import Margin
+from graphsynth.jamming.chance.margin import LinearMargin, Margin
 
 Array = NDArray[np.float64]
+Objects = NDArray[np.object_]
 #: Ends of boxes are multiples of this.
 _GRID = 2.0**32
 #: Boxes cut at a time, at most.
@@ -125,6 +126,11 @@ def affine(margin: Margin, sources: Sources, lo: Array, hi: Array) -> Affine:
     return Affine(np.where(sound[:, None], weights, 0.0), low, high, curved)
 
 
+def _unknown(count: int) -> Objects:
+    """Nothing known of N boxes."""
+    return np.full(count, None, dtype=object)
+
+
 def _shaped(value: Any, shape: tuple[int, ...]) -> Interval:
     """Spread intervals to a shape."""
     if value.shape == shape:
@@ -133,19 +139,36 @@ def _shaped(value: Any, shape: tuple[int, ...]) -> Interval:
     return zero
 
 
+def linear(margin: Margin, sources: Sources, lo: Array, hi: Array, known: Objects) -> tuple[Affine, Objects]:
+    """Enclose the margin over boxes (N, n) by a linear function: by its own bounds if it has any, else by derivatives.
+
+    ``known`` (N,) is what a margin with bounds of its own already knows of each box, None for nothing.
+    """
+    if not isinstance(margin, LinearMargin):
+        return affine(margin, sources, lo, hi), known
+    middle = 0.5 * (lo + hi)
+    at = sources.quantities([Interval.from_bounds(x, x) for x in middle.T])
+    over = sources.quantities(variables(Interval.from_bounds(lo, hi))) if lo.shape[1] else at
+    line, left = margin.lines(at, over, 0.5 * (hi - lo), list(known))
+    fresh = np.empty(len(lo), dtype=object)
+    fresh[:] = left
+    return line, fresh
+
+
 @dataclass
 class Boxes:
-    """Boxes that are not decided, with bounds of the probability of binding inside each."""
+    """Boxes that are not decided, with bounds of the probability of binding inside each; ``known`` by the margin."""
 
     lo: Array
     hi: Array
     lower: Array
     upper: Array
     curved: Array
+    known: Objects
 
     def take(self, keep: Any) -> Boxes:
         """Keep some of the boxes."""
-        return Boxes(self.lo[keep], self.hi[keep], self.lower[keep], self.upper[keep], self.curved[keep])
+        return Boxes(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
     def joined(self, other: Boxes) -> Boxes:
         """Join the boxes of both."""
@@ -189,14 +212,13 @@ class Paver:
         self.masses: list[dict[tuple[float, float], tuple[float, float]]] = [{} for _ in self.every]
         self.brackets: list[dict[tuple[float, float], Bracket]] = [{} for _ in self.every]
         if n == 0:
-            value = _shaped(self.margin.enclosed(self.sources.quantities([])), ())
-            sure = bool(value.guaranteed)
-            return Bounds(float(sure and value.hi < 0.0), float(not sure or value.lo < 0.0), 1, "")
+            line, _ = linear(self.margin, self.sources, np.zeros((1, 0)), np.zeros((1, 0)), _unknown(1))
+            return Bounds(float(line.low[0] > 0.0), float(line.high[0] > 0.0), 1, "")
         smooth = sum(d.kind in ("normal", "beta") for d in self.every)
         wanted = math.sqrt(40.0 * max(smooth, 1) / max(self.width, 1e-6))
         self.resolution = 1 << min(max(math.ceil(math.log2(wanted)), 5), 12)
         self.goal = self.width
-        boxes = self.assessed(np.zeros((1, n)), np.ones((1, n)))
+        boxes = self.assessed(np.zeros((1, n)), np.ones((1, n)), _unknown(1))
         reason = ""
         while True:
             lower, upper = self.total(boxes)
@@ -229,29 +251,30 @@ class Paver:
         cut = np.round(0.5 * (own.lo + own.hi)[rows, axis] * _GRID) / _GRID
         left, right = own.hi.copy(), own.lo.copy()
         left[rows, axis] = right[rows, axis] = cut
-        fresh = self.assessed(np.concatenate([own.lo, right]), np.concatenate([left, own.hi]))
+        known = np.concatenate([own.known, own.known])
+        fresh = self.assessed(np.concatenate([own.lo, right]), np.concatenate([left, own.hi]), known)
         return boxes.take(np.sort(rest)).joined(fresh)
 
-    def assessed(self, lo: Array, hi: Array) -> Boxes:
+    def assessed(self, lo: Array, hi: Array, known: Objects) -> Boxes:
         """Bound the probability in each box; boxes that are decided are booked and left out."""
         found: list[tuple[Any, ...]] = []
         for _ in range(6):  # as long as ruling out parts of a box pays, the margin is enclosed anew in the rest
-            line = affine(self.margin, self.sources, lo, hi)
+            line, known = linear(self.margin, self.sources, lo, hi, known)
             self.boxes += len(lo)
             low, high = _contracted(lo, hi, line)
             alive = (low < high).all(axis=1)
             shrunk = alive & (np.prod(np.where(hi > lo, (high - low) / (hi - lo), 1.0), axis=1) < 0.8)
             done = alive & ~shrunk
-            found.append((lo[done], hi[done], *(part[done] for part in line)))
-            lo, hi = low[shrunk], high[shrunk]
+            found.append((lo[done], hi[done], *(part[done] for part in line), known[done]))
+            lo, hi, known = low[shrunk], high[shrunk], known[shrunk]
             if len(lo) == 0:
                 break
         else:
-            line = affine(self.margin, self.sources, lo, hi)
-            found.append((lo, hi, *line))
-        lo, hi, weights, low, high, curved = (np.concatenate(parts) for parts in zip(*found))
+            line, known = linear(self.margin, self.sources, lo, hi, known)
+            found.append((lo, hi, *line, known))
+        lo, hi, weights, low, high, curved, known = (np.concatenate(parts) for parts in zip(*found))
         lower, upper = self.bounds(lo, hi, weights, low, high)
-        every = Boxes(lo, hi, lower, upper, curved)
+        every = Boxes(lo, hi, lower, upper, curved, known)
         decided = np.isinf(low) & (low > 0.0) | (upper - lower <= _NOTHING)
         self.decided += list(zip(lower[decided].tolist(), upper[decided].tolist()))
         return every.take(~decided)

@@ -62,10 +62,9 @@ class ChanceProblem:
     def toleranced(self) -> dict[str, Distribution]:
         """Distribution of everything that varies by itself, uniform where only a range is given."""
         given = dict(self.distributions)
-        if isinstance(self.subject, ToleranceBox):
-            for name, value in self.subject.ranges.items():
-                if name not in given and not value.is_point:
-                    given[name] = Distribution.uniform(value)
+        for name, value in getattr(self.subject, "ranges", {}).items():
+            if name not in given and not value.is_point:
+                given[name] = Distribution.uniform(value)
         return given
 
     @property
@@ -86,7 +85,7 @@ class ChanceProblem:
 
     def model(self) -> tuple[Margin, Sources]:
         """Return the margin over all that can occur, and what varies independently."""
-        if not isinstance(self.subject, ToleranceBox) and not hasattr(self.subject, "enclosed"):
+        if not isinstance(self.subject, ToleranceBox) and not hasattr(self.subject, "sampled"):
             raise GeometryError(f"subject = {self.subject!r} is no ToleranceBox and no Margin; give one")
         for factor in self.common:
             if not isinstance(factor, CommonFactor):
@@ -112,6 +111,8 @@ class ChanceProblem:
             if missing := set(margin.names) - set(given):
                 raise GeometryError(f"{min(missing)!r} has no distribution; give one for {', '.join(margin.names)}")
             own = given
+            if hasattr(margin, "covering"):
+                margin = margin.covering({name: self._reach(own[name], effects.get(name, [])) for name in margin.names})
         none = [Fraction(0)] * len(self.common)
         rows = tuple(tuple(effects.get(name, none)) for name in margin.names)
         common = tuple(factor.distribution for factor in self.common)
