@@ -63,8 +63,8 @@ class ChanceProblem:
         """Distribution of everything that varies by itself, uniform where only a range is given."""
         given = dict(self.distributions)
         for name, value in getattr(self.subject, "ranges", {}).items():
-            if name not in given and not value.is_point:
-                given[name] = Distribution.uniform(value)
+            if name not in given and not (value.is_point and isinstance(self.subject, ToleranceBox)):
+                given[name] = Distribution("uniform", value)
         return given
 
     @property

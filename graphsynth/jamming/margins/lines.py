@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 #: Share of the cost from which an item counts as loaded; what the rounding of some dozen terms may add.
 _LOADED, _SUMS = 1e-6, 1e-13
+#: Share by which a limit varies over a box from which its vector is taken in proportion to it.
+_STEEP = 0.6
 
 
 class Boxes(NamedTuple):
@@ -56,18 +58,17 @@ def boxes_of(quantities: Quantities, items: Items, at: Sequence[Any], over: Sequ
 
     here = Interval.stack([_value(own, count) for own in limits(middle)], axis=-1)
     t_by = Interval.stack([_slope(own, count, n) for own in limits(whole)], axis=-1)
-    vectors = [
-        Interval.stack([Interval.stack([f(c) for c in pair], axis=-1) for pair in own.vectors], axis=-2)
-        for own, f in (
-            (middle, lambda c: _value(c, count)),
-            (whole, lambda c: _value(c, count)),
-            (whole, lambda c: _slope(c, count, n)),
-        )
-    ]
+    v = _pairs([[_value(c, count) for c in pair] for pair in middle.vectors])
+    v_over = _pairs([[_value(c, count) for c in pair] for pair in whole.vectors])
+    v_by = _pairs([[_slope(c, count, n) for c in pair] for pair in whole.vectors])
     p = Interval.stack([_value(own, count) for own in at[:size]], axis=-1) if size else Interval.zeros((count, 0))
     p_by = [_slope(own, count, n) for own in over[:size]]
     grown = Interval.stack(p_by, axis=-1) if size else Interval.zeros((n, count, 0))
-    return Boxes(here, t_by, *vectors, p, grown, half)
+    return Boxes(here, t_by, v, v_over, v_by, p, grown, half)
+
+
+def _pairs(vectors: list[list[Interval]]) -> Interval:
+    return Interval.stack([Interval.stack(pair, axis=-1) for pair in vectors], axis=-2)
 
 
 def _value(own: Any, count: int) -> Interval:
@@ -96,7 +97,7 @@ class Pairs(NamedTuple):
     steps: Interval
 
     def at_input(self) -> Interval:
-        """Steps with the input kept at its middle."""
+        """Return the steps with the input kept at its middle."""
         zero = np.ones((len(self.steps), 1))
         zero[0] = 0.0
         return self.steps * points(zero)
@@ -193,7 +194,9 @@ def certificates(layout: Layout, items: Items, boxes: Boxes, pairs: Pairs, y: Ar
     found = []
     for dual in (False, True):
         if dual:
-            r, e, d = (duals(*own, steps) for own in ((pairs.r, pairs.r_by), (pairs.e, pairs.e_by), (pairs.d, pairs.d_by)))
+            r, e, d = (
+                duals(*own, steps) for own in ((pairs.r, pairs.r_by), (pairs.e, pairs.e_by), (pairs.d, pairs.d_by))
+            )
         else:
             r, e, d = columns(pairs.r), columns(pairs.e), columns(pairs.d)
         found.append(_left_over(layout, items, (r, e, d), wrenches, lambda k, dual=dual: limit(k, dual)))
@@ -253,7 +256,8 @@ def length(x: Any, y: Any) -> Any:
 class Slack(NamedTuple):
     """What items leave of their limits: at least ``-need + by . step`` over the box, for every input of the station.
 
-    ``need`` (P, items), infinite where nothing is proved; ``by`` (P, items, n); ``curved`` (P, items, 1 + n): what the
+    In shares of the limits; two rows for each item, for vectors that point along the one at the middle and against it.
+    ``need`` (P, rows), infinite where nothing is proved; ``by`` (P, rows, n); ``curved`` (P, rows, 1 + n): what the
     input and every source add to the need (estimated).
     """
 
@@ -264,39 +268,71 @@ class Slack(NamedTuple):
 
 @np.errstate(all="ignore")
 def slacks(layout: Layout, items: Items, boxes: Boxes, pairs: Pairs, found: Sharing, a: Array) -> Slack:
-    """Bound the slack of all costly items, by a linear rule for their vectors; ``a`` (1 + n, P) guides the rule.
+    """Bound what all costly items leave, by a linear rule for their vectors over their limits; ``a`` (1 + n, P).
 
-    Loaded items follow so that all of them keep the slack ``t (m + a . step)``; what then does not close is left to
+    Loaded items follow so that all of them leave the same share, ``m + a . step``; what then does not close is left to
     the ways of correction, to first order in the rule, and enclosed for the rest.
     """
-    t, t_by = boxes.t.mid, boxes.t_by.mid
-    way = ways(items, t, found)
-    tau = found.tau.copy()
-    here = columns(pairs.r), columns(pairs.e), {place: columns(pairs.d)[place] for place, _, _ in layout.misalignments}
+    steps = pairs.steps
+    t, t_dual, caps = _limits(items, boxes, steps)
+    over = np.where(t.mid > 0.0, t.mid, np.inf)
+    way = ways(items, t.mid, found) / over[..., None, None]
+    share = found.tau / over[..., None]
+    turned = [place for place, _, _ in layout.misalignments]
+    here = columns(pairs.r), columns(pairs.e), {place: columns(pairs.d)[place] for place in turned}
+
+    def open_(share: Array) -> Interval:
+        """Closure at the middles."""
+        own = [(t[:, k] * share[:, k, 0], t[:, k] * share[:, k, 1]) for k in range(share.shape[1])]
+        return _stacked(closure(layout, here[0], here[1], own, here[2]), len(share))
+
     for _ in range(2):
-        off = _stacked(closure(layout, here[0], here[1], _vectors(tau), here[2]), len(tau))
-        tau = tau - np.einsum("pijc,pc->pij", way, np.nan_to_num(off.mid))
-    off = _stacked(closure(layout, here[0], here[1], _vectors(tau), here[2]), len(tau))
-    size = np.hypot(tau[..., 0], tau[..., 1])
-    unit = np.where(size[..., None] > 0.0, tau / np.where(size > 0.0, size, 1.0)[..., None], (1.0, 0.0))
+        share = share - np.einsum("pijc,pc->pij", way, np.nan_to_num(open_(share).mid))
+    size = np.hypot(share[..., 0], share[..., 1])
+    unit = np.where(size[..., None] > 0.0, share / np.where(size > 0.0, size, 1.0)[..., None], (1.0, 0.0))
     load = np.einsum("pick,pk->pic", found.rows, found.y)
-    loaded = items.costly & (t * np.hypot(load[..., 0], load[..., 1]) > _LOADED)
-    grown = np.concatenate([np.zeros((1, *t.shape)), t_by]) - t * a[..., None]
-    rule = np.where(loaded[..., None], grown[..., None] * unit, 0.0)
-    moving = [
-        duals(*own, pairs.steps) for own in ((pairs.r, pairs.r_by), (pairs.e, pairs.e_by), (pairs.d, pairs.d_by))
-    ]
+    loaded = items.costly & (t.mid * np.hypot(load[..., 0], load[..., 1]) > _LOADED)
+    rule = np.where(loaded[..., None], (caps.mid - a[..., None])[..., None] * unit, 0.0)
+    moving = [duals(*own, steps) for own in ((pairs.r, pairs.r_by), (pairs.e, pairs.e_by), (pairs.d, pairs.d_by))]
     for last in (False, True):
-        own = _following(tau, rule, pairs.steps)
-        shift = {place: moving[2][place] for place, _, _ in layout.misalignments}
-        sums = closure(layout, moving[0], moving[1], own, shift)
-        change = Interval.stack([s.grad + Interval.zeros(pairs.steps.shape) for s in sums], axis=-1)
+        own = [(limit * x, limit * y) for limit, (x, y) in zip(t_dual, _following(share, rule, steps))]
+        sums = closure(layout, moving[0], moving[1], own, {place: moving[2][place] for place in turned})
+        change = Interval.stack([_slopes(own, steps) for own in sums], axis=-1)
         if not last:
             rule = rule - np.einsum("pijc,kpc->kpij", way, np.nan_to_num(change.mid))
-    missing = off + (change * pairs.steps.reshape(*pairs.steps.shape, 1)).sum(0)
-    step, fine = enclosed_solve(_matrix(layout, moving, way), -missing)
-    spread = (change.rad + 0.0) * pairs.steps.mag[..., None]
-    return _slack(items, boxes, (tau, rule, unit, way), (pairs.steps, step, spread), fine)
+    missing = open_(share) + (change * steps.reshape(*steps.shape, 1)).sum(0)
+    step, fine = enclosed_solve(_matrix(layout, moving, t_dual, way), -missing)
+    start = Interval.from_bounds(*(np.where(t.mid > 0.0, own / over, 1.0) for own in (boxes.t.lo, boxes.t.hi)))
+    return _slack(
+        items, (start, caps), (share, rule, unit, way), (steps, step, change.rad * steps.mag[..., None]), fine
+    )
+
+
+def _slopes(own: Any, steps: Interval) -> Interval:
+    zero = Interval.zeros(steps.shape)
+    return zero + own.grad if isinstance(own, Dual) else zero
+
+
+def _limits(items: Items, boxes: Boxes, steps: Interval) -> tuple[Interval, list[Any], Interval]:
+    """Return units of the items at the middles (P, items), over the pairs, and what limits grow, (1 + n, P, items).
+
+    A limit that varies much is its own unit, so that its vector vanishes with it and all it may grow to is 1; of others
+    the unit is the limit at the middle, and the cap follows the limit.  Items without limit have the unit 1.
+    """
+    count = len(boxes.half)
+    one = np.ones(count)
+    zero = np.zeros((1, count))
+    here, whole, caps = [], [], []
+    for k, free in enumerate(items.free.tolist()):
+        by = boxes.t_by[:, :, k]
+        middle = one if free else boxes.t.mid[:, k]
+        steep = (by.mag * steps.mag[1:]).sum(axis=0) > _STEEP * middle
+        own = Interval.from_bounds(*(np.concatenate([zero, np.where(steep, end, 0.0)]) for end in (by.lo, by.hi)))
+        here.append(points(middle))
+        whole.append(Dual(points(middle) + (own * steps).sum(0), own))
+        rest = Interval.from_bounds(*(np.concatenate([zero, np.where(steep, 0.0, end)]) for end in (by.lo, by.hi)))
+        caps.append(rest / points(np.where(middle > 0.0, middle, 1.0)))
+    return Interval.stack(here, axis=-1), whole, Interval.stack(caps, axis=-1)
 
 
 def _stacked(sums: list[Any], count: int) -> Interval:
@@ -304,63 +340,62 @@ def _stacked(sums: list[Any], count: int) -> Interval:
     return Interval.stack([own + zero for own in sums], axis=-1)
 
 
-def _vectors(tau: Array) -> list[tuple[Any, Any]]:
-    return [(points(tau[:, k, 0]), points(tau[:, k, 1])) for k in range(tau.shape[1])]
-
-
-def _following(tau: Array, rule: Array, steps: Interval) -> list[tuple[Any, Any]]:
-    """Duals of the items that follow the rule (1 + n, P, items, 2)."""
+def _following(share: Array, rule: Array, steps: Interval) -> list[tuple[Any, Any]]:
+    """Duals of the shares that follow the rule (1 + n, P, items, 2)."""
     by = points(rule)
-    over = points(tau) + (by * steps.reshape(*steps.shape, 1, 1)).sum(0)
-    return [tuple(Dual(over[:, k, i], by[:, :, k, i]) for i in (0, 1)) for k in range(tau.shape[1])]  # type: ignore[misc]
+    over = points(share) + (by * steps.reshape(*steps.shape, 1, 1)).sum(0)
+    return [tuple(Dual(over[:, k, i], by[:, :, k, i]) for i in (0, 1)) for k in range(share.shape[1])]  # type: ignore[misc]
 
 
-def _matrix(layout: Layout, moving: list[Columns], way: Array) -> Interval:
+def _matrix(layout: Layout, moving: list[Columns], t: list[Any], way: Array) -> Interval:
     """Enclose what every column of the ways adds to the closure, (P, 3 loops, 3 loops)."""
     r, e = ([tuple(c.value for c in pair) for pair in own] for own in moving[:2])
-    parts = [
-        _stacked(closure(layout, r, e, _vectors(way[..., c]), {}), len(way))  # type: ignore[arg-type]
-        for c in range(way.shape[3])
-    ]
+    limits = [own.value if isinstance(own, Dual) else own for own in t]
+    parts = []
+    for c in range(way.shape[3]):
+        own = [(limit * way[:, k, 0, c], limit * way[:, k, 1, c]) for k, limit in enumerate(limits)]
+        parts.append(_stacked(closure(layout, r, e, own, {}), len(way)))
     return Interval.stack(parts, axis=-1)
 
 
 def _slack(
     items: Items,
-    boxes: Boxes,
+    caps: tuple[Interval, Interval],
     made: tuple[Array, Array, Array, Array],
     moved: tuple[Interval, Interval, Array],
     fine: NDArray[np.bool_],
 ) -> Slack:
-    """Bound ``limit - |vector|`` from below: linear in the steps where the vector does not turn far."""
-    (tau, rule, unit, way), (steps, step, spread) = made, moved
+    """Bound ``cap - |share|`` from below by linear functions of the steps, one for each side of every item."""
+    (share, rule, unit, way), (steps, step, spread) = made, moved
     half, across = steps.mag, np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
     move = np.einsum("pijc,pc->pij", np.abs(way), step.mag)  # of every component, by the correction
-    far, wide = (np.einsum("kpij,pij->kpi", rule, way) for way in (unit, across))
-    start, side = ((tau * way).sum(axis=-1) for way in (unit, across))
-    rest = np.abs(unit[..., 0]) * move[..., 0] + np.abs(unit[..., 1]) * move[..., 1]
-    turn = np.abs(across[..., 0]) * move[..., 0] + np.abs(across[..., 1]) * move[..., 1]
+    far, wide = (np.einsum("kpij,pij->kpi", rule, own) for own in (unit, across))
+    start, side = ((share * own).sum(axis=-1) for own in (unit, across))
+    rest, turn = ((np.abs(own) * move).sum(axis=-1) for own in (unit, across))
     reach = np.einsum("kpi,kp->pi", np.abs(far), half)
     turn = np.where(items.plane, turn + np.einsum("kpi,kp->pi", np.abs(wide), half) + np.abs(side), 0.0)
     least, most = start - reach - rest, start + reach + rest
-    # the length is convex in the component along the middle: the chord between its ends bounds it
-    ends = np.hypot(least, turn), np.hypot(most, turn)
-    slope = np.where(most > least, np.clip((ends[1] - ends[0]) / (most - least), 0.0, 1.0), 0.0)
-    bend = np.maximum(ends[0] - slope * least, ends[1] - slope * most)
-    need = bend + slope * (start + rest) - boxes.t.lo
-    far = slope * far
-    need = need + np.einsum("kpi,kp->pi", boxes.t_by.rad, half[1:]) + np.abs(far[0]) * half[0][:, None]
-    by = np.moveaxis(boxes.t_by.mid - far[1:], 0, -1)
-    scale = boxes.t.mag + np.abs(most) + turn + np.einsum("kpi,kp->pi", boxes.t_by.mag, half[1:])
-    need = need + _SUMS * scale
-    need = np.where(fine[:, None] & np.isfinite(need), need, np.inf)
-    lean = np.abs(unit[..., 0])[..., None] * np.abs(way[:, :, 0]) + np.abs(unit[..., 1])[..., None] * np.abs(way[:, :, 1])
-    curved = np.einsum("pic,kpc->pik", lean, spread)
-    part = np.minimum(bend / np.maximum(turn, 1e-300), 1.0)
-    curved += np.moveaxis(np.abs(wide) * half[..., None], 0, -1) * np.where(items.plane, part, 0.0)[..., None]
-    curved[..., 0] += np.abs(far[0]) * half[0][:, None]
-    curved[..., 1:] += np.moveaxis(boxes.t_by.rad * half[1:, :, None], 0, -1)
-    return Slack(np.where(items.costly, need, -np.inf), by, np.nan_to_num(curved))
+    loose = np.einsum("kpi,kp->pi", caps[1].rad, half)
+    fixed = _SUMS * (2.0 + np.abs(most) + turn + np.einsum("kpi,kp->pi", caps[1].mag, half)) + loose - caps[0].lo
+    lean = np.einsum("pij,pijc->pic", np.abs(unit), np.abs(way))
+    plain = np.einsum("pic,kpc->pik", lean, spread)
+    aside = np.where(items.plane[:, None], np.moveaxis(np.abs(wide) * half[..., None], 0, -1), 0.0)
+    sides = []
+    for sign in (1.0, -1.0):
+        ends = (least, most) if sign > 0.0 else (-most, -least)
+        low, high = (np.maximum(own, 0.0) for own in ends)
+        # the length is convex in the component along the middle: the chord between the ends of a side bounds it
+        first, last = np.hypot(low, turn), np.hypot(high, turn)
+        slope = np.where(high > low, np.clip((last - first) / (high - low), 0.0, 1.0), 0.0)
+        bend = np.maximum(first - slope * low, last - slope * high)
+        own = sign * slope * far
+        need = bend + slope * (sign * start + rest) + fixed + np.abs(own[0]) * half[0][:, None]
+        need = np.where(fine[:, None] & np.isfinite(need), need, np.inf)
+        need = np.where(items.costly & ((high > 0.0) | (sign > 0.0)), need, -np.inf)
+        curved = plain + aside * np.minimum(bend / np.maximum(turn, 1e-300), 1.0)[..., None]
+        curved[..., 0] += np.abs(own[0]) * half[0][:, None]
+        sides.append((need, np.moveaxis(caps[1].mid[1:] - own[1:], 0, -1), np.nan_to_num(curved)))
+    return Slack(*(np.concatenate(part, axis=1) for part in zip(*sides)))
 
 
 def thresholds(slack: Slack, a: Array, half: Array) -> tuple[Array, NDArray[np.intp], Array]:
@@ -370,6 +405,9 @@ def thresholds(slack: Slack, a: Array, half: Array) -> tuple[Array, NDArray[np.i
     is enough; it is convex in v, least at ``a_k / by_k`` for some k.  Infinite: nothing in the box is proved free.
     """
     need, by = slack.need, slack.by
+    if not by.shape[2]:  # nothing varies: free, or not proved
+        item = need.argmax(axis=1)
+        return np.where(need.max(axis=1) < 0.0, -np.inf, np.inf), item, np.zeros(len(need))
     size = np.abs(by) * half[:, None]
     none = (np.abs(a) * half).sum(axis=1)
     with np.errstate(all="ignore"):
@@ -402,6 +440,4 @@ def solved(layout: Layout, items: Items, boxes: Boxes, pairs: Pairs) -> Sharing:
 def _moments(layout: Layout, r: Array, y: Array) -> Array:
     """Moments of the joints (P, joints, 2) by loop wrenches."""
     wrench = np.einsum("lj,plc->pjc", layout.incidence, y.reshape(len(y), -1, 3))
-    return np.stack(
-        [wrench[..., 0] - wrench[..., 2] * r[..., 1], wrench[..., 1] + wrench[..., 2] * r[..., 0]], axis=-1
-    )
+    return np.stack([wrench[..., 0] - wrench[..., 2] * r[..., 1], wrench[..., 1] + wrench[..., 2] * r[..., 0]], axis=-1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,16 +18,7 @@ from graphsynth.jamming.chance.paving import Affine
 from graphsynth.jamming.joints.drawing import Tolerances
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.program import Bearings, check_motion
-from graphsynth.jamming.margins.lines import (
-    Boxes,
-    Slack,
-    boxes_of,
-    certificates,
-    pairs_of,
-    slacks,
-    solved,
-    thresholds,
-)
+from graphsynth.jamming.margins.lines import Boxes, Slack, boxes_of, certificates, pairs_of, slacks, solved, thresholds
 from graphsynth.jamming.margins.program import Items
 from graphsynth.jamming.margins.quantities import Quantities, quantities_of
 from graphsynth.jamming.margins.stations import Stations
@@ -54,14 +46,14 @@ class _Pairs(NamedTuple):
 
     def take(self, rows: Any) -> _Pairs:
         """Return some of the pairs."""
-        *rest, slack = self
-        return _Pairs(*(part[rows] for part in rest), Slack(*(part[rows] for part in slack)))
+        slack = Slack(*(part[rows] for part in self.slack))
+        return _Pairs._make([*(part[rows] for part in self[:-1]), slack])
 
     @staticmethod
     def join(parts: list[_Pairs]) -> _Pairs:
         """Put pairs together."""
-        rest = [np.concatenate(own) for own in zip(*(part[:-1] for part in parts))]
-        return _Pairs(*rest, Slack(*(np.concatenate(own) for own in zip(*(part.slack for part in parts)))))
+        slack = Slack(*(np.concatenate(own) for own in zip(*(part.slack for part in parts))))
+        return _Pairs._make([*(np.concatenate(own) for own in zip(*(part[:-1] for part in parts))), slack])
 
 
 class JointsMargin(Shown):
@@ -116,7 +108,7 @@ class JointsMargin(Shown):
         if self.sampler is None:
             from graphsynth.jamming.margins.sampling import Sampler
 
-            self.sampler = Sampler(self)
+            self.sampler = Sampler(self.quantities, self.items, self.stations.work)
         return self.sampler.margin_of(x)
 
     def _told(self) -> tuple[str, list[tuple[str, str]]]:
@@ -146,7 +138,7 @@ class JointsMargin(Shown):
             found = _Pairs.join([found.take(~again), fresh])
         return self._affine(found, half, (a, low, loose, c, item, v))
 
-    def _affine(self, found: _Pairs, half: Array, bounds: tuple[Array, ...]) -> tuple[Affine, list[Rows]]:
+    def _affine(self, found: _Pairs, half: Array, bounds: tuple[Any, ...]) -> tuple[Affine, list[Rows]]:
         """Put the bounds of all pairs of every box together."""
         a, low, loose, c, item, v = bounds
         start = np.full(len(half), np.inf)
@@ -167,8 +159,10 @@ class JointsMargin(Shown):
         box, station = found.box[left], found.station[left]
         order = np.argsort(box, kind="stable")
         ends = np.searchsorted(box[order], np.arange(len(half) + 1))
-        sets = [station[order[i:j]] for i, j in zip(ends[:-1], ends[1:])]
-        low = np.where(low > (np.abs(a) * half).sum(axis=1) * (1.0 + 1e-12), np.inf, np.minimum(low, high))
+        sets = [station[order[i:j]] for i, j in itertools.pairwise(ends)]
+        low = np.where(
+            (low > 0.0) & (low > (np.abs(a) * half).sum(axis=1) * (1.0 + 1e-12)), np.inf, np.minimum(low, high)
+        )
         return Affine(a, low, high, curved), sets
 
     def _pairs(self, boxes: Boxes, box: Rows, station: Rows) -> _Pairs:
@@ -201,9 +195,9 @@ class JointsMargin(Shown):
         start = np.where(line.sound, line.start.hi, np.inf)
         return _Pairs(box, station, start, low, a[1:].T, loose, slack)
 
-    def _bounds(self, found: _Pairs, half: Array) -> tuple[Array, ...]:
+    def _bounds(self, found: _Pairs, half: Array) -> tuple[Any, ...]:
         """Return the line of every box, by its most dangerous station, and the thresholds of all pairs."""
-        count, n = half.shape
+        count = len(half)
         order = np.argsort(-found.start, kind="stable")
         best = np.full(count, -1)
         best[found.box[order]] = order
@@ -213,7 +207,7 @@ class JointsMargin(Shown):
         loose = np.where(have[:, None], found.loose[best] if len(found.box) else 0.0, 0.0)
         return a, low, loose, *thresholds(found.slack, a[found.box], half[found.box])
 
-    def _worth(self, found: _Pairs, bounds: tuple[Array, ...]) -> NDArray[np.bool_]:
+    def _worth(self, found: _Pairs, bounds: tuple[Any, ...]) -> NDArray[np.bool_]:
         """Tell the pairs whose station is too wide for their box, and cut those stations."""
         c, low, item, v = bounds
         gap = c - low[found.box]

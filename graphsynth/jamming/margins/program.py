@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 #: Cost of a wrench that nothing else bounds.
 _LEAST = 1e-7
-#: Share in which a joint that is used up may tilt further in a correction; what joints without limit take beside others.
+#: Share in which a used up joint may tilt further in a correction; what joints without limit take beside others.
 _STIFF, _FREE = 1e-3, 1e4
 
 
@@ -45,7 +45,7 @@ class Items(NamedTuple):
 
 
 class Sharing(NamedTuple):
-    """Solutions of P poses: wrenches ``y`` (P, 3 loops), vectors of the items (P, items, 2), rows (P, items, 2, 3 loops)."""
+    """Solutions of P poses: wrenches ``y`` (P, 3 loops), vectors (P, items, 2), rows (P, items, 2, 3 loops)."""
 
     y: Array
     tau: Array
@@ -53,7 +53,7 @@ class Sharing(NamedTuple):
 
 
 def item_rows(layout: Layout, r: Array, e: Array) -> Array:
-    """What every item adds to the closure, (P, items, 2, 3 loops); positions in units."""
+    """Return what every item adds to the closure, (P, items, 2, 3 loops); positions in units."""
     moments = moment_rows(layout, r, e)
     forces = np.zeros((len(r), len(layout.end_float), 2, moments.shape[3]))
     forces[:, :, 0, 2::3] = layout.incidence.T
@@ -98,7 +98,7 @@ def _carried(forbidden: Array) -> list[tuple[Array, NDArray[np.intp]]]:
 
 
 def ways(items: Items, t: Array, found: Sharing) -> Array:
-    """Changes of the items (P, items, 2, 3 loops) that correct the closure, one column for each of its sums.
+    """Return changes of the items (P, items, 2, 3 loops) that correct the closure, a column for each of its sums.
 
     In proportion to the squares of the limits; an item that uses its limit as far as any other turns and does not grow.
     """
@@ -117,7 +117,9 @@ def ways(items: Items, t: Array, found: Sharing) -> Array:
     return np.asarray(moves @ np.linalg.pinv(effect, rcond=1e-14)[:, None])
 
 
-def closure(layout: Layout, r: Columns, e: Columns, tau: list[tuple[Any, Any]], d: dict[int, tuple[Any, Any]]) -> list[Any]:
+def closure(
+    layout: Layout, r: Columns, e: Columns, tau: list[tuple[Any, Any]], d: dict[int, tuple[Any, Any]]
+) -> list[Any]:
     """Sum up every loop (3 for each) for items tau; intervals or duals, positions in units."""
     zero = Interval(0)
     joints, blocks = len(layout.joints), len(layout.limit)

@@ -127,8 +127,7 @@ def _tilt_of_fit(hole: Formula, shaft: Formula, height: Formula, nominal: Fracti
         c = (bore - pin) * 0.5
         both = (bore + pin) * 0.5 + size  # 2 R + c
         w = _square(h) + c * both * sign
-        found = atan(c / (h + w.sqrt())) * 2
-        return found
+        return atan(c / (h + w.sqrt())) * 2
 
     return tilt
 
@@ -152,8 +151,12 @@ def quantities_of(
     tilts = tuple(tilts) if isinstance(tilts, Iterable) else (tilts,)
     parts = tuple(tolerances) if isinstance(tolerances, Iterable) else ()
     bearings, axes, box = drawn(mechanism, bearings, tilts, parts if parts else tolerances)
+    if not axes:
+        raise GeometryError("no axis is misaligned; give a tilt, or an AxisAngle among the tolerances")
     given = problem(mechanism, bearings, axes, condition)
-    made = _Making({name: Range(Fraction(a), Fraction(b), exact=False) for name, a, b in zip(box.names, box.low, box.high)})
+    made = _Making(
+        {name: Range(Fraction(a), Fraction(b), exact=False) for name, a, b in zip(box.names, box.low, box.high)}
+    )
     layout = given.layout
     fits = {mechanism.joint(*own.joint).pair: own for own in parts if isinstance(own, FitClearance)}
     limits = []
@@ -180,16 +183,18 @@ def _named(pair: tuple[int, int]) -> str:
 def _limit(
     made: _Making, own: Limits, kind: str, pair: tuple[int, int], fits: dict[tuple[int, int], FitClearance]
 ) -> Formula | None:
-    """Formula of one limit on tilt; None if it is infinite."""
-    value = getattr(own, kind)
-    if value in (0.0, math.inf):
-        return None if value else lambda q: Interval(0)
+    """Make the formula of one limit on tilt; None if it is infinite."""
+    ends = bounds(own, kind)
+    if math.isinf(ends[1]) and not math.isinf(ends[0]):
+        raise GeometryError(
+            f"joint {_named(pair)} binds for some of its tolerances and never for others; narrow them, or leave it "
+            "free of limits"
+        )
+    if math.isinf(ends[0]):
+        return None
+    if ends[1] == 0.0:
+        return lambda q: Interval(0)
     if pair not in fits:
-        ends = bounds(own, kind)
-        if math.isinf(ends[1]):
-            raise GeometryError(
-                f"joint {_named(pair)} binds for some of its tolerances and never for others; narrow them, or leave it free"
-            )
         return made.spread(f"{kind} {_named(pair)}", ends)
     drawing = fits[pair]
     fit = Fit.read(drawing.fit)
@@ -199,10 +204,8 @@ def _limit(
     return _tilt_of_fit(hole, shaft, height, fit.nominal, drawing.condition)
 
 
-def _play(
-    made: _Making, own: Limits, pair: tuple[int, int], floats: dict[tuple[int, int], EndFloat]
-) -> Formula | None:
-    """Formula of an axial clearance to either side; None if it is infinite."""
+def _play(made: _Making, own: Limits, pair: tuple[int, int], floats: dict[tuple[int, int], EndFloat]) -> Formula | None:
+    """Make the formula of an axial clearance to either side; None if it is infinite."""
     if math.isinf(own.axial_clearance):
         return None
     if pair not in floats or own.axial_clearance == 0.0:

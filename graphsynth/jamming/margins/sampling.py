@@ -18,7 +18,9 @@ from graphsynth.jamming.joints.tubes import prove_tubes, slopes
 from graphsynth.jamming.margins.program import item_rows, share
 
 if TYPE_CHECKING:
-    from graphsynth.jamming.margins.margin import JointsMargin
+    from graphsynth.jamming.joints.pieces import Work
+    from graphsynth.jamming.margins.program import Items
+    from graphsynth.jamming.margins.quantities import Quantities
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -44,9 +46,8 @@ class Members(NamedTuple):
 class Sampler:
     """Positions at a grid of inputs, and the pool of cuts: place in the grid, wrench."""
 
-    def __init__(self, margin: JointsMargin) -> None:
-        self.margin, self.layout, self.items = margin, margin.quantities.layout, margin.items
-        work = margin.stations.work
+    def __init__(self, quantities: Quantities, items: Items, work: Work) -> None:
+        self.quantities, self.layout, self.items = quantities, quantities.layout, items
         count = int(np.clip(_GRID * (work.high - work.low) / (2.0 * np.pi), 64, _GRID))
         u = np.linspace(work.low, work.high, count + 1)
         fine, poses, velocities = work._follow(u)
@@ -63,7 +64,7 @@ class Sampler:
 
     def members(self, x: Array) -> Members:
         """Evaluate quantities (N, quantities)."""
-        quantities = self.margin.quantities
+        quantities = self.quantities
         values = quantities.values([points(column) for column in x.T])
         none = np.zeros(len(x))
 
@@ -94,16 +95,20 @@ class Sampler:
         return d
 
     def _loads(self, place: Rows, y: Array, p: Array) -> tuple[Array, Array]:
-        """Loads of the items (P, items) and rates of the work by the misalignments (P, axes, 2), for wrenches."""
+        """Return loads of the items (P, items) and rates of the work by the misalignments (P, axes, 2)."""
         r, e, base = self._geometry(place, p)
-        load = np.einsum("pick,pk->pic", item_rows(self.layout, r, e), y)
+        rows = item_rows(self.layout, r, e)
+        if self.items.free.any() and p.shape[1]:  # joints without limit carry nothing, whatever the lengths
+            none = rows[:, self.items.free].reshape(len(y), -1, y.shape[1])
+            y = y - (np.linalg.pinv(none, rcond=1e-11) @ (none @ y[:, :, None]))[..., 0]
+        load = np.einsum("pick,pk->pic", rows, y)
         size = np.where(self.items.costly, np.hypot(load[..., 0], load[..., 1]), 0.0)
         wrench = np.einsum("lj,plc->pjc", self.layout.incidence, y.reshape(len(y), -1, 3))
         moment = np.stack(
             [wrench[..., 0] - wrench[..., 2] * r[..., 1], wrench[..., 1] + wrench[..., 2] * r[..., 0]], axis=-1
         )
         rates = []
-        for k, (own, sign, _) in enumerate(self.layout.misalignments):
+        for own, sign, _ in self.layout.misalignments:
             turn = base[:, own, 0 if sign > 0 else 1]
             mx, my = moment[:, own, 0], moment[:, own, 1]
             rates.append(sign * np.stack([mx * turn[:, 0] + my * turn[:, 1], my * turn[:, 0] - mx * turn[:, 1]], -1))

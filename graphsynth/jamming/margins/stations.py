@@ -107,7 +107,7 @@ class Stations:
         return prove_tubes(self.system, self.joints, u, x, counted, p), counted
 
     def _add(self, lo: Array, hi: Array, tubes: Tubes, counted: Array, depth: int) -> Rows:
-        """Number proved pieces, with positions at their middles and derivatives."""
+        """Give numbers to proved pieces, with positions at their middles and derivatives."""
         u, p = Interval.from_bounds(lo, hi), self.work.whole(len(lo))
         here, middle = points(u.mid), points(p.mid)
         x = tubes.tight.mid if self.system.size else tubes.tight.lo
@@ -152,4 +152,3 @@ class Stations:
                 ).reshape(-1, PARTS)
                 for k, parts in zip(own[good].tolist(), numbers):
                     self.children[k] = parts
-

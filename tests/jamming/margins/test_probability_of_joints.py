@@ -1,0 +1,133 @@
+"""`probability_of_jamming` of all joints: closed forms, random members, and what is refused."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from jointed import CASES, FOUR, PLAIN, four_bar, true_margin
+
+from graphsynth.core.errors import GeometryError
+from graphsynth.jamming import (
+    CommonFactor,
+    Distribution,
+    Grade,
+    allocate_tolerances,
+    joints_margin,
+    probability_of_jamming as probability,
+)
+from graphsynth.jamming.bearing.parameters import Range
+from graphsynth.jamming.joints.limits import FREE, JointLimits, Misalignment
+from graphsynth.tolerances import AxisAngle, FitClearance, LengthTolerance
+
+LEVEL = {pair: JointLimits(0.006, tilt_range=(0.0055, 0.0065)) for pair in ((0, 3), (1, 2), (2, 3))}
+ALPHA = Misalignment(0, 1, 0.012, alpha_range=(0.010, 0.014))
+
+
+def fixed(value: str) -> Distribution:
+    return Distribution("uniform", Range(Fraction(value), Fraction(value)))
+
+
+def test_one_quantity_over_the_full_rotation() -> None:
+    """Three equal bearings bind if and only if alpha > 2 t (theory/joints-that-share-a-tilt 6)."""
+    margin = joints_margin(FOUR.simulate("0..360 deg"), JointLimits(0.006), ALPHA)
+    found = probability(margin, {"alpha 0-1": Distribution.uniform("[0.010, 0.014]")}, width=2e-3)
+    assert found.lower <= 0.5 <= found.upper <= found.lower + 2e-3
+    assert "small tilts" in found.model and "0 to 6.28319" in found.model
+    all_bind = probability(margin, {"alpha 0-1": Distribution.uniform("[0.0121, 0.0122]")})
+    none = probability(margin, {"alpha 0-1": Distribution.uniform("[0.0118, 0.0119]")})
+    assert all_bind.lower > 1.0 - 1e-12 and none.upper == 0.0
+
+
+@pytest.mark.slow
+def test_two_quantities_over_the_full_rotation() -> None:
+    """All limits grow together by a common factor: P(alpha > 2 t) is an integral of a linear function."""
+    margin = joints_margin(FOUR.simulate("0..360 deg"), LEVEL, ALPHA)
+    given = {f"tilt {a}-{b}": fixed("0.006") for a, b in LEVEL} | {"alpha 0-1": Distribution.uniform("[0.010, 0.014]")}
+    for spread, shape, exact in (
+        ("[-0.0005, 0.0005]", Distribution.uniform, 0.5),
+        ("[0, 0.0005]", Distribution.uniform, (0.014 - 0.0125) / 0.004),
+        ("[-0.0005, 0.0005]", Distribution.triangular, 0.5),
+    ):
+        together = CommonFactor("grade", shape(spread), {name: 1 for name in given if name.startswith("tilt")})
+        found = probability(margin, given, [together], width=4e-3)
+        assert found.lower <= exact <= found.upper <= found.lower + 4e-3
+
+
+@pytest.mark.slow
+def test_part_of_a_rotation_is_less_likely_to_bind() -> None:
+    whole, part = (four_bar(span, tolerances=()) for span in ("0..180 deg", "140..180 deg"))
+    both = [probability(margin, width=0.1, seconds=8.0) for margin in (whole, part)]
+    assert both[1].upper < both[0].lower
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(CASES))
+def test_bounds_hold_the_interval_of_random_members(name: str) -> None:
+    found = probability(CASES[name](), width=5e-3, seconds=20.0)
+    drawn = found.sampled(20_000)
+    assert drawn.lower <= found.upper and found.lower <= drawn.upper
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_sampled_margins_are_those_of_members(name: str) -> None:
+    """Signs of sampled margins near binding, against members with their own dimensions."""
+    margin, rng = CASES[name](), np.random.default_rng(3)
+    ends = np.array([[float(own.lower), float(own.upper)] for own in margin.ranges.values()])
+    x = ends[:, 0] + (ends[:, 1] - ends[:, 0]) * rng.random((200, len(ends)))
+    sampled = margin.sampled(x)
+    near = np.argsort(np.abs(sampled))[:3]
+    for k in near:
+        true = true_margin(margin, x[k], 121)
+        assert true * sampled[k] > 0.0 or abs(true) < 1e-3
+        assert abs(true) < 0.05
+
+
+def test_a_point_is_a_plain_verdict() -> None:
+    margin = four_bar(tolerances=())
+    given = {name: Distribution("uniform", Range(own.lower, own.lower)) for name, own in margin.ranges.items()}
+    found = probability(margin, given)
+    assert (found.lower, found.upper) in ((0.0, 0.0), (1.0, 1.0))
+    assert (found.lower == 1.0) == (true_margin(margin, np.array([float(o.lower) for o in margin.ranges.values()])) < 0)
+
+
+def test_allocation_takes_the_margin_of_all_joints() -> None:
+    margin = joints_margin(FOUR.simulate("30..120 deg"), PLAIN, ALPHA)
+    grades = {
+        "alpha 0-1": [Grade("coarse", "[0.010, 0.014]", 1.0), Grade("fine", "[0.0108, 0.0112]", 4.0)],
+        "tilt 0-3": [Grade("coarse", "[0.005, 0.007]", 1.0), Grade("fine", "[0.0065, 0.0075]", 3.0)],
+    }
+    bought = allocate_tolerances(margin, grades, allowed=1e-3, seconds=10.0)
+    assert bought.choice and bought.upper <= 1e-3
+    assert bought.cheapest
+
+
+def test_what_has_no_answer_is_refused() -> None:
+    motion = FOUR.simulate("30..120 deg")
+    with pytest.raises(GeometryError, match="nothing can bind"):
+        joints_margin(motion, FREE, ALPHA)
+    with pytest.raises(GeometryError, match="no axis is misaligned"):
+        joints_margin(motion, PLAIN)
+    with pytest.raises(GeometryError, match="assembled near"):
+        joints_margin(motion, PLAIN, ALPHA, [LengthTolerance(1, (0, 2), 0.9)])
+    with pytest.raises(GeometryError, match="fit with clearance"):
+        joints_margin(motion, PLAIN, ALPHA, [FitClearance((1, 2), "35 H7/p6", 10.0)])
+    with pytest.raises(GeometryError, match="never for others"):
+        joints_margin(motion, PLAIN, ALPHA, [FitClearance((1, 2), "35 H7/c11", 3.6)])
+    with pytest.raises(GeometryError, match="no quantity"):
+        probability(joints_margin(motion, PLAIN, ALPHA), {"nonsense": Distribution.uniform("[0, 1]")})
+
+
+def test_tolerances_of_no_width_are_no_quantities() -> None:
+    motion = FOUR.simulate("30..120 deg")
+    none = [AxisAngle(2, 3, 0.0), LengthTolerance(1, (0, 2), 0.0)]
+    with_none, without = (joints_margin(motion, PLAIN, ALPHA, parts) for parts in (none, ()))
+    wide = [name for name, own in with_none.ranges.items() if not own.is_point]
+    assert wide == list(without.ranges)
+    found = [probability(margin, width=0.05, seconds=5.0) for margin in (with_none, without)]
+    assert found[0].lower <= found[1].upper and found[1].lower <= found[0].upper
+
+
+def test_fits_that_may_interfere_by_another_distribution_are_refused() -> None:
+    margin = four_bar(joints=PLAIN, tolerances=[FitClearance((1, 2), "35 F7/h6", 10.0)])
+    with pytest.raises(GeometryError, match="interfere"):
+        probability(margin, {"shaft 1-2": Distribution.uniform("[-0.016, 0.1]")})
