@@ -262,6 +262,35 @@ def binding_corner() -> str:
     return board.svg("The part of a box that binds, the margin between two lines, and the box that is left")
 
 
+def half_spaces() -> str:
+    """Draw members free of binding between the half spaces of several wrenches, and the two lines of one box."""
+    board = Board(560, 300, 50 + 262j, 1.0)
+    tangents = [(at, 50.0 + 9.0 * math.sqrt(at - 40.0), 4.5 / math.sqrt(at - 40.0)) for at in (75, 120, 185, 350)]
+
+    def verge(x: float) -> float:
+        return min(height + slope * (x - at) for at, height, slope in tangents)
+
+    edge = [complex(x, verge(x)) for x in range(60, 441)]
+    board.line(0j + edge[0].real, *edge, 440 + 0j, colour="a", width=0, fill="a")
+    board.curve(edge, colour="a", width=2.2)
+    for at, height, slope in tangents:
+        ends = [complex(x, height + slope * (x - at)) for x in (60, min(440.0, at + (235.0 - height) / slope))]
+        board.line(*ends, colour="note", width=1.0, dash="2 5")
+    left, right, low, high = 110.0, 265.0, 85.0, 215.0
+    corners = complex(left, low), complex(right, low), complex(right, high), complex(left, high)
+    board.line(*corners, corners[0], colour="ink")
+    at, height, slope = tangents[2]
+    for shift, colour in ((0.0, "b"), (-16.0, "a")):
+        board.line(*(complex(x, height + shift + slope * (x - at)) for x in (left, right)), colour=colour, width=2.2)
+    board.text(345 + 60j, "free at every input", colour="a", size=13)
+    board.text(150 + 198j, "binds", colour="b", size=13)
+    board.text(306 + 196j, "a·δ = low", colour="b", size=13)
+    board.text(300 + 158j, "a·δ = c", colour="a", size=13)
+    board.text(440 - 14j, "limit", size=13)
+    board.text(28 + 200j, "tilt", size=13)
+    return board.svg("Free members lie between the half spaces of all wrenches; two lines of a box bound what binds")
+
+
 def whitney() -> str:
     """Draw a peg in a hole with two contacts, and the diagram of its loads."""
     board = Board(660, 330, 150 + 150j, 3.0)
@@ -807,6 +836,7 @@ DRAWINGS = {
     "theory-modes": modes,
     "theory-platform": platform,
     "theory-probability": binding_corner,
+    "theory-probability-of-joints": half_spaces,
     "theory-shared-tilt": shared_tilt,
     "theory-singular": singular,
     "theory-small-crank": small_crank,

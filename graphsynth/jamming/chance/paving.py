@@ -212,8 +212,12 @@ class Paver:
         self.masses: list[dict[tuple[float, float], tuple[float, float]]] = [{} for _ in self.every]
         self.brackets: list[dict[tuple[float, float], Bracket]] = [{} for _ in self.every]
         if n == 0:
-            line, _ = linear(self.margin, self.sources, np.zeros((1, 0)), np.zeros((1, 0)), _unknown(1))
-            return Bounds(float(line.low[0] > 0.0), float(line.high[0] > 0.0), 1, "")
+            if isinstance(self.margin, LinearMargin):
+                line, _ = linear(self.margin, self.sources, np.zeros((1, 0)), np.zeros((1, 0)), _unknown(1))
+                return Bounds(float(line.low[0] > 0.0), float(line.high[0] > 0.0), 1, "")
+            value = _shaped(self.margin.enclosed(self.sources.quantities([])), ())
+            sure = bool(value.guaranteed)
+            return Bounds(float(sure and value.hi < 0.0), float(not sure or value.lo < 0.0), 1, "")
         smooth = sum(d.kind in ("normal", "beta") for d in self.every)
         wanted = math.sqrt(40.0 * max(smooth, 1) / max(self.width, 1e-6))
         self.resolution = 1 << min(max(math.ceil(math.log2(wanted)), 5), 12)
