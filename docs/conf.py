@@ -160,25 +160,30 @@ def _whole_docstring(self: Any) -> tuple[str, list[str]]:
     return "", self.__class__(self._dedent(self._consume_to_end()), self._config).lines()
 
 
-def _each_name(
+def _one_entry(
     self: Any, parse_type: bool = True, prefer_type: bool = False, multiple: bool = False
 ) -> list[tuple[Any, ...]]:
-    """Give each name of "width, height : float" a line of its own, among attributes as among parameters."""
-    several = multiple or (parse_type and not prefer_type)
-    fields: list[tuple[Any, ...]] = CONSUME(self, parse_type, prefer_type, several)
-    return fields
+    """Keep the names of "width, height : float" in one entry; Sphinx would take the first for a type."""
+    return [(re.sub(r",\s+", ",", name), *rest) for name, *rest in CONSUME(self, parse_type, prefer_type, False)]
+
+
+def _spaced_names(app: Any, doctree: nodes.document) -> None:
+    """Set the space again that `_one_entry` took."""
+    for comma in [node for node in doctree.findall(addnodes.literal_strong) if node.astext() == ","]:
+        comma.replace_self(nodes.Text(", "))
 
 
 def setup(app: Any) -> dict[str, bool]:
     """Register with Sphinx."""
     setattr(NumpyDocstring, "_consume_inline_attribute", _whole_docstring)  # noqa: B010
-    setattr(NumpyDocstring, "_consume_fields", _each_name)  # noqa: B010
+    setattr(NumpyDocstring, "_consume_fields", _one_entry)  # noqa: B010
     next(field for field in PyObject.doc_field_types if field.name == "variable").label = "Attributes"
     app.connect("source-read", _read)
     app.connect("autodoc-process-docstring", _docstring)
     app.connect("autodoc-process-signature", _signature)
     app.connect("autodoc-skip-member", _skip)
     app.connect("doctree-read", _without_chance_links)
+    app.connect("doctree-read", _spaced_names)
     app.connect("doctree-resolved", _whole_numbers)
     app.connect("doctree-resolved", _long_cells)
     app.connect("doctree-resolved", _dotted_names)
