@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from fractions import Fraction as F
 
@@ -12,6 +13,8 @@ from graphsynth.jamming import Verdict
 from graphsynth.pipeline.runner import execute
 from graphsynth.pipeline.scene import OutputsTable, load_scene
 from graphsynth.pipeline.stages import Context
+from graphsynth.systems.lambda_linkage.model import LambdaLinkage
+from graphsynth.systems.lambda_linkage.space import beside_small_tilts
 from graphsynth.systems.lambda_linkage.stages import tolerance_box
 
 EXAMPLE = {  # theory/jam-arcs 7
@@ -69,3 +72,35 @@ def test_the_report_says_what_is_proved():
     assert "clearance [0.027, 0.033]" in tables["What is proved about the bearing"].note
     fits = {row[0]: row[2] for row in tables["Standard fits (ISO 286)"].rows}
     assert (fits["H7/g6"], fits["H11/b11"]) == ("every pair binds", "every pair is free")
+
+
+def compared(**changes):
+    """The table beside small tilts of the shipped scene with another tilt, as rows, note and what is said first."""
+    table = load_scene("lambda").mechanism
+    table = replace(table, tilt=replace(table.tilt, **changes))
+    tilt = table.tilt
+    linkage = LambdaLinkage(2, 1, 2.5, 2.5, alpha=tilt.alpha, axis=tilt.axis)
+    found, said = beside_small_tilts(table, linkage)
+    return found.rows, found.note, said
+
+
+@pytest.mark.parametrize("alpha", [1 / 30, 0.3])
+def test_the_scene_tells_exact_closure_beside_small_tilts(alpha):
+    (alone, shared), note, (finding,) = compared(alpha=alpha)
+    critical = 0.006064396559156420060266102798724801172486
+    exact, small = math.asin(0.4 * math.sin(alpha)), 0.4 * alpha
+    assert alone[1] == "90°" and alone[2:4] == (f"{exact / critical:.7g}", f"{small / critical:.7g}")
+    assert alone[4] == f"{100 * (small / exact - 1):+.2g} %"
+    assert "binds" in alone[-1] and "certified" in alone[-1] and "exact" in note
+    if alpha == 1 / 30:  # 1/60 by theory: three equal bearings at 90 degrees (first order)
+        assert (
+            shared[3] == f"{1 / 60 / critical:.7g}" and "2.7483" in finding.text and "binds (certified)" in finding.text
+        )
+
+
+def test_a_free_linkage_is_told_too_and_others_are_left_out():
+    (alone, shared), _, (finding,) = compared(alpha=0.01)
+    assert alone[-1] == shared[-1] == "free there (certified)" and "it closes (certified)" in finding.text
+    for changes in ({"axis": (1.0, 0.0, 0.1)}, {"alpha": 0.6}, {"alpha": 0.0}):
+        rows, note, said = compared(**changes)
+        assert rows == () and said == () and note.startswith("Only for")

@@ -25,7 +25,7 @@ from graphsynth.structure.graph import MechanismGraph
 ENUMERATOR = {"numpy", "numba", "llvmlite"}
 ALLOWED = {
     ("lambda", "solutions"): set(),
-    ("lambda", "records"): ENUMERATOR,
+    ("lambda", "records"): ENUMERATOR | {"flint"},  # of the proof with every loop closed in space
     ("lambda", "mechanism_pictures"): ENUMERATOR,
     ("didenko", "solutions"): set(),
     ("didenko", "graph_pictures"): ENUMERATOR,

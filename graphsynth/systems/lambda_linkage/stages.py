@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from graphsynth.pipeline.products import Attempt, Candidate, Finding, Quantity, Recognised, Record, Table, each
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.steps import recognise_by_key, records_of
+from graphsynth.systems.lambda_linkage.space import beside_small_tilts
 from graphsynth.systems.lambda_linkage.system import LambdaTable
 
 if TYPE_CHECKING:
@@ -111,8 +112,9 @@ def assess(
     motion = next(m.value for m in motions if m.candidate.number == done.candidate.number)
     proved = _proof_table(context, done.value, limits)
     findings = _findings(done.value[condition], limits[condition])
-    jam = replace(_binding_table(context, done.value, limits), findings=findings)
-    return records, (_motion_table(motion), jam, proved, _fit_table(context))
+    space, said = beside_small_tilts(context.scene.mechanism, motion.linkage)
+    jam = replace(_binding_table(context, done.value, limits), findings=(*findings, *said))
+    return records, (_motion_table(motion), jam, proved, space, _fit_table(context))
 
 
 def _findings(report: JammingReport, limits: Mapping[str, CertifiedLimit]) -> tuple[Finding, ...]:
