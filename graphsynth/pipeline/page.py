@@ -61,7 +61,12 @@ _PICTURES = STYLE + "".join(
 
 
 #: Headings of the galleries, in the order of the page; other products that are pictures follow under their names.
-_HEADINGS = {"animations": "In motion", "mechanism_pictures": "The mechanism", "plots": "Curves"}
+_HEADINGS = {
+    "animations": "In motion",
+    "mechanism_pictures": "The mechanism",
+    "plots": "Curves",
+    "binding_curves": "What binding costs",
+}
 
 _PAGE = """
 {%- macro grid(columns, rows) -%}

@@ -85,6 +85,19 @@ def test_coupled_joints_of_the_source():
     assert by(problem, "samples")[-1].error < 1e-3
 
 
+def test_the_torque_of_binding_has_errors_of_its_sampling():
+    from graphsynth.evidence.binding import binding_problem, exact_torque
+
+    f = np.linspace(0.0, np.pi, 100_001)
+    c = 0.03 * 0.1 / 0.25
+    assert exact_torque() == pytest.approx(
+        (900.0 * np.maximum(c * np.sin(f) - 0.006, 0.0) * c * np.cos(f)).max(), rel=1e-8
+    )
+    problem = binding_problem(QUICK)
+    assert all(row.good for row in problem.rows)
+    assert by(problem, "derivative of the energy")[-1].error < 1e-4
+
+
 @pytest.mark.slow
 def test_coupled_joints_of_another_linkage_have_proved_bounds():
     linkage = LambdaLinkage(2.2, 1.0, 2.4, 2.3)

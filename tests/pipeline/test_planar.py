@@ -129,6 +129,33 @@ def test_a_motor_has_one_characteristic(tmp_path: Path) -> None:
 BEARINGS = {"radius_mm": 17.5, "height_mm": 10, "clearance_mm": 0.03}
 
 
+def test_what_binding_costs_in_a_scene(tmp_path: Path) -> None:
+    from graphsynth.jamming import Bearing
+    from graphsynth.jamming.binding import ContactFriction, LinkSection
+
+    own = {"stiffness_Nm_per_rad": 900.0, "friction": 0.1, "young_GPa": 210, "width_mm": 10, "height": "0.004 m"}
+    given: dict[str, Any] = {"bearings": {**BEARINGS, "alpha_deg": 2.0}, "binding": own}
+    found = execute(scene(tmp_path, ["records"], **given))
+    motion = linkage().simulate(np.linspace(0.0, 2 * np.pi, 73))
+    friction = ContactFriction(0.1, 0.0175, 0.01)
+    bar = LinkSection.rectangular(2.1e11, 0.01, 0.004)
+    report = motion.binding(tilt="2 deg", joints=Bearing(17.5, 10, 0.03), stiffness=900.0, links=bar, friction=friction)
+    assert margins(found)["binding torque"] == pytest.approx(report.peak_torque, rel=1e-9)
+    assert margins(found)["binding loss"] == pytest.approx(report.loss, rel=1e-9)
+    assert "drive: binds (estimated)" in found["records"][0].verdict
+    weak = execute(scene(tmp_path, ["records"], **given | {"binding": {**own, "motor_Nm": 0.01}}))
+    assert weak["records"][0].good is False
+    assert "exceed the motor" in weak["records"][0].reason
+
+
+def test_binding_needs_bearings_and_a_whole_section(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"no \[mechanism.bearings\]"):
+        scene(tmp_path, ["records"], binding={"stiffness_Nm_per_rad": 900.0})
+    with pytest.raises(SceneError, match="young_GPa, width_mm and height_mm"):
+        bound = {"stiffness_Nm_per_rad": 900.0, "young_GPa": 210}
+        scene(tmp_path, ["records"], bearings={**BEARINGS, "alpha_deg": 2.0}, binding=bound)
+
+
 def test_bearings_against_the_coupled_assessment(tmp_path: Path) -> None:
     from graphsynth.jamming.joints import Misalignment, assess_coupled, bearing_limits
     from graphsynth.kinematics import simulate
@@ -386,5 +413,13 @@ def test_the_scene_of_the_how_to_uses_every_part(tmp_path: Path) -> None:
     }
     assert 1 <= len(report["records"]) <= 3 and {record.status for record in report["records"]} == {"assessed"}
     names = {margin.name for margin in report["records"][0].margins}
-    assert names >= {"tilt allowed", "largest torque", "mean speed with the motor", "transmission angle"}
+    assert names >= {
+        "tilt allowed",
+        "binding torque",
+        "largest torque",
+        "mean speed with the motor",
+        "transmission angle",
+    }
     assert len(report["animations"]) == len(report["plots"]) == min(2, len(report["records"]))
+    assert len(report["binding_curves"]) == len(report["plots"])
+    assert "wears first" in report["binding_curves"][0].caption or "free" in report["binding_curves"][0].caption

@@ -59,6 +59,10 @@ def rows_of(
 ) -> Rows:
     """Rows at poses (N, links, 3) with rates by the input; ``unit``: metres of the mechanism's unit of length."""
     layout, mechanism = given.layout, given.mechanism
+    if len(poses) == 0:
+        k = 3 * layout.loops
+        shapes = ((0, len(layout.limit), 2, k), (0, k), (0, k, k)) * 2
+        return Rows(*(np.zeros(shape) for shape in shapes))
     at = Places(*joint_places(mechanism, layout.joints, poses))
     by = _place_rates(mechanism, layout.joints, poses, rates)
     at, by = at._replace(r=unit * at.r), by._replace(r=unit * by.r)

@@ -123,16 +123,18 @@ def _report(
     motion: Motion, given: JointProblem, parts: _Parts, size: float, limit: float | None, begin: float
 ) -> BindingReport:
     """Solve all assembled samples and lay out what is found."""
-    keep = np.flatnonzero(motion.assembled & np.isfinite(motion.velocities).all(axis=(1, 2)))
+    keep = np.flatnonzero(motion.assembled)
     poses, rates = motion.poses[keep], motion.velocities[keep]
+    moving = np.isfinite(rates).all(axis=(1, 2))  # not in a dead-centre position, nor at a change point
+    rates = np.where(moving[:, None, None], rates, 0.0)
     loaded = _loaded(given, parts.springs, rows_of(given, parts.springs, parts.beams, poses, rates, size), size)
     rubbing, rate = parts.rubbing, driven_rate(motion, size)[keep]
     sliding = _sliding(given, rubbing, *joint_rates(motion.mechanism, poses, rates), size)
     rubs = np.abs(loaded.contact(given, rubbing)) * sliding
     coefficient = np.array([0.0 if own is None else own.coefficient for own in _of(given, rubbing)])
-    with np.errstate(all="ignore"):
-        elastic = np.where(loaded.least.stiff, math.inf, loaded.slope / rate)
-        losses = rubs @ coefficient / np.abs(rate)
+    known = np.where(moving & (rate != 0.0), rate, math.nan)
+    elastic, losses = loaded.slope / known, rubs @ coefficient / np.abs(known)
+    elastic[loaded.least.stiff] = math.inf
     # the columns of the report, NaN where the mechanism is not assembled
     columns = {
         "energy": loaded.least.energy,
@@ -154,7 +156,7 @@ def _report(
         unit=size,
         limits=given.limits,
         misalignments=given.misalignments,
-        notes=_notes(motion, given, keep, loaded),
+        notes=_notes(motion, given, known, loaded),
         seconds=perf_counter() - begin,
     )
 
@@ -260,15 +262,17 @@ def _wear(
     return tuple(sorted(found, key=lambda row: (-np.nan_to_num(row.wear, nan=-1.0), -row.moment)))
 
 
-def _notes(motion: Motion, given: JointProblem, keep: NDArray[np.intp], loaded: _Loaded) -> tuple[str, ...]:
+def _notes(motion: Motion, given: JointProblem, known: Array, loaded: _Loaded) -> tuple[str, ...]:
     notes = []
     if given.layout.loops == 0:
         notes.append("no closed loop of guided joints: nothing can bind")
-    if missing := len(motion.inputs) - len(keep):
-        notes.append(f"{missing} samples are not assembled, or at rest at a dead centre: {motion.reason or 'left out'}")
-    largest = float(np.nanmax(np.where(loaded.moment.any(), loaded.tilt, 0.0), initial=0.0))
+    if missing := len(motion.inputs) - len(known):
+        notes.append(f"{missing} samples are not assembled: {motion.reason}")
+    if still := int(np.isnan(known).sum()):
+        notes.append(f"the torque is not known at {still} samples, in dead-centre positions or at change points")
+    largest = max(float(np.nanmax(loaded.tilt, initial=0.0)), *(abs(own.alpha) for own in given.misalignments), 0.0)
     if largest > _SMALL:
-        notes.append(f"a joint tilts by {largest:.3g} rad: small tilts are a rough model there")
+        notes.append(f"tilts of {largest:.3g} rad: small tilts are a rough model there, errors {largest**2:.1g}")
     worst = float(loaded.least.error.max(initial=0.0))
     if worst > 1e-5:
         notes.append(f"the loads are known to {worst:.1e} of those without clearance only")

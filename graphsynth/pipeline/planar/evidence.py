@@ -54,6 +54,14 @@ def coupled_joints(context: Any, effort: Effort) -> Problem:
     )
 
 
+def binding(context: Any, effort: Effort) -> Problem:
+    """Measure the torque that binding costs."""
+    from graphsynth.evidence.binding import binding_problem
+
+    problem = binding_problem(effort)
+    return replace(problem, note=f"Not a mechanism of the scene, but one with a closed form. {problem.note}")
+
+
 def linkage_dynamics(context: Any, effort: Effort) -> Problem:
     """Measure a mechanism of the scene with its loads, free to move from the speed of the scene."""
     from graphsynth.dynamics.start import consistent_start

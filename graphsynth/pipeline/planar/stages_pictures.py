@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _FRAMES = 72
 
 
-def _best(context: Context, written: tuple[Outcome, ...], ranking: Ranking) -> list[tuple[int, Motion]]:
+def best_motions(context: Context, written: tuple[Outcome, ...], ranking: Ranking) -> list[tuple[int, Motion]]:
     """Return number and motion of the best candidates, the best first."""
     import numpy as np
 
@@ -38,7 +38,7 @@ def sketches(
 
     by_number = {record.number: record for record in records}
     pictures = []
-    for place, (number, motion) in enumerate(_best(context, written, ranking), 1):
+    for place, (number, motion) in enumerate(best_motions(context, written, ranking), 1):
         # the sample in which the nearest two joints of different links are farthest apart
         joints = np.stack([motion.point(j.a, j.at_a).position for j in motion.mechanism.joints], axis=1)
         apart = np.linalg.norm(joints[:, :, None] - joints[:, None], axis=-1) + 1e9 * np.eye(joints.shape[1])
@@ -59,7 +59,7 @@ def animations(
     from graphsynth.drawing.frames import with_trace_points
 
     pictures = []
-    for place, (number, motion) in enumerate(_best(context, written, ranking), 1):
+    for place, (number, motion) in enumerate(best_motions(context, written, ranking), 1):
         title = f"Place {place}: candidate {number}"
         traced = with_trace_points(motion)
         svg = animated_svg(traced, frames=_FRAMES, title=title, seconds=4.0, width=420.0, height=320.0)
@@ -72,7 +72,7 @@ def plots(context: Context, written: tuple[Outcome, ...], ranking: Ranking) -> t
     from graphsynth.drawing.motion_charts import coupler_curves, margin_chart
 
     pictures = []
-    for place, (number, motion) in enumerate(_best(context, written, ranking), 1):
+    for place, (number, motion) in enumerate(best_motions(context, written, ranking), 1):
         named = bool(motion.mechanism.points)
         chart = coupler_curves(motion) if named else margin_chart(motion)
         what = "path of the point" if named else "margins of the groups: 0 where two assembly modes meet"

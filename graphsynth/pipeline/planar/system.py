@@ -25,6 +25,9 @@ def _more(scene: Any) -> tuple[Stage, ...]:
     if table.bearings is not None:
         stages.append(Stage("jamming", f"{_HERE}.stages:jamming", ("moved",), ("jammed",), each=True, cost=2.0))
         parts.append("jammed")
+    if table.binding is not None:
+        stages.append(Stage("binding", f"{_HERE}.binding:binding", ("moved",), ("bound",), each=True))
+        parts.append("bound")
     if table.loads is not None:
         stages.append(Stage("dynamics", f"{_HERE}.stages:dynamics", ("moved",), ("driven",), each=True, cost=3.0))
         parts.append("driven")
@@ -36,6 +39,8 @@ def _more(scene: Any) -> tuple[Stage, ...]:
             Stage("animate best", f"{_HERE}.stages_pictures:animations", (*best, "records"), ("animations",)),
             Stage("plot best", f"{_HERE}.stages_pictures:plots", best, ("plots",)),
         ]
+        if table.binding is not None:
+            stages.append(Stage("plot binding", f"{_HERE}.binding:curves", best, ("binding_curves",)))
     return tuple(stages)
 
 
@@ -51,6 +56,12 @@ SYSTEM = System(
     ),
     more=_more,
     evidence=plans(
-        f"{_HERE}.evidence", "positions", "coupled-joints", "linkage-dynamics", "dimensions", "path-dimensions"
+        f"{_HERE}.evidence",
+        "positions",
+        "coupled-joints",
+        "binding",
+        "linkage-dynamics",
+        "dimensions",
+        "path-dimensions",
     ),
 )

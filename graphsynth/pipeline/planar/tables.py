@@ -155,6 +155,22 @@ class BearingsTable:
 
 
 @dataclass(frozen=True, slots=True)
+class BindingTable:
+    """What gives way where the bearings bind: their stiffness, links as bars (height across the plane); friction."""
+
+    stiffness: Annotated[float, In("N m/rad", above=0)]
+    friction: Annotated[float, In(least=0)] = 0.0
+    motor: Annotated[float | None, In("Nm", above=0)] = None
+    young: Annotated[float | None, In("GPa", above=0)] = None
+    width: Annotated[float | None, In("mm", above=0)] = None
+    height: Annotated[float | None, In("mm", above=0)] = None
+
+    def __post_init__(self) -> None:
+        bar = [value is None for value in (self.young, self.width, self.height)]
+        require(all(bar) or not any(bar), "needs young_GPa, width_mm and height_mm of the links, or none of them")
+
+
+@dataclass(frozen=True, slots=True)
 class DirectCurrentTable:
     """A direct-current motor with voltage ``gain`` times what its speed lacks; one constant for torque and back-emf."""
 
@@ -206,6 +222,7 @@ class PlanarTable:
     embody: EmbodyTable = field(default_factory=EmbodyTable)
     motion: MotionTable = field(default_factory=MotionTable)
     bearings: BearingsTable | None = None
+    binding: BindingTable | None = None
     loads: LoadsTable | None = None
     pictures: Annotated[int, In(least=1)] = 10
 
@@ -214,3 +231,9 @@ class PlanarTable:
             bool(self.files) or self.crank is not None or self.loads is None,
             "has [mechanism.loads] but no crank_mm; masses need the size of the mechanism: give it",
         )
+        if self.binding is not None:
+            require(
+                self.bearings is not None, "has [mechanism.binding] but no [mechanism.bearings], which bind; give it"
+            )
+            sized = bool(self.files) or self.crank is not None
+            require(sized, "has [mechanism.binding] but no crank_mm; a torque needs the size of the mechanism: give it")

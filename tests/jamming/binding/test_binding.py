@@ -225,6 +225,25 @@ def test_what_cannot_give_way_blocks() -> None:
     assert "neither clearance nor compliance" in report.statement
 
 
+def test_singular_positions_are_told() -> None:
+    """At a change point the torque is not known, and where nothing is assembled nothing is."""
+    flat = gs.Mechanism.four_bar(0.2, 0.1, 0.2, 0.1).simulate(np.linspace(0.0, math.tau, 9))
+    report = flat.binding(tilt=0.02, joints=0.001, stiffness=1e6)
+    assert np.isnan(report.torque[0])
+    assert np.isfinite(report.energy[:4]).all()
+    assert np.isfinite(report.torque[1:4]).all()
+    assert any("change points" in note for note in report.notes)
+    assert any("not assembled" in note for note in report.notes)
+    apart = gs.Mechanism.four_bar(0.3, 0.2, 0.15, 0.3).simulate([0.0])
+    assert not apart.assembled.any()
+    nothing = apart.binding(tilt=0.02, joints=0.001, stiffness=1e6)
+    assert nothing.answer == "not assembled"
+    assert math.isnan(nothing.peak_torque)
+    assert "assembled" in repr(nothing)
+    steep = LAMBDA.binding(tilt=0.3, joints=0.0, stiffness=1e6)
+    assert any("rough model" in note for note in steep.notes)
+
+
 def test_stiffness_over_nine_decades() -> None:
     """Energy and torque grow with the stiffness, whatever its size."""
     base = LAMBDA.binding(tilt=0.03, joints=0.006, stiffness=1.0)
