@@ -52,7 +52,7 @@ def binding_problem(effort: Effort | None = None) -> Problem:
     for name, method in (("derivative of the energy", derivative), ("differences of the energy", differences)):
         for count in effort.some((36, 120, 360, 1440)):
             found, *timed = best_of(partial(method, count), effort, warm=count == 36)
-            own = {"reference": reference, "default": method is derivative and count == 360}
+            own: Any = {"reference": reference, "default": method is derivative and count == 360}
             rows.append(Row.of(name, f"{count} positions", abs(found / exact - 1.0), timed, **own))
     note = "Both miss the peak between the samples; the derivative itself is exact to 1e-9."
     question = "Largest torque over the turn that a tilted motor axis costs a lambda linkage"

@@ -125,7 +125,7 @@ def _report(
     """Solve all assembled samples and lay out what is found."""
     keep = np.flatnonzero(motion.assembled)
     poses, rates = motion.poses[keep], motion.velocities[keep]
-    moving = np.isfinite(rates).all(axis=(1, 2))  # not in a dead-centre position, nor at a change point
+    moving = np.asarray(np.isfinite(rates).all(axis=(1, 2)))  # not in a dead-centre position, nor at a change point
     rates = np.where(moving[:, None, None], rates, 0.0)
     loaded = _loaded(given, parts.springs, rows_of(given, parts.springs, parts.beams, poses, rates, size), size)
     rubbing, rate = parts.rubbing, driven_rate(motion, size)[keep]
