@@ -187,8 +187,9 @@ def coordinates(bodies: Bodies, q: Array) -> Array:
 def multipliers(bodies: Bodies, found: Optimum) -> Multipliers | None:
     """Multipliers of the bodies from an optimum of the joints; any are valid, these make L stationary (estimated)."""
     model = bodies.model
-    top = float(found.weight.max(initial=0.0))
-    if not top > 0.0 or not math.isfinite(found.scale):
+    if not math.isfinite(found.scale):
+        return _apart(bodies, found)
+    if not found.weight.max(initial=0.0) > 0.0:
         return None
     u = coordinates(bodies, found.q)
     here = at(bodies, exact(u[None]))
@@ -208,6 +209,21 @@ def multipliers(bodies: Bodies, found: Optimum) -> Multipliers | None:
     A = np.concatenate([here.J.mid[0], E])[:, : bodies.size]
     by = -np.linalg.lstsq(A.T, slope[: bodies.size], rcond=1e-10)[0]
     return proof._replace(by=by[: 3 * count], spin=by[3 * count :])
+
+
+def _apart(bodies: Bodies, found: Optimum) -> Multipliers | None:
+    """Multipliers where no factor is enough: V where it is least, whose derivative vanishes (estimated)."""
+    u = coordinates(bodies, found.q)
+    for _ in range(20):
+        here = at(bodies, exact(u[None]))
+        step = np.linalg.lstsq(here.J.mid[0][:, : bodies.size], here.V.mid[0], rcond=1e-6)[0]
+        u[: bodies.size] -= step * min(1.0, 0.1 / max(float(np.abs(step).max(initial=0.0)), 1e-300))
+    by = at(bodies, exact(u[None])).V.mid[0]
+    size = float(np.linalg.norm(by))
+    if not size > 0.0:
+        return None
+    scalars = np.zeros(len(bodies.conditions[1]) // 2)
+    return Multipliers(u, by / size, np.zeros((len(by), bodies.width)), scalars, np.zeros(len(bodies.model.bounds)))
 
 
 def body_box(bodies: Bodies, reach: float, given: Array) -> Box | None:

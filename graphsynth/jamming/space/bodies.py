@@ -405,9 +405,9 @@ def chart_of(x: Balls, y: Balls) -> list[Balls]:
 
 
 def stands_apart(model: SpaceModel) -> bool:
-    """Whether `Bodies` describes a model: no guides, all axes along z but for misalignments below a radian."""
+    """Whether `Bodies` describes a model: no guides, all axes along z but for misalignments below 1.5 rad."""
     turns = [seat.turn for joint in model.joints for seat in (joint.seat_a, joint.seat_b)]
-    level = all(turn[0] == turn[1] == 0.0 or (turn[2] == 0.0 and math.hypot(*turn) < 1.0) for turn in turns)
+    level = all(turn[0] == turn[1] == 0.0 or (turn[2] == 0.0 and math.hypot(*turn) < 1.5) for turn in turns)
     return level and not any(joint.guide for joint in model.joints)
 
 

@@ -55,6 +55,13 @@ def coupled_joints(context: Any, effort: Effort) -> Problem:
     return lambda_problem(replace(linkage, alpha=0.0), bearing, math.atan2(y, x), table.bearing.condition, effort)
 
 
+def exact_closure(context: Any, effort: Effort) -> Problem:
+    """Measure the tilt of the bearing at B with every loop closed in space."""
+    from graphsynth.evidence.space import space_problem
+
+    return space_problem(_box(context).nominal()[0], effort=effort)
+
+
 def positions(context: Any, effort: Effort) -> Problem:
     """Measure the planar linkage over a rotation, by closed form, engine and proof."""
     from graphsynth.evidence.position import four_bar, position_problem

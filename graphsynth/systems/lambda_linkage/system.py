@@ -52,5 +52,14 @@ SYSTEM = System(
         Stage("animate", f"{_HERE}.pictures:animations", ("motions", "assessments"), ("animations",)),
         Stage("plot", f"{_HERE}.pictures:plots", ("motions", "assessments"), ("plots",)),
     ),
-    evidence=plans(f"{_HERE}.evidence", "crossing", "areas", "arc-ends", "coupled-joints", "positions", "dimensions"),
+    evidence=plans(
+        f"{_HERE}.evidence",
+        "crossing",
+        "areas",
+        "arc-ends",
+        "coupled-joints",
+        "exact-closure",
+        "positions",
+        "dimensions",
+    ),
 )
