@@ -171,7 +171,7 @@ def repeated_public_names() -> Iterator[str]:
 
 
 #: Folders of modules with a line of their own in the budget, beside the systems.
-FOLDERS = {"jamming/binding", "jamming/chance", "jamming/margins", "jamming/space"}
+FOLDERS = {"jamming/assembly", "jamming/binding", "jamming/chance", "jamming/margins", "jamming/space"}
 
 
 def sizes() -> dict[str, tuple[int, int]]:

@@ -11,11 +11,11 @@ from graphsynth import Driver, Mechanism, MechanismGraph, Prismatic, Revolute, a
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval
 from graphsynth.jamming import Bearing, Fit
+from graphsynth.jamming.assembly.positions import Positions
+from graphsynth.jamming.assembly.tubes import prove_tubes, slopes
 from graphsynth.jamming.joints import JointLimits, Misalignment, assess_coupled, certify_coupled, largest_scale
 from graphsynth.jamming.joints.closure import joint_places
 from graphsynth.jamming.joints.drawing import drawn, fit_limits
-from graphsynth.jamming.joints.positions import Positions
-from graphsynth.jamming.joints.tubes import prove_tubes, slopes
 from graphsynth.tolerances import (
     AxisAngle,
     EndFloat,
@@ -54,6 +54,16 @@ def shifted(mechanism, offsets, turn=0.0):
 def slider_crank():
     graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     joints = [Revolute(0, 1), Revolute(1, 2, (1, 0)), Revolute(2, 3, (3, 0)), Prismatic(0, 3, (0, 0.3))]
+    return Mechanism(graph, joints, [Driver(0, 1)])
+
+
+def rocker_slider():
+    """A four-bar whose rocker pushes a slider: a dyad, then unknowns."""
+    graph = MechanismGraph(6, [(0, 1), (1, 2), (2, 3), (0, 3), (3, 4), (4, 5), (0, 5)], frame=0)
+    joints = [
+        *(Revolute(j.a, j.b, j.at_a, j.at_b) for j in LAMBDA.joints), Revolute(3, 4, (1.0, 0.7)),
+        Revolute(4, 5, (3.0, 0.0)), Prismatic(0, 5, (0.0, -0.5)),
+    ]  # fmt: skip
     return Mechanism(graph, joints, [Driver(0, 1)])
 
 
@@ -99,8 +109,12 @@ def test_lengths_of_a_link_are_chained_from_their_datum():
     assert member.joint(1, 3).at_a == pytest.approx((0.9, 2.05))  # moves with its datum
 
 
-@pytest.mark.parametrize("make", [lambda: LAMBDA, slider_crank], ids=["lambda", "slider"])
-def test_tubes_hold_the_motion_of_every_member(make):
+@pytest.mark.parametrize(
+    ("make", "closed"),
+    [(lambda: LAMBDA, 0), (lambda: LAMBDA, 1), (slider_crank, 1), (rocker_slider, 1)],
+    ids=["lambda", "dyad", "slider", "rocker"],
+)
+def test_tubes_hold_the_motion_of_every_member(make, closed):
     """Wide boxes of lengths, a hole and a temperature: random members and inputs lie inside, and their rates too."""
     mechanism = make()
     rng = np.random.default_rng(3)
@@ -109,16 +123,18 @@ def test_tubes_hold_the_motion_of_every_member(make):
         ThermalExpansion(-50.0, 100.0, {0: 1e-5, 1: 1e-4, 2: 2e-5}),
     ]  # fmt: skip
     box = parameter_box(mechanism, given)
-    system, joints = Positions(mechanism, box), tuple(range(len(mechanism.joints)))
     edges = np.linspace(0.3, 2.8, 41)
     u = Interval.from_bounds(edges[:-1], edges[1:])
-    motion = simulate(mechanism, u.mid)
+    motion, joints = simulate(mechanism, u.mid), tuple(range(len(mechanism.joints)))
+    system = Positions(mechanism, box, motion.poses[0] if closed else None)
+    assert len(system.dyads) == (closed and make is not slider_crank)
+    assert (system.size == 0) == (closed and len(mechanism.joints) == 4 and make is not slider_crank)
     counted = system.count(motion.poses)
     x = system.coordinates(motion.poses, motion.velocities)[0]
     tubes = prove_tubes(system, joints, u, x, counted)
     assert tubes.proved.all()
     r_rate, *_, fine = slopes(system, joints, u, tubes, counted)
-    assert fine.all() and r_rate.shape == (1 + box.size, 40, 4, 2)
+    assert fine.all() and r_rate.shape == (1 + box.size, 40, len(joints), 2)
     step = 1e-6
     for _ in range(6):
         p = rng.uniform(box.low, box.high)
@@ -180,6 +196,44 @@ def test_every_length_of_the_lambda_linkage_within_one_percent():
     tilt = replace(TILT, alpha=1.05e-3 * scale, alpha_range=None)
     binds = certify_coupled(motion, LIMITS, tilt, tolerances=lengths(0.01), resolution=1e-2, max_pieces=3000)
     assert binds.verdict.is_jammed and not binds.verdict.is_free
+
+
+def turning(rng, width):
+    """A random four-bar whose driven link turns fully for every member, with its lengths and a tilt."""
+    while True:
+        sizes = rng.uniform(0.2, 1.0, 4)
+        short, *middle, long = np.sort(sizes)
+        if sizes.argmin() in (0, 1) and (1.0 + width) * (short + long) < (1.0 - width) * sum(middle):
+            break
+    ends = {0: (1, 3), 1: (0, 2), 2: (1, 3), 3: (0, 2)}
+    given = [LengthTolerance(link, ends[link], width * sizes[link]) for link in range(4)]
+    return Mechanism.four_bar(*sizes), given, Misalignment(0, 1, 1e-3, rng.uniform(0.0, 6.28))
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 10))])
+def test_three_percent_on_every_length_is_decided(seed):
+    """Free at 80 % of what the worst of all corners allows, up to members that are nearly stretched."""
+    mechanism, given, tilt = turning(np.random.default_rng([15, seed]), 0.03)
+    scale = worst_scale(mechanism, parameter_box(mechanism, given), tilt=tilt, count=61)
+    tilt = replace(tilt, alpha=0.8e-3 * scale, alpha_range=None)
+    found = certify_coupled(simulate(mechanism, TURN), LIMITS, tilt, tolerances=given, seconds=60.0)
+    assert found.verdict.name == "CERTIFIED_FREE" and found.one_branch and found.decided == 1.0
+
+
+def test_a_dyad_that_some_member_cannot_close_is_not_proved():
+    """Crank and frame in line: coupler and rocker reach for the nominal mechanism, not for the shortest of both."""
+    mechanism = Mechanism.four_bar(2, 1, 1.6, 1.45)
+    motion = simulate(mechanism, [3.1, 3.2])
+    u = Interval.from_bounds(np.array([3.1]), np.array([3.2]))
+    for plus, proved in ((0.01, True), (0.04, False)):
+        box = parameter_box(mechanism, [LengthTolerance(2, (1, 3), plus), LengthTolerance(3, (0, 2), plus)])
+        system = Positions(mechanism, box, motion.poses[0])
+        x, counted = np.zeros((1, 0)), system.count(motion.poses[:1])
+        tubes = prove_tubes(system, (0, 1, 2, 3), u, x, counted)
+        assert tubes.proved[0] == proved and (float(tubes.rooms.lo[0, 0]) > 0.0) == proved
+        for a, b in itertools.product((-plus, plus), repeat=2):  # room of the triangle with sides 3, 1.6 + a, 1.45 + b
+            share = 0.5 + ((1.6 + a) ** 2 - (1.45 + b) ** 2) / 18.0
+            assert tubes.rooms[0, 0].contains((1.6 + a) ** 2 / 9.0 - share**2)
 
 
 @pytest.mark.slow

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
-from graphsynth.jamming.joints.positions import points
-from graphsynth.jamming.joints.tubes import prove_tubes
+from graphsynth.jamming.assembly.positions import points
+from graphsynth.jamming.assembly.tubes import prove_tubes
 
 if TYPE_CHECKING:
+    from graphsynth.jamming.assembly.tubes import Tubes
     from graphsynth.jamming.joints.pieces import Found, Work
-    from graphsynth.jamming.joints.tubes import Tubes
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -38,7 +38,7 @@ class Branch(NamedTuple):
 
 def of_the_motion(work: Work, pieces: Found) -> Branch:
     """Tell which pieces are proved to hold the branch of the motion (certified)."""
-    if work.system.size == 0:
+    if work.system.size == 0 and not work.system.dyads:
         return Branch(pieces.proved.copy(), bool(pieces.proved.all()))
     count = len(pieces.lo)
     first, second = _neighbours(pieces)
@@ -95,6 +95,8 @@ def _same(work: Work, pieces: Found, first: Rows, second: Rows) -> Mask:
     high = np.minimum(pieces.hi[first], pieces.hi[second])
     p_low = np.maximum(pieces.p_lo[first], pieces.p_lo[second])
     p_high = np.minimum(pieces.p_hi[first], pieces.p_hi[second])
+    if work.system.size == 0:  # of dyads alone, on their sides there is one
+        return np.ones(len(first), dtype=np.bool_)
     at = work.assemblies(0.5 * (low + high), np.clip(0.5 * (p_low + p_high), p_low, p_high))
     return np.asarray(at.proved & _inside(at, pieces, first) & _inside(at, pieces, second))
 
@@ -126,4 +128,4 @@ def _with_samples(work: Work, pieces: Found) -> Rows:
     x = work.system.coordinates(poses, np.zeros_like(poses))[0]
     at, none = work.motion.inputs[samples], np.zeros((len(samples), work.box.size))
     own = prove_tubes(work.system, (), points(at), x, work.system.count(poses), points(none))
-    return rows[own.proved & _inside(own, pieces, rows)]
+    return rows[own.proved & work.system.follows(poses) & _inside(own, pieces, rows)]

@@ -2,7 +2,7 @@
 
 A piece is free if the tilts found at its middle can be corrected to close every loop, inside the limits, for every
 input, position and tolerance in it; it binds if the wrenches found at its middle prove so for all of them.  The
-positions are proved by `graphsynth.jamming.joints.positions`.  The search is that of the small-tilt model L1; the
+positions are proved by `graphsynth.jamming.assembly.positions`.  The search is that of the small-tilt model L1; the
 verdict counts only pieces for which the terms of second order, which that model neglects, are proved not to change it.
 """
 
@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals.reading import shortened
+from graphsynth.jamming.assembly.positions import Unsupported
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.branch import of_the_motion
 from graphsynth.jamming.joints.drawing import Tolerances, drawn
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.pieces import Found, Work, check_range
-from graphsynth.jamming.joints.positions import Unsupported
 from graphsynth.jamming.joints.program import Bearings, problem
 from graphsynth.jamming.joints.search import Budget, MemberWitness, jamming_member, search
 from graphsynth.jamming.verdict import Verdict

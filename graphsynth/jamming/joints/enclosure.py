@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals import Dual, Interval
+from graphsynth.jamming.assembly.positions import enclosed_solve, points
 from graphsynth.jamming.joints.closure import PITCH, ROLL, ROUND, Columns, Layout, by_joint, closure_sums, moment_rows
-from graphsynth.jamming.joints.positions import enclosed_solve, points
 from graphsynth.jamming.joints.program import PoseSolution, Units
 
 if TYPE_CHECKING:

@@ -24,14 +24,14 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals import Dual, Interval, variables
 from graphsynth.intervals.dual import jacobian_of
+from graphsynth.jamming.assembly.positions import PLANE, Moved, Positions, enclosed_solve
 from graphsynth.jamming.joints.closure import ROUND, Layout
 from graphsynth.jamming.joints.limits import bounds
-from graphsynth.jamming.joints.positions import PLANE, Moved, Positions, enclosed_solve
 from graphsynth.mechanism.equations import Pair
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 
 if TYPE_CHECKING:
-    from graphsynth.jamming.joints.tubes import Tubes
+    from graphsynth.jamming.assembly.tubes import Tubes
 
 
 Array = NDArray[np.float64]
@@ -84,7 +84,7 @@ def neglected(
     ``assumed`` (N, blocks) are tilts below which a proof of freedom will keep all blocks, so that their limits need not
     be looked at; infinity for a proof of binding.
     """
-    count = len(tubes.r)
+    count, system = len(tubes.r), system.about(tubes.rooms)
     blocks = np.minimum(layout.limit_range[1], assumed)
     angles = _angles(system, layout, blocks)
     small: Mask = np.asarray((angles.link < LARGEST).all(axis=1) & (angles.joint < LARGEST).all(axis=1))
@@ -213,6 +213,9 @@ def _movements(
     amounts = np.concatenate([offset, offset, twist], axis=1)
     width, q = n + amounts.shape[1], system.driven(u)
     around = Interval.from_bounds(-amounts, amounts)
+    # rooms of dyads do not depend on the unknowns
+    steps = np.concatenate([np.zeros((count, n)), amounts], axis=1).T
+    system = system.about(tubes.rooms, Interval.from_bounds(-steps, steps))
 
     def rates(x: Interval) -> tuple[list[Any], Interval, Mask]:
         """Unknowns with derivatives over a box, and how far its assembly moves."""
@@ -231,6 +234,8 @@ def _movements(
             sound = np.asarray(fine & (rate.mag < reach).all(axis=1))
         change = _beside(rate, around)
         at = system.place(unknowns[:n], q, _moved(unknowns[n:]))
+        for room in at.rooms:
+            sound &= room.value.lo > 0.0
 
         def size(value: Any) -> Array:
             if not isinstance(value, Dual):

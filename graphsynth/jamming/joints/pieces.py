@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval, check_rounding
+from graphsynth.jamming.assembly.positions import Positions, points
+from graphsynth.jamming.assembly.tubes import Tubes, columns_of, middles, prove_tubes, slopes, whole_box
 from graphsynth.jamming.joints.closure import Layout, shifts, shifts_enclosed
 from graphsynth.jamming.joints.enclosure import Moving, Pieces, Rule, factor_range, lower_bounds, rule_of, upper_bounds
 from graphsynth.jamming.joints.exact import Neglected, neglected
 from graphsynth.jamming.joints.limits import Misalignment, bounds
-from graphsynth.jamming.joints.positions import Positions, points
 from graphsynth.jamming.joints.program import JointProblem, PoseSolution, check_motion, solve_poses
-from graphsynth.jamming.joints.tubes import Tubes, columns_of, middles, prove_tubes, slopes, whole_box
 from graphsynth.tolerances.box import ParameterBox
 
 if TYPE_CHECKING:
@@ -93,6 +93,8 @@ Mask = NDArray[np.bool_]
 FIRST, FEWEST, PARTS = 128, 16, 4
 #: In a proof of freedom a joint may tilt so much more than the tilt found, in its own share and that of the largest.
 _ROOM, _SHARE, _LEAST = 1.25, 0.25, 1e-4
+#: Largest over smallest factor of a piece up to which its estimated range is believed.
+_SMALL = 1.35
 #: Layout, pieces and solution that a bound starts from.
 _Bound: TypeAlias = tuple[Layout, Pieces, PoseSolution]
 
@@ -135,8 +137,11 @@ class Found(NamedTuple):
 
     @property
     def mixed(self) -> Mask:
-        """Whether some members seem to bind and some do not (estimated): no cut proves them all alike."""
-        return np.asarray((self.least < 1.0) & (self.most > 1.0))
+        """Whether some members seem to bind and some do not (estimated): no cut proves them all alike.
+
+        Told only of pieces so small that a range to first order means something.
+        """
+        return np.asarray((self.least < 1.0) & (self.most > 1.0) & (self.most < _SMALL * self.least))
 
     @staticmethod
     def join(parts: list[Found]) -> Found:
@@ -191,13 +196,13 @@ class Work:
         self, given: JointProblem, motion: Motion, tolerance: float | ParameterBox, exact: bool = True
     ) -> None:
         self.given, self.motion, self.exact = given, motion, exact
-        self.system = Positions(motion.mechanism, tolerance)
-        self.box = self.system.box
-        self.corners = corner_layouts(given.layout)
         keep = np.flatnonzero(motion.assembled)
         ends = motion.inputs[keep]
         self.low, self.high = float(ends.min()), float(ends.max())
         self.start = motion.poses[keep[int(np.argmin(ends))]]
+        self.system = Positions(motion.mechanism, tolerance, self.start)
+        self.box = self.system.box
+        self.corners = corner_layouts(given.layout)
         self.evaluated = 0
 
     def first(self) -> tuple[Array, Array]:
@@ -215,6 +220,15 @@ class Work:
         fine = found.assembled[at] & np.isfinite(found.velocities[at]).all(axis=(1, 2))
         return fine, found.poses[at], found.velocities[at]
 
+    def _near(self, inputs: Array) -> tuple[NDArray[np.intp], Array, Array]:
+        """Return inputs at which the motion is assembled, the unknowns there, and what is counted (estimated)."""
+        if self.system.size == 0:
+            none = np.zeros((len(inputs), 0))
+            return np.arange(len(inputs)), none, np.zeros((len(inputs), len(self.system.closing)))
+        fine, poses, velocities = self._follow(inputs)
+        keep = np.flatnonzero(fine & self.system.follows(poses))
+        return keep, self.system.coordinates(poses[keep], velocities[keep])[0], self.system.count(poses[keep])
+
     def whole(self, count: int) -> Interval:
         """Return the whole box of parameters for N pieces."""
         return whole_box(self.system, count)
@@ -226,12 +240,9 @@ class Work:
         p = self.whole(count) if parameters is None else parameters
         u, found = Interval.from_bounds(lo, hi), Found.open(lo, hi, p, self.system.size)
         found = Found._make(np.array(part) for part in found)
-        fine, poses, velocities = self._follow(u.mid)
-        keep = np.flatnonzero(fine)
+        keep, x, counted = self._near(u.mid)
         if keep.size == 0:
             return found
-        x = self.system.coordinates(poses[keep], velocities[keep])[0]
-        counted = self.system.count(poses[keep])
         tubes = prove_tubes(self.system, self.given.layout.joints, u[keep], x, counted, p[keep])
         found.proved[keep], found.reach[keep] = tubes.proved, tubes.reach
         found.box_lo[keep], found.box_hi[keep] = tubes.domain.lo, tubes.domain.hi

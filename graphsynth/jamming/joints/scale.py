@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import finite
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval
+from graphsynth.jamming.assembly.positions import Unsupported
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.branch import of_the_motion
 from graphsynth.jamming.joints.drawing import Tolerances, drawn
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.pieces import PARTS, Found, Work, check_range, cut
-from graphsynth.jamming.joints.positions import Unsupported
 from graphsynth.jamming.joints.program import Bearings, check_motion, problem
 from graphsynth.jamming.joints.search import Budget
 

@@ -33,7 +33,7 @@ _PEAKS = 4
 _FEW = 8
 #: So many times the parameters of a piece are halved at most; with members of both kinds; what a cut of the input is
 #: worth beside that of a parameter, for it makes more pieces but is needed anyway.
-_CUTS, _MIXED_CUTS, _INPUT = 12, 4, 0.5
+_CUTS, _MIXED_CUTS, _INPUT = 24, 4, 0.5
 
 
 class Budget(NamedTuple):

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals import Dual, Interval
-from graphsynth.jamming.joints.closure import PITCH, ROLL, ROUND, Layout
-from graphsynth.jamming.joints.enclosure import Columns, _without_forbidden
-from graphsynth.jamming.joints.positions import enclosed_solve, points
+from graphsynth.jamming.assembly.positions import enclosed_solve, points
+from graphsynth.jamming.joints.closure import PITCH, ROLL, ROUND, Columns, Layout
+from graphsynth.jamming.joints.enclosure import _without_forbidden
 from graphsynth.jamming.margins.program import Items, Sharing, closure, share, ways
 from graphsynth.jamming.margins.quantities import Quantities, Values
 from graphsynth.jamming.margins.stations import Places

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals import Interval
-from graphsynth.jamming.joints.closure import PITCH, ROUND, Layout, moment_rows, work_row
+from graphsynth.jamming.joints.closure import PITCH, ROUND, Columns, Layout, moment_rows, work_row
 from graphsynth.jamming.joints.cones import solve_cones
-from graphsynth.jamming.joints.enclosure import Columns
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals import Interval
-from graphsynth.jamming.joints.positions import points
-from graphsynth.jamming.joints.tubes import prove_tubes, slopes
+from graphsynth.jamming.assembly.positions import points
+from graphsynth.jamming.assembly.tubes import prove_tubes, slopes
 from graphsynth.jamming.margins.program import item_rows, share
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval
+from graphsynth.jamming.assembly.positions import Unsupported, points
+from graphsynth.jamming.assembly.tubes import Tubes, joined, prove_tubes, settled, slopes
 from graphsynth.jamming.joints.branch import of_the_motion
 from graphsynth.jamming.joints.pieces import PARTS, Found, Work, cut
-from graphsynth.jamming.joints.positions import Unsupported, points
-from graphsynth.jamming.joints.tubes import Tubes, joined, prove_tubes, settled, slopes
 
 if TYPE_CHECKING:
     from graphsynth.jamming.joints.program import JointProblem

@@ -108,7 +108,7 @@ def test_what_has_no_answer_is_refused() -> None:
     with pytest.raises(GeometryError, match="no axis is misaligned"):
         joints_margin(motion, PLAIN)
     with pytest.raises(GeometryError, match="assembled near"):
-        joints_margin(motion, PLAIN, ALPHA, [LengthTolerance(1, (0, 2), 0.9)])
+        joints_margin(motion, PLAIN, ALPHA, [LengthTolerance(2, (1, 3), 2.4)])
     with pytest.raises(GeometryError, match="fit with clearance"):
         joints_margin(motion, PLAIN, ALPHA, [FitClearance((1, 2), "35 H7/p6", 10.0)])
     with pytest.raises(GeometryError, match="never for others"):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals import Dual, Interval, Status, image, variables
 from graphsynth.intervals.dual import jacobian_of, values_of
-from graphsynth.jamming.joints.positions import Array, Mask, Placement, Positions, enclosed_solve, guide, points
+from graphsynth.jamming.assembly.positions import Array, Mask, Placement, Positions, enclosed_solve, guide, points
 from graphsynth.mechanism.equations import Pair
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
 
@@ -35,7 +35,8 @@ class Tubes(NamedTuple):
     ``centre`` (N, size): where it lies at the middle of the input and of the parameters;
     ``r``, ``e``, ``base`` (N, joints, 2), (N, joints, 2), (N, joints, 2, 2): positions, guide directions, directions of
     links a and b of the joints asked for.  Certified where proved.  ``reach`` (N, 1 + m): how far the input and each
-    parameter lead the unknowns, in units of their weights (estimated): what is worth cutting.
+    parameter lead the unknowns, in units of their weights (estimated): what is worth cutting.  ``rooms`` (N, dyads): of
+    the dyads, positive where proved.
     """
 
     proved: Mask
@@ -46,6 +47,7 @@ class Tubes(NamedTuple):
     e: Interval
     base: Interval
     reach: Array
+    rooms: Interval
 
     def take(self, rows: NDArray[np.intp]) -> Tubes:
         """Return some of the pieces."""
@@ -134,21 +136,23 @@ def _middle(system: Positions, u: Interval, x: Array, p: Interval, counted: Arra
 
 def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, counted: Array, p: Interval) -> Tubes:
     count, size = x.shape
-    if system.box.size:
+    if system.box.size and size:
         x = settled(system, x, u, p, counted)
     steps = Interval.stack([u, *columns_of(p)], axis=-1)
     steps = steps - points(steps.mid)
     half, weights = steps.mag, system.weights
     proved = np.ones(count, dtype=np.bool_)
     tight = domain = centre = Interval.zeros((count, 0))
-    reach = np.zeros(half.shape)
+    rooms, reach = _rooms(system, u, p, steps)
+    proved &= (rooms.lo > 0.0).all(axis=1)
     if size:
-        proved, centre = _middle(system, u, x, p, counted)
+        found, centre = _middle(system, u, x, p, counted)
+        proved &= found
         tight = domain = centre
     if size and half.any():
         rates = _rates(system, points(u.mid), centre, counted, points(p.mid))[2].mag
         move = (rates * half[:, None]).sum(axis=2)
-        reach = np.where(np.isfinite(rates), rates, 0.0).max(axis=1, initial=0.0) * half
+        reach = np.maximum(reach, np.where(np.isfinite(rates), rates, 0.0).max(axis=1, initial=0.0) * half)
         radius = _ROOM * move + (0.05 * (move / weights).max(axis=1, initial=0.0, keepdims=True) + 1e-10) * weights
         held, parts = np.zeros((count, size)), (u, p, steps)
         left = np.flatnonzero(proved)
@@ -159,7 +163,8 @@ def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, co
             if left.size == 0:
                 break
             piece = parts[0][left], parts[1][left], parts[2][left]
-            lead, room, inside = _lead(system, piece, centre[left], counted[left], (radius[left], move[left]), shells)
+            own, guess = system.about(rooms[left]), (radius[left], move[left])
+            lead, room, inside = _lead(own, piece, centre[left], counted[left], guess, shells)
             proved[left[inside]], held[left[inside]], radius[left[inside]] = True, lead[inside], room[inside]
             wider = np.where(inside[:, None] | ~(_ROOM * lead < 0.7 * weights), radius[left], _ROOM * lead)
             radius[left] = np.maximum(radius[left], wider)
@@ -170,14 +175,40 @@ def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, co
         domain = centre + Interval.from_bounds(-room, room)
     if not joints:
         none, base = Interval.zeros((count, 0, 2)), Interval.zeros((count, 0, 2, 2))
-        return Tubes(proved, domain, tight, centre, none, none, base, reach)
-    return Tubes(proved, domain, tight, centre, *_placed(system, joints, u, tight, p), reach)
+        return Tubes(proved, domain, tight, centre, none, none, base, reach, rooms)
+    return Tubes(proved, domain, tight, centre, *_placed(system.about(rooms), joints, u, tight, p), reach, rooms)
+
+
+def _rooms(system: Positions, u: Interval, p: Interval, steps: Interval) -> tuple[Interval, Array]:
+    """Enclose the rooms of dyads, which depend on the input and the parameters alone, by the mean value theorem.
+
+    And estimate how far each of these turns the links of the dyads, (N, 1 + m).
+    """
+    count = len(u)
+    if not system.dyads:
+        return Interval.zeros((count, 0)), np.zeros(steps.shape)
+    none = [Interval(0)] * system.size
+
+    def placed(near: Positions, u: Interval, p: Interval) -> tuple[Placement, Interval]:
+        box = Interval.stack([u, *columns_of(p)], axis=-1)
+        first, *rest = variables(box)
+        at = near.within(rest).place(none, near.driven(first))
+        rooms = [room.value if isinstance(room, Dual) else room for room in at.rooms]
+        return at, Interval.stack([room + Interval.zeros((count,)) for room in rooms], axis=-1)
+
+    with np.errstate(all="ignore"):
+        at, middle = placed(system, points(u.mid), points(p.mid))
+        turned = [at.angle[link] for dyad in system.dyads for link in dyad.links]
+        rates = [angle.grad.mag.T for angle in turned if isinstance(angle, Dual)]
+        reach = np.nan_to_num(np.max(rates, axis=0), posinf=0.0) * steps.mag if rates else np.zeros(steps.shape)
+        near = system.about(middle, Interval.from_bounds(steps.lo.T, steps.hi.T))
+        return placed(near, u, p)[1], reach
 
 
 def middles(system: Positions, joints: tuple[int, ...], u: Interval, tubes: Tubes, p: Interval) -> Tubes:
     """Return tubes of the middles of pieces u and p: where the joints are there."""
     u, p, x = points(u.mid), points(p.mid), tubes.centre
-    return Tubes(tubes.proved, x, x, x, *_placed(system, joints, u, x, p), np.zeros_like(tubes.reach))
+    return Tubes(tubes.proved, x, x, x, *_placed(system, joints, u, x, p), np.zeros_like(tubes.reach), tubes.rooms)
 
 
 def _placed(
@@ -287,7 +318,7 @@ def slopes(
     """
     count, n = len(u), system.size
     p = whole_box(system, count) if parameters is None else parameters
-    unknowns, own, rate, fine = _rates(system, u, tubes.tight, counted, p)
+    unknowns, own, rate, fine = _rates(system.about(tubes.rooms), u, tubes.tight, counted, p)
     kinds = 1 + p.shape[1]
 
     def along(value: Any) -> Interval:

@@ -6,11 +6,12 @@ unknowns are the other coordinates of the tree, the equations those of the joint
 (`graphsynth.mechanism.joints`), so a mechanism with L loops of revolute joints has 2 L of each.
 
 The dimensions are functions of the parameters of a box (`graphsynth.tolerances.box`).  Where the assemblies lie is
-proved in `graphsynth.jamming.joints.tubes`, and which belong together in `graphsynth.jamming.joints.branch`.
+proved in `graphsynth.jamming.assembly.tubes`, and which belong together in `graphsynth.jamming.joints.branch`.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
@@ -20,9 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals import Interval, atan2, cos, hypot, pi, sin
+from graphsynth.jamming.assembly.dyads import Dyad, Near, find_dyads, place_dyad
 from graphsynth.mechanism.constraints import characteristic_length
 from graphsynth.mechanism.equations import FLOATS, Gradient, Pair, Plane, Seen, derivatives, seen
-from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.tolerances.box import ParameterBox, relative_box
 
 if TYPE_CHECKING:
@@ -41,15 +43,19 @@ class Unsupported(Exception):  # noqa: N818 - never leaves the package: it becom
 
 
 class Placement(NamedTuple):
-    """Angle, direction (cos, sin) and origin of every link."""
+    """Angle, direction (cos, sin) and origin of every link; room of every dyad."""
 
     angle: list[Any]
     turn: list[Pair]
     origin: list[Pair]
+    rooms: list[Any]
 
 
 class _Edge(NamedTuple):
-    """A joint of the tree: from ``parent`` to ``child``; columns of the unknown angle and displacement, or -1."""
+    """A joint of the tree: from ``parent`` to ``child``; columns of the unknown angle and displacement, or -1.
+
+    ``dyad`` is the number of the dyad that the child belongs to, or -1.
+    """
 
     joint: int
     parent: int
@@ -57,17 +63,19 @@ class _Edge(NamedTuple):
     angle: int
     slide: int
     driver: int
+    dyad: int = -1
 
 
 class Positions:
     """Equations and joint positions of a mechanism whose dimensions lie in a box of parameters.
 
-    ``tolerance`` is the box, or one relative half width of every coordinate of a joint.  Raises
+    ``tolerance`` is the box, or one relative half width of every coordinate of a joint; with a ``pose`` (links, 3)
+    dyads have closed forms, in its assembly mode, and no unknowns.  Raises
     `Unsupported` for a cam, a law that is not enclosed, a driver that closes a loop of drivers, or as many equations as
     unknowns missing.
     """
 
-    def __init__(self, mechanism: Mechanism, tolerance: float | ParameterBox = 0.0) -> None:
+    def __init__(self, mechanism: Mechanism, tolerance: float | ParameterBox = 0.0, pose: Array | None = None) -> None:
         self.mechanism = mechanism
         self.box = tolerance if isinstance(tolerance, ParameterBox) else relative_box(mechanism, tolerance)
         if any(isinstance(joint, Cam) for joint in mechanism.joints):
@@ -78,8 +86,10 @@ class Positions:
             if not hasattr(driver.law, "at"):
                 law = type(driver.law).__name__
                 raise Unsupported(f"the law {law} of a driver is not enclosed; use Linear, Harmonic or Polynomial")
-        self.edges, self.size = self._tree()
-        tree = {edge.joint for edge in self.edges}
+        self.near: Near | None = None
+        self.dyads: list[Dyad] = []
+        self.edges, self.size = self._tree(pose)
+        tree = {edge.joint for edge in self.edges} | {dyad.joints[2] for dyad in self.dyads}
         self.closing = [k for k in range(len(mechanism.joints)) if k not in tree]
         rows = sum(3 - mechanism.joints[k].mobility for k in self.closing)
         if rows != self.size:
@@ -87,41 +97,61 @@ class Positions:
                 f"{rows} closing equations for {self.size} unknowns: as many drivers as freedoms are needed"
             )
 
-    def _tree(self) -> tuple[list[_Edge], int]:
+    def _tree(self, pose: Array | None) -> tuple[list[_Edge], int]:
+        """Joints from the frame outward: driven ones, then dyads if their sides are known, then the others."""
         joints, links = self.mechanism.joints, self.mechanism.graph.links
         driver_of = {driver.pair: k for k, driver in enumerate(self.mechanism.drivers)}
-        part = list(range(links))  # of the forest grown so far, for every link
-
-        chosen = []
-        order = sorted(range(len(joints)), key=lambda k: (joints[k].pair not in driver_of, joints[k].mobility, k))
-        for k in order:
-            joint = joints[k]
-            if isinstance(joint, Gear):
-                continue
-            if part[joint.a] != part[joint.b]:
-                part = [part[joint.b] if own == part[joint.a] else own for own in part]
-                chosen.append(k)
-            elif joint.pair in driver_of:
-                raise Unsupported("the driven joints form a loop")
-        if len(chosen) != links - 1:
-            raise Unsupported("a link hangs on gears alone")
         edges: list[_Edge] = []
         reached, size = [self.mechanism.frame], 0
-        for link in reached:
-            for k in chosen:
-                joint = joints[k]
-                other = joint.a + joint.b - link
-                if link not in joint.pair or other in reached:
-                    continue
-                driver = driver_of.get(joint.pair, -1)
-                angle = slide = -1
-                if not isinstance(joint, Prismatic) and driver < 0:
-                    angle, size = size, size + 1
-                if not isinstance(joint, Revolute) and driver < 0:
-                    slide, size = size, size + 1
-                edges.append(_Edge(k, link, other, angle, slide, driver))
-                reached.append(other)
+
+        def grow(chosen: list[int]) -> None:
+            nonlocal size
+            for link in reached:
+                for k in chosen:
+                    joint = joints[k]
+                    other = joint.a + joint.b - link
+                    if link not in joint.pair or other in reached:
+                        continue
+                    driver = driver_of.get(joint.pair, -1)
+                    angle = slide = -1
+                    if not isinstance(joint, Prismatic) and driver < 0:
+                        angle, size = size, size + 1
+                    if not isinstance(joint, Revolute) and driver < 0:
+                        slide, size = size, size + 1
+                    edges.append(_Edge(k, link, other, angle, slide, driver))
+                    reached.append(other)
+
+        driven = [k for k, joint in enumerate(joints) if joint.pair in driver_of]
+        part = list(range(links))  # of the forest grown so far, for every link
+        if len(_forest(joints, driven, part)) < len(driven):
+            raise Unsupported("the driven joints form a loop")
+        grow(driven)
+        if pose is not None:
+            for own in find_dyads(self.mechanism, set(reached)):
+                sine = float(own.seen_side(self.mechanism, pose[None])[0])
+                self.dyads.append(own._replace(side=math.copysign(1.0, sine)))
+        outer = [k for dyad in self.dyads for k in dyad.joints[:2]]
+        rest = [k for k in sorted(range(len(joints)), key=lambda k: (joints[k].mobility, k)) if k not in driven]
+        chosen = driven + _forest(joints, outer + rest, part)
+        if len(chosen) != links - 1:
+            raise Unsupported("a link hangs on gears alone")
+        for number, own in enumerate(self.dyads):
+            ends = zip(own.joints, own.bases, own.links)
+            edges += [_Edge(k, base, link, -1, -1, -1, number) for k, base, link in ends]
+            reached += own.links
+        grow(chosen)
         return edges, size
+
+    def about(self, rooms: Interval, steps: Interval | None = None) -> Positions:
+        """Return the same equations with known enclosures of the rooms of the dyads."""
+        other = copy(self)
+        other.near = Near(rooms, steps) if self.dyads else None
+        return other
+
+    def follows(self, poses: Array) -> Mask:
+        """Whether the dyads have their sides at poses (N, links, 3), clearly, in floats."""
+        sides = [dyad.seen_side(self.mechanism, poses) * dyad.side > 1e-9 for dyad in self.dyads]
+        return np.asarray(np.all(sides, axis=0)) if sides else np.ones(len(poses), dtype=np.bool_)
 
     def within(self, values: Sequence[Any]) -> Positions:
         """Return the same equations for other values of the parameters: intervals, or duals."""
@@ -167,8 +197,12 @@ class Positions:
     def place(self, x: list[Any], q: list[Any], moved: Moved | None = None) -> Placement:
         """Place every link for unknowns x and driven coordinates q; ``moved`` disturbs the joints."""
         links, zero = self.mechanism.graph.links, Interval(0)
-        at = Placement([zero] * links, [Pair(Interval(1), zero)] * links, [Pair(zero, zero)] * links)
+        at = Placement([zero] * links, [Pair(Interval(1), zero)] * links, [Pair(zero, zero)] * links, [])
         for edge in self.edges:
+            if edge.dyad >= 0:
+                if edge.dyad == len(at.rooms):
+                    self._place_dyad(self.dyads[edge.dyad], at, moved)
+                continue
             joint, (at_a, at_b) = self.mechanism.joints[edge.joint], self.local[edge.joint]
             forward, child = edge.parent == joint.a, edge.child
             driver = self.mechanism.drivers[edge.driver] if edge.driver >= 0 else None
@@ -192,6 +226,32 @@ class Positions:
             P = P if moved is None else P + moved[edge.joint][0]
             at.origin[child] = P - PLANE.turned(there, at.turn[child])
         return at
+
+    def _place_dyad(self, dyad: Dyad, at: Placement, moved: Moved | None) -> None:
+        """Place both links of a dyad, and note its room."""
+        joints, (a, b), number = self.mechanism.joints, dyad.links, len(at.rooms)
+
+        def local(k: int, link: int) -> Pair:
+            return self.local[k][link != joints[k].a]
+
+        ends = [
+            at.origin[base] + PLANE.turned(local(k, base), at.turn[base]) for k, base in zip(dyad.joints, dyad.bases)
+        ]
+        if moved is not None:
+            first, second, inner = (moved[k][0] for k in dyad.joints)
+            ends = [ends[0] + first, ends[1] + second + inner]
+        outer = [local(k, link) for k, link in zip(dyad.joints, dyad.links)]
+        arms = local(dyad.joints[2], a) - outer[0], local(dyad.joints[2], b) - outer[1]
+        near = self.near
+
+        def narrowed(room: Any) -> Any:
+            return room if near is None else near.narrowed(room, number)
+
+        *turns, room = place_dyad(PLANE, (ends[0], ends[1]), arms, dyad.side, narrowed)
+        at.rooms.append(room)
+        for link, turn, end, own in zip((a, b), turns, ends, outer):
+            at.turn[link], at.angle[link] = turn, PLANE.argument(turn)
+            at.origin[link] = end - PLANE.turned(own, turn)
 
     def seen(self, k: int, at: Placement) -> Seen:
         """Joint k with its two links."""
@@ -241,6 +301,17 @@ class Positions:
         """Enclose the coordinates of the drivers over the inputs (N,)."""
         laws: list[Any] = [driver.law for driver in self.mechanism.drivers]
         return [law.at(u, sin, cos)[0] for law in laws]
+
+
+def _forest(joints: Sequence[JointGeometry], order: list[int], part: list[int]) -> list[int]:
+    """Choose joints in order that join links of different parts; gears join nothing."""
+    chosen = []
+    for k in order:
+        a, b = part[joints[k].a], part[joints[k].b]
+        if a != b and not isinstance(joints[k], Gear):
+            part[:] = [b if own == a else own for own in part]
+            chosen.append(k)
+    return chosen
 
 
 def _taken(p: Pair, rows: NDArray[np.intp]) -> Pair:

@@ -1,0 +1,1 @@
+"""Where the assemblies of a mechanism lie: structural groups with a closed form."""
