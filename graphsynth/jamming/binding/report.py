@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import Shown, work
 from graphsynth.mechanism.joints import Prismatic
 
 if TYPE_CHECKING:
     import graphsynth as gs
-    from graphsynth.jamming.joints.limits import Limits, Misalignment
+    from graphsynth.jamming.binding.exact import ExactBinding
+    from graphsynth.jamming.binding.parts import JointStiffness
+    from graphsynth.jamming.joints.program import JointProblem
     from graphsynth.kinematics.engine.result import Motion
 
 Array = NDArray[np.float64]
@@ -60,6 +64,8 @@ class BindingReport(Shown):
         Those that wear most first.
     motor_torque, unit : float or None, float
         What the motor can give; metres of the mechanism's unit of length.
+    problem, springs, bent : JointProblem, tuple of JointStiffness, bool
+        Limits and misalignments; stiffness of every joint; whether links have sections.
     """
 
     motion: Motion
@@ -76,8 +82,9 @@ class BindingReport(Shown):
     wear: tuple[JointWear, ...]
     motor_torque: float | None
     unit: float
-    limits: tuple[Limits, ...]
-    misalignments: tuple[Misalignment, ...]
+    problem: JointProblem
+    springs: tuple[JointStiffness, ...]
+    bent: bool
     notes: tuple[str, ...] = ()
     seconds: float = field(default=0.0, compare=False)
 
@@ -192,6 +199,23 @@ class BindingReport(Shown):
             told += f", contact {row.contact:.4g} N, wear {row.wear:.4g} N/m" if row.wear > 0.0 else ""
             rows.append((f"joint {row.joint[0]}-{row.joint[1]}", told))
         return rows
+
+    def exact(self, samples: Sequence[int] | None = None) -> ExactBinding:
+        """Solve some samples again with every loop closed exactly in space, as a check of small tilts (rigid links).
+
+        ``samples`` are numbers of assembled samples, all by default.  `GeometryError` for links with sections, or
+        joints that the exact closure does not describe.
+        """
+        from graphsynth.jamming.binding.exact import exact_binding
+        from graphsynth.jamming.space.model import Unsupported
+
+        if self.bent:
+            raise GeometryError("links have sections; the exact closure takes them as rigid: leave links out")
+        chosen = np.flatnonzero(self.motion.assembled) if samples is None else np.asarray(samples, dtype=np.intp)
+        try:
+            return exact_binding(self.problem, self.springs, self.motion.poses[chosen], self.unit)
+        except Unsupported as error:
+            raise GeometryError(str(error)) from error
 
     def details(self) -> str:
         """Return all figures, all joints and all notes in words."""

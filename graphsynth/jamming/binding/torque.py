@@ -154,8 +154,9 @@ def _report(
         wear=_wear(given, rubbing, motion.inputs[keep], loaded, sliding),
         motor_torque=limit,
         unit=size,
-        limits=given.limits,
-        misalignments=given.misalignments,
+        problem=given,
+        springs=tuple(parts.springs),
+        bent=any(beam is not None for beam in parts.beams),
         notes=_notes(motion, given, known, loaded),
         seconds=perf_counter() - begin,
     )

@@ -225,6 +225,33 @@ def test_what_cannot_give_way_blocks() -> None:
     assert "neither clearance nor compliance" in report.statement
 
 
+@pytest.mark.parametrize("kind", ["four-bar", "slider", "six-bar"])
+def test_exact_closure_differs_by_alpha_squared(kind: str) -> None:
+    """Energy and torque with finite tilts; the difference falls with the square of the tilt."""
+    mechanism = {
+        "four-bar": gs.Mechanism.four_bar(0.3, 0.1, 0.32, 0.25),
+        "slider": gs.Mechanism.slider_crank(0.1, 0.3),
+        "six-bar": gs.gallery.watt_six_bar(),
+    }[kind]
+    motion = mechanism.simulate(np.array([0.4, 1.4, 2.4]))
+    far = []
+    for alpha in (0.02, 0.04):
+        joints = {
+            joint.pair: SlideLimits(0.1 * alpha, 0.05 * alpha)
+            if isinstance(joint, Prismatic)
+            else JointLimits(0.1 * alpha)
+            for joint in mechanism.joints
+        }
+        report = motion.binding(tilt=alpha, joints=joints, stiffness=JointStiffness(900.0, 1e6))
+        exact = report.exact()
+        assert exact.missed < 1e-9
+        np.testing.assert_allclose(exact.energy, report.energy, rtol=3.0 * alpha**2)
+        size = np.abs(report.elastic_torque).max()
+        np.testing.assert_allclose(exact.torque, report.elastic_torque, atol=5.0 * alpha**2 * size)
+        far.append(np.abs(exact.energy / report.energy - 1.0).max())
+    assert far[1] == pytest.approx(4.0 * far[0], rel=0.1)
+
+
 def test_singular_positions_are_told() -> None:
     """At a change point the torque is not known, and where nothing is assembled nothing is."""
     flat = gs.Mechanism.four_bar(0.2, 0.1, 0.2, 0.1).simulate(np.linspace(0.0, math.tau, 9))

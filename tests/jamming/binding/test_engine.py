@@ -140,8 +140,10 @@ def test_against_a_general_engine(name: str, alpha: float, axial: float, size: f
     torque = np.array([own[0] for own in found])
     solved = np.isfinite(torque)
     assert solved.sum() >= 7
-    size = alpha * report.moment.max()  # of the terms that small tilts neglect
+    size = alpha * report.moment.max()  # of what small tilts and the play in the plane change
     np.testing.assert_allclose(torque[solved], report.elastic_torque[solved], atol=alpha**2 * size)
+    exact = report.exact()
+    np.testing.assert_allclose(torque[solved], exact.torque[solved], atol=alpha**2 * size)
     for k, pair in enumerate(report.joints):
         if pair in pins:
             moments = np.array([own[1][pair] for own in found])
