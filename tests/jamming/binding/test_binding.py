@@ -60,6 +60,73 @@ def test_a_cantilever_is_bent() -> None:
     np.testing.assert_allclose(report.energy, 1.5 * bending / 0.25**3 * lift**2, rtol=1e-9, atol=1e-15)
 
 
+def frame_of_beams(motion: gs.Motion, k: int, alpha: float, tilt: float, bar: LinkSection) -> float:
+    """Energy of a pose by finite elements: grid beams from the middle of every link to its joints, springs between.
+
+    Unknowns are tilts and height (x, y, w) of every hub and every end; heights at a joint are equal (multipliers).
+    """
+    mechanism, poses = motion.mechanism, motion.poses[k]
+    places: dict[tuple[int, int], complex] = {}  # of (link, number of a joint, or -1 for its hub)
+    for number, joint in enumerate(mechanism.joints):
+        x, y, t = poses[joint.a]
+        places[joint.a, number] = places[joint.b, number] = complex(x, y) + np.exp(1j * t) * complex(*joint.at_a)
+    for link in range(mechanism.graph.links):
+        own = [at for (other, _), at in places.items() if other == link]
+        places[link, -1] = sum(own) / len(own)
+    index = {key: 3 * i for i, key in enumerate(sorted(key for key in places if key[0] != mechanism.frame))}
+    size = 3 * len(index)
+    K, f, constant = np.zeros((size, size)), np.zeros(size), 0.0
+    for (link, number), start in index.items():
+        if number < 0:
+            continue
+        e = places[link, number] - places[link, -1]
+        length, e = abs(e), e / abs(e)
+        # rows: height, slope along the arm and twist, at both ends
+        B = np.zeros((6, size))
+        for end, at in enumerate((index[link, -1], start)):
+            B[3 * end, at + 2] = 1.0
+            B[3 * end + 1, at : at + 2] = e.imag, -e.real
+            B[3 * end + 2, at : at + 2] = e.real, e.imag
+        beam, m = np.zeros((6, 6)), length
+        rows = [0, 1, 3, 4]
+        bent = np.array(
+            [[12, 6 * m, -12, 6 * m], [0, 4 * m**2, -6 * m, 2 * m**2], [0, 0, 12, -6 * m], [0, 0, 0, 4 * m**2]]
+        )
+        beam[np.ix_(rows, rows)] = bar.bending / m**3 * (bent + np.triu(bent, 1).T)
+        beam[np.ix_([2, 5], [2, 5])] = bar.torsion / m * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        K += B.T @ beam @ B
+    rows = []
+    for number, joint in enumerate(mechanism.joints):
+        row, spring = np.zeros(size), np.zeros((2, size))
+        for link, sign in ((joint.a, -1.0), (joint.b, 1.0)):
+            if link != mechanism.frame:
+                at = index[link, number]
+                row[at + 2] = sign
+                spring[[0, 1], [at, at + 1]] = sign
+        rows.append(row)
+        turned = np.array([alpha if joint.pair == mechanism.drivers[0].pair else 0.0, 0.0])
+        turned *= 1.0 if joint.a == mechanism.frame else -1.0
+        K += tilt * spring.T @ spring
+        f += tilt * spring.T @ turned
+        constant += 0.5 * tilt * turned @ turned
+    C = np.array(rows)
+    # heights of a tilted shaft stay those of its pivot: the joint is at the tilted axis itself
+    whole = np.block([[K, C.T], [C, np.zeros((len(C), len(C)))]])
+    u = np.linalg.lstsq(whole, np.concatenate([f, np.zeros(len(C))]), rcond=None)[0][:size]
+    return float(0.5 * u @ K @ u - f @ u + constant)
+
+
+@pytest.mark.parametrize("kind", ["four-bar", "six-bar"])
+def test_links_as_a_frame_of_beams(kind: str) -> None:
+    """Binary and ternary links with joints without clearance: linear, so finite elements give the same energy."""
+    mechanism = {"four-bar": gs.Mechanism.four_bar(0.3, 0.1, 0.32, 0.25), "six-bar": gs.gallery.watt_six_bar()}[kind]
+    motion = mechanism.simulate(np.array([0.4, 1.4, 2.4]))
+    bar = LinkSection(40.0, 23.0)
+    report = motion.binding(tilt=0.02, joints=0.0, stiffness=900.0, links=bar)
+    found = [frame_of_beams(motion, k, 0.02, 900.0, bar) for k in range(3)]
+    np.testing.assert_allclose(report.energy, found, rtol=1e-8)
+
+
 def test_an_axial_clearance_is_used_up() -> None:
     alpha, clearance, k = 0.01, 0.0016, 3e5
     joints = {(0, 1): RIGID, (1, 2): RIGID, (2, 3): JointLimits(math.inf, clearance), (0, 3): RIGID}
