@@ -256,7 +256,7 @@ class BindingReport(Shown):
         bands = [band(a, b, "contact" if k == 0 else "", "c") for k, (a, b) in enumerate(self._runs(self.energy > 0.0))]
         bands += [band(a, b, "blocks" if k == 0 else "", "jam") for k, (a, b) in enumerate(self._runs(self.blocked))]
         label = "input" if self._linear else "input, degrees"
-        chart: gs.Chart = work("chart")(lines, label, f"torque that binding costs, {self._effort}", bands, (), levels)
+        chart: gs.Chart = work("chart")(lines, label, f"torque of binding, {self._effort}", bands, (), levels)
         if ax is not None:
             chart.draw(ax)
         return chart
