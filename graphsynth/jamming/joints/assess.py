@@ -112,7 +112,8 @@ class CoupledReport(Assessment):
         about = self.small_tilts.partition(":")[0]
         if not math.isnan(self.small_tilt_error):
             about = f"{about}, off by about {100.0 * self.small_tilt_error:.2g} % at that input"
-        return [*rows, ("figures", about)]
+        proof = [] if self.certificate is None else [("proof of", self.certificate.model.partition(":")[0])]
+        return [*rows, ("figures of", about), *proof]
 
     @property
     def model(self) -> str:

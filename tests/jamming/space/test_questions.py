@@ -141,6 +141,12 @@ def test_reports_say_what_they_are_about_and_how_far_small_tilts_are_off():
     own = assess_jamming(motion, tilt=alpha, joints=one_bearing(0.4), model="exact", certify=False)
     assert own.factor[own.inputs == u] == pytest.approx(small.factor[small.inputs == u] * exact, rel=1e-9)
     assert "exact closure in space" in own.details() and math.isnan(own.small_tilt_error)
+    for model, words in (
+        ("small", "proof of       L1 with exact tilts"),
+        ("exact", "proof of       exact closure in space"),
+    ):
+        proved = assess_jamming(motion, tilt=0.02, joints=one_bearing(0.04), model=model)
+        assert proved.verdict is Verdict.CERTIFIED_FREE and words in proved.details()
 
 
 def test_a_word_for_no_model_and_mechanisms_that_are_not_described():
