@@ -95,8 +95,9 @@ class BindingReport(Shown):
 
     @property
     def torque(self) -> Array:
-        """Drive torque that binding costs in the sense of the motion, shape (n,)."""
-        return self.elastic_torque + self.friction_torque
+        """Drive torque that binding costs, positive in the sense of the motion, shape (n,)."""
+        sense = np.sign(self._rate() * (self.inputs[-1] - self.inputs[0]))
+        return np.asarray(np.where(sense < 0.0, -1.0, 1.0) * self.elastic_torque + self.friction_torque)
 
     @property
     def contact(self) -> NDArray[np.bool_]:
@@ -131,7 +132,7 @@ class BindingReport(Shown):
         if good.sum() < 2 or not np.any(power[good]):
             return math.nan
         u, power, energy = self.inputs[good], power[good], self.energy[good]
-        total = float(np.trapezoid(np.abs(power), u))
+        total = abs(float(np.trapezoid(np.abs(power), u)))
         return abs(float(np.trapezoid(power, u)) - float(energy[-1] - energy[0])) / total
 
     def _rate(self) -> Array:

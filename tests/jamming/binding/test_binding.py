@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -317,6 +318,27 @@ def test_exact_closure_differs_by_alpha_squared(kind: str) -> None:
         np.testing.assert_allclose(exact.torque, report.elastic_torque, atol=5.0 * alpha**2 * size)
         far.append(np.abs(exact.energy / report.energy - 1.0).max())
     assert far[1] == pytest.approx(4.0 * far[0], rel=0.1)
+
+
+def test_a_driven_guide_that_goes_back() -> None:
+    """Force by the travel of the slider, in N though lengths are in mm; friction is against the motion."""
+    crank = gs.Mechanism.slider_crank(100.0, 300.0)
+    pose = crank.simulate(np.array([0.5, 0.6])).poses[0]
+    pump = replace(crank, drivers=(gs.Driver(0, 3),), pose=tuple(tuple(row) for row in pose))
+    x = np.linspace(pose[3, 0], pose[3, 0] - 30.0, 301)
+    joints = {
+        joint.pair: SlideLimits(0.001, 0.001) if isinstance(joint, Prismatic) else JointLimits(0.002)
+        for joint in pump.joints
+    }
+    axis = Misalignment(0, 1, 0.03, rigid=False)
+    given: Any = {"tilt": axis, "joints": joints, "stiffness": JointStiffness(500.0, 1e6), "unit": "mm"}
+    report = pump.simulate(x).binding(**given, friction=ContactFriction(0.1, 0.01, 0.03))
+    slope = np.gradient(report.energy, 1e-3 * x)[1:-1]
+    np.testing.assert_allclose(report.elastic_torque[1:-1], slope, atol=1e-4 * np.abs(slope).max())
+    np.testing.assert_allclose(report.torque, report.friction_torque - report.elastic_torque, rtol=1e-12)
+    assert 0.0 <= report.work_error < 1e-5
+    assert "N, at input" in report.statement
+    assert report.exact([0]).torque[0] == pytest.approx(report.elastic_torque[0], rel=3e-3)
 
 
 def test_singular_positions_are_told() -> None:
