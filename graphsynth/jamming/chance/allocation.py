@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import process_time
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import Shown, work
 from graphsynth.intervals.reading import shortened
 from graphsynth.jamming.bearing.bearing import Condition
-from graphsynth.jamming.bearing.parameters import Given, ToleranceBox
+from graphsynth.jamming.bearing.parameters import Given, Range, ToleranceBox
 from graphsynth.jamming.chance.distributions import Distribution
 from graphsynth.jamming.chance.paving import Bounds, Paver
 from graphsynth.jamming.chance.probability import ChanceProblem, CommonFactor
@@ -101,6 +101,10 @@ class Allocation(Shown):
         return pd.DataFrame(rows, columns=["quantity", "grade", "cost"])
 
 
+def _hull(ranges: Sequence[Range]) -> Range:
+    return Range(min(own.lower for own in ranges), max(own.upper for own in ranges), all(own.exact for own in ranges))
+
+
 class _Search:
     """Choices as rows of option numbers; estimates and enclosures of their probabilities."""
 
@@ -112,6 +116,11 @@ class _Search:
         self.starts = np.cumsum([0, *self.sizes[:-1]])
         self.costs = np.concatenate([[grade.cost for grade in offered] for offered in self.grades.values()])
         self.known: dict[tuple[int, ...], Bounds] = {}
+        if hasattr(problem.subject, "covering"):  # positions are proved once, for the widest of all grades
+            widest = {
+                name: _hull([grade.distribution.support for grade in offered]) for name, offered in grades.items()
+            }
+            self.problem = replace(problem, subject=problem.subject.covering(widest))
         self._estimate()
 
     def chosen(self, choice: Sequence[int]) -> dict[str, Grade]:
@@ -319,6 +328,22 @@ def _first_good(search: _Search, trials: int, end: float) -> tuple[tuple[int, ..
     return None, math.inf
 
 
+def curve(points: Iterable[tuple[float, float]]) -> Any:
+    """Return the picture of costs over proved probabilities (upper bound, cost); None without one above zero."""
+    line = work("chart line")
+    good = sorted({(upper, cost) for upper, cost in points if upper > 0.0})
+    if not good:
+        return None
+    x, y = np.array([[math.log10(upper), cost] for upper, cost in good]).T
+    ends = np.append(np.repeat(x, 2)[1:], x[-1:] + 0.3)
+    lines = [
+        line(ends, np.repeat(y, 2), "least cost found", "a", "-"),
+        line(x, y, "proved choices", "a", "o"),
+        line(x[:1] - 0.3, y[:1]),  # room for the first mark
+    ]
+    return work("chart")(lines, "log10 of the probability of binding, proved upper bound", "cost of the grades")
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class ParetoCurve(Shown):
     """Allocations for several probabilities allowed: what less risk costs, each point proved."""
@@ -338,19 +363,11 @@ class ParetoCurve(Shown):
 
         Steps: between two points nothing can be bought.
         """
-        line = work("chart line")
-        good = sorted({(point.upper, point.cost) for point in self.points if point.choice and point.upper > 0.0})
-        x, y = np.array([[math.log10(upper), cost] for upper, cost in good]).reshape(-1, 2).T
-        ends = np.append(np.repeat(x, 2)[1:], x[-1:] + 0.3)
-        lines = [
-            line(ends, np.repeat(y, 2), "least cost found", "a", "-"),
-            line(x, y, "proved choices", "a", "o"),
-            line(x[:1] - 0.3, y[:1]),  # room for the first mark
-        ]
-        return work("chart")(lines, "log10 of the probability of binding, proved upper bound", "cost of the grades")
+        return curve([(point.upper, point.cost) for point in self.points if point.choice])
 
     def _picture(self) -> str:
-        return str(self.chart().svg()) if any(point.choice and point.upper > 0.0 for point in self.points) else ""
+        chart = self.chart()
+        return "" if chart is None else str(chart.svg())
 
     def _told(self) -> tuple[str, list[tuple[str, str]]]:
         rows = [

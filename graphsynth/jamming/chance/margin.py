@@ -46,10 +46,12 @@ class Margin(Protocol):
 class LinearMargin(Protocol):
     """A margin that bounds itself over boxes by linear functions, better than by its derivatives."""
 
-    def lines(self, at: Sequence[Any], over: Sequence[Any], half: Array, known: Sequence[Any]) -> tuple[Any, list[Any]]:
+    def lines(
+        self, at: Sequence[Any], over: Sequence[Any], ends: tuple[Array, Array], known: Sequence[Any]
+    ) -> tuple[Any, list[Any]]:
         """Return an `Affine` of N boxes, and what is worth knowing of their parts.
 
-        ``at``, ``over``: the quantities at the middles, and over the boxes as duals by the sources; ``half`` (N, n);
+        ``at``, ``over``: the quantities at the middles, and over the boxes as duals by the sources; ``ends`` (N, n);
         ``known`` of each box, None for nothing.
         """
 

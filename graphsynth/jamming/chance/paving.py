@@ -149,7 +149,7 @@ def linear(margin: Margin, sources: Sources, lo: Array, hi: Array, known: Object
     middle = 0.5 * (lo + hi)
     at = sources.quantities([Interval.from_bounds(x, x) for x in middle.T])
     over = sources.quantities(variables(Interval.from_bounds(lo, hi))) if lo.shape[1] else at
-    line, left = margin.lines(at, over, 0.5 * (hi - lo), list(known))
+    line, left = margin.lines(at, over, (lo, hi), list(known))
     fresh = np.empty(len(lo), dtype=object)
     fresh[:] = left
     return line, fresh

@@ -286,8 +286,10 @@ class JammingProbability(Shown):
         def enclosed(problem: ChanceProblem) -> Bounds:
             return Paver(*problem.model(), width, seconds=seconds).run()
 
-        now = enclosed(self.problem)
-        base = replace(self, lower=max(self.lower, now.lower), upper=min(self.upper, now.upper))
+        base = self
+        if self.upper - self.lower > width:
+            now = enclosed(self.problem)
+            base = replace(self, lower=max(self.lower, now.lower), upper=min(self.upper, now.upper))
         rows = []
         for name, problem in self.problem.each(factor.lower):
             found = enclosed(problem)

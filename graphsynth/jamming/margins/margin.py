@@ -29,15 +29,21 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
-#: Rounds of cutting stations for one batch of boxes; pairs looked at together; what the input may add to a gap.
-_ROUNDS, _TOGETHER, _SHARE = 5, 2048, 0.3
+Mask = NDArray[np.bool_]
+#: Rounds of looking closer for one batch of boxes; pairs looked at together, in one round; what the input may add to a
+#: gap; stations of a box that are looked at in a round.
+_ROUNDS, _TOGETHER, _MOST, _SHARE, _NEXT = 5, 2048, 4096, 0.3, 4
 
 
 class _Pairs(NamedTuple):
-    """Pairs of a box and a station: certificate (``low`` and ``a`` in the sources), slack of the items."""
+    """Pairs of a box and a station: certificate (``low`` and ``a`` in the sources), slack of the items.
+
+    ``fresh`` where both are of the box; elsewhere the slack is that of a larger box, and the certificate an estimate.
+    """
 
     box: Rows
     station: Rows
+    fresh: Mask
     start: Array
     low: Array
     a: Array
@@ -54,6 +60,28 @@ class _Pairs(NamedTuple):
         """Put pairs together."""
         slack = Slack(*(np.concatenate(own) for own in zip(*(part.slack for part in parts))))
         return _Pairs._make([*(np.concatenate(own) for own in zip(*(part[:-1] for part in parts))), slack])
+
+    def inherited(self, box: int, shift: Array) -> _Pairs:
+        """Return the pairs of a larger box for a part of it whose middle lies so far from the other."""
+        with np.errstate(invalid="ignore"):
+            change = self.slack.by @ shift
+            size = np.abs(self.slack.by) @ np.abs(shift)
+            need = self.slack.need - change + 1e-13 * size
+        count = len(self.box)
+        return self._replace(
+            box=np.full(count, box),
+            fresh=np.zeros(count, dtype=np.bool_),
+            start=np.where(np.isfinite(self.start), self.start + self.a @ shift, self.start),
+            low=np.full(count, -np.inf),
+            slack=self.slack._replace(need=np.where(np.isnan(need), np.inf, need)),
+        )
+
+
+class _Known(NamedTuple):
+    """What is known of a box: its middle, and its pairs."""
+
+    middle: Array
+    pairs: _Pairs
 
 
 class JointsMargin(Shown):
@@ -115,34 +143,57 @@ class JointsMargin(Shown):
         return f"Margin of {self.model}", [(name, str(own)) for name, own in self.ranges.items()]
 
     def lines(
-        self, at: Sequence[Any], over: Sequence[Any], half: Array, open_: Sequence[Rows | None]
-    ) -> tuple[Affine, list[Rows]]:
+        self, at: Sequence[Any], over: Sequence[Any], ends: tuple[Array, Array], known: Sequence[_Known | None]
+    ) -> tuple[Affine, list[_Known]]:
         """Bound the margin over N boxes by linear functions of the n sources.
 
-        ``at``, ``over``: quantities at the middles, and over the boxes as duals by the sources; ``half`` (N, n);
-        ``open_``: stations at which each box may bind, None for all.  Returns the same for what is left.
+        ``at``, ``over``: quantities at the middles, and over the boxes as duals by the sources; ``ends`` of the boxes
+        (N, n); ``known`` of each, None for nothing.  Returns the same for what is left.
         """
+        middle, half = 0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0])
         boxes = boxes_of(self.quantities, self.items, at, over, half)
-        lists = [self.first if own is None else own for own in open_]
-        box = np.repeat(np.arange(len(half)), [len(own) for own in lists])
-        fresh = self._pairs(boxes, box, np.concatenate(lists) if lists else box)
-        found = fresh
+        found = self._start(boxes, middle, known)
         for k in range(_ROUNDS):
-            a, low, loose, c, item, v = self._bounds(found, half)
-            again = self._worth(found, (c, low, item, v)) if k < _ROUNDS - 1 else np.zeros(len(c), dtype=np.bool_)
-            if not again.any():
+            bounds = self._bounds(found, half)
+            if k == _ROUNDS - 1:
                 break
-            parts = [self.stations.children[s] for s in found.station[again].tolist()]
-            size = [len(own) for own in parts]
-            fresh = self._pairs(boxes, np.repeat(found.box[again], size), np.concatenate(parts))
-            found = _Pairs.join([found.take(~again), fresh])
-        return self._affine(found, half, (a, low, loose, c, item, v))
+            cut, again = self._worth(found, bounds), self._next(found, bounds, len(half))
+            if not (cut.any() or again.any()):
+                break
+            children = [self.stations.children[s] for s in found.station[cut].tolist()]
+            box = [np.full(len(own), b) for own, b in zip(children, found.box[cut].tolist())]
+            fresh = self._pairs(
+                boxes, np.concatenate([*box, found.box[again]]), np.concatenate([*children, found.station[again]])
+            )
+            found = _Pairs.join([found.take(~(cut | again)), fresh])
+        return self._affine(found, middle, half, bounds)
 
-    def _affine(self, found: _Pairs, half: Array, bounds: tuple[Any, ...]) -> tuple[Affine, list[Rows]]:
+    def _start(self, boxes: Boxes, middle: Array, known: Sequence[_Known | None]) -> _Pairs:
+        """Evaluate all stations of boxes about which nothing is known, and the likely worst ones of others."""
+        none = [k for k, own in enumerate(known) if own is None]
+        first = self.first
+        parts = [self._pairs(boxes, np.repeat(none, len(first)).astype(np.intp), np.tile(first, len(none)))]
+        parts += [own.pairs.inherited(k, middle[k] - own.middle) for k, own in enumerate(known) if own is not None]
+        found = _Pairs.join(parts)
+        few = len(found.box) <= _TOGETHER // 2  # as fast as one
+        worst = ~found.fresh & (few | (_rank(found.box, found.start, len(known)) < _NEXT))
+        return _Pairs.join([found.take(~worst), self._pairs(boxes, found.box[worst], found.station[worst])])
+
+    def _next(self, found: _Pairs, bounds: tuple[Any, ...], count: int) -> Mask:
+        """Tell the pairs to look at: the highest thresholds of a box, if they are those of a larger box."""
+        low, c = bounds[1], bounds[3]
+        top = _rank(found.box, -c, count) < _NEXT
+        again = top & ~found.fresh & (c > low[found.box])
+        again[np.flatnonzero(again)[_MOST:]] = False
+        return np.asarray(again)
+
+    def _affine(
+        self, found: _Pairs, middle: Array, half: Array, bounds: tuple[Any, ...]
+    ) -> tuple[Affine, list[_Known]]:
         """Put the bounds of all pairs of every box together."""
         a, low, loose, c, item, v = bounds
         start = np.full(len(half), np.inf)
-        np.minimum.at(start, found.box, found.start)
+        np.minimum.at(start, found.box[found.fresh], found.start[found.fresh])
         order = np.argsort(c, kind="stable")
         high = np.full(len(half), -np.inf)
         worst = np.full(len(half), -1)
@@ -155,22 +206,31 @@ class JointsMargin(Shown):
             own = own + np.abs(v_used[:, None] * slack.by[rows, item] - a[found.box]) * half[found.box]
         curved = np.where(half > 0.0, loose, 0.0) + np.where(worst[:, None] >= 0, np.nan_to_num(own)[worst], 0.0)
         # a station that may bind only where the line proves binding adds nothing: not here, not in any part
-        left = (c > low[found.box]) | (found.start == start[found.box])
-        box, station = found.box[left], found.station[left]
-        order = np.argsort(box, kind="stable")
-        ends = np.searchsorted(box[order], np.arange(len(half) + 1))
-        sets = [station[order[i:j]] for i, j in itertools.pairwise(ends)]
+        left = (c > low[found.box]) | (found.fresh & (found.start == start[found.box]))
+        order = np.flatnonzero(left)
+        order = order[np.argsort(found.box[order], kind="stable")]
+        places = np.searchsorted(found.box[order], np.arange(len(half) + 1))
+        kept = [_Known(middle[k], found.take(order[i:j])) for k, (i, j) in enumerate(itertools.pairwise(places))]
         low = np.where(
             (low > 0.0) & (low > (np.abs(a) * half).sum(axis=1) * (1.0 + 1e-12)), np.inf, np.minimum(low, high)
         )
-        return Affine(a, low, high, curved), sets
+        return Affine(a, low, high, curved), kept
 
     def _pairs(self, boxes: Boxes, box: Rows, station: Rows) -> _Pairs:
+        if not len(box):
+            return self._empty(boxes)
         parts = [
             self._evaluated(boxes, box[k : k + _TOGETHER], station[k : k + _TOGETHER])
-            for k in range(0, max(len(box), 1), _TOGETHER)
+            for k in range(0, len(box), _TOGETHER)
         ]
         return _Pairs.join(parts)
+
+    def _empty(self, boxes: Boxes) -> _Pairs:
+        """Return no pairs."""
+        n, rows, none = boxes.half.shape[1], 2 * len(self.items.costly), np.zeros(0, dtype=np.intp)
+        slack = Slack(np.zeros((0, rows)), np.zeros((0, rows, n)), np.zeros((0, rows, 1 + n)))
+        flat = np.zeros(0)
+        return _Pairs(none, none, flat > 0.0, flat, flat, np.zeros((0, n)), np.zeros((0, n)), slack)
 
     def _evaluated(self, boxes: Boxes, box: Rows, station: Rows) -> _Pairs:
         layout, items, stations = self.quantities.layout, self.items, self.stations
@@ -193,12 +253,13 @@ class JointsMargin(Shown):
         low = np.where(line.sound, np.nextafter(low, -np.inf), -np.inf)
         slack = slacks(layout, items, own, pairs, found, np.nan_to_num(a))
         start = np.where(line.sound, line.start.hi, np.inf)
-        return _Pairs(box, station, start, low, a[1:].T, loose, slack)
+        return _Pairs(box, station, np.ones(len(box), dtype=np.bool_), start, low, a[1:].T, loose, slack)
 
     def _bounds(self, found: _Pairs, half: Array) -> tuple[Any, ...]:
         """Return the line of every box, by its most dangerous station, and the thresholds of all pairs."""
         count = len(half)
-        order = np.argsort(-found.start, kind="stable")
+        order = np.flatnonzero(found.fresh)
+        order = order[np.argsort(-found.start[order], kind="stable")]
         best = np.full(count, -1)
         best[found.box[order]] = order
         have = best >= 0
@@ -207,23 +268,33 @@ class JointsMargin(Shown):
         loose = np.where(have[:, None], found.loose[best] if len(found.box) else 0.0, 0.0)
         return a, low, loose, *thresholds(found.slack, a[found.box], half[found.box])
 
-    def _worth(self, found: _Pairs, bounds: tuple[Any, ...]) -> NDArray[np.bool_]:
+    def _worth(self, found: _Pairs, bounds: tuple[Any, ...]) -> Mask:
         """Tell the pairs whose station is too wide for their box, and cut those stations."""
-        c, low, item, v = bounds
+        _, low, _, c, item, v = bounds
         gap = c - low[found.box]
         rows = np.arange(len(c))
         most = np.full(len(low), -np.inf)
         np.maximum.at(most, found.box, gap)
         curved = found.slack.curved[rows, item]
         with np.errstate(all="ignore"):
-            wide = np.where(
-                c == np.inf, curved[:, 0] > curved[:, 1:].max(axis=1, initial=0.0), v * curved[:, 0] > _SHARE * gap
+            wide = (curved[:, 0] > _SHARE * curved[:, 1:].sum(axis=1)) & (
+                (c == np.inf) | (v * curved[:, 0] > _SHARE * gap)
             )
             wide &= (gap > _SHARE * most[found.box]) | (gap == np.inf)
-        wide &= (gap > 0.0) & (c > -np.inf)
+        wide &= found.fresh & (gap > 0.0) & (c > -np.inf)
+        wide[np.flatnonzero(wide)[_MOST // 4 :]] = False
         self.stations.cut(np.unique(found.station[wide]))
         can = np.array([k in self.stations.children for k in found.station.tolist()], dtype=np.bool_)
         return np.asarray(wide & can)
+
+
+def _rank(box: Rows, key: Array, count: int) -> Rows:
+    """Place of every pair among those of its box, in the order of a key."""
+    order = np.lexsort((key, box))
+    first = np.searchsorted(box[order], np.arange(count))
+    place = np.empty(len(box), dtype=np.intp)
+    place[order] = np.arange(len(box)) - first[box[order]]
+    return place
 
 
 def joints_margin(

@@ -23,6 +23,7 @@ from graphsynth.pipeline.stages import Context
 if TYPE_CHECKING:
     from graphsynth.dynamics.elements import MotorDrive
     from graphsynth.dynamics.model import Body, DynamicModel
+    from graphsynth.jamming.joints.limits import JointLimits, Misalignment
     from graphsynth.kinematics.dimensional.goals import Goals, Target
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.laws import Driver
@@ -245,23 +246,11 @@ def jamming(context: Context, moved: Moved) -> Part:
 
     It is `Rejected` if they jam (or, with ``certify``, are not proved free) and ``must_be_free`` is true.
     """
-    from graphsynth.jamming.bearing.bearing import Bearing
-    from graphsynth.jamming.joints import Misalignment, assess_coupled, bearing_limits, certify_coupled
+    from graphsynth.jamming.joints import assess_coupled, certify_coupled
     from graphsynth.jamming.verdict import Verdict
 
     table: BearingsTable = context.scene.mechanism.bearings
-    bearing = Bearing(table.radius_mm, table.height_mm, table.clearance_mm)
-    limits = bearing_limits(bearing, table.condition, clearance_tolerance=table.clearance_tolerance_mm)
-    driver, alpha, spread = moved.motion.mechanism.drivers[0], table.alpha, table.alpha_tolerance
-    tilt = Misalignment(
-        driver.base,
-        driver.link,
-        alpha,
-        table.direction,
-        alpha_range=(max(alpha - spread, 0.0), alpha + spread) if spread else None,
-        direction_range=(0.0, math.tau) if table.any_direction else None,
-    )
-    parts = [part_of(own) for own in table.tolerances]
+    limits, tilt, parts = bearings_of(table, moved)
     given: Any = {"condition": table.condition, "tolerances": parts or table.length_tolerance}
     report = assess_coupled(moved.motion, limits, tilt, **given)
     verdict, reason = report.verdict, report.reason
@@ -279,6 +268,25 @@ def jamming(context: Context, moved: Moved) -> Part:
         Quantity.of_si("worst input", report.worst_input, "deg"),
     )
     return Part(f"bearings: {verdict.value}", good, margins, reason if verdict is Verdict.UNDECIDED else "")
+
+
+def bearings_of(table: BearingsTable, moved: Moved) -> tuple[JointLimits, Misalignment, list[PartTolerance]]:
+    """Return the limits of all bearings, the tilt of the driven axis, and the tolerances of the parts."""
+    from graphsynth.jamming.bearing.bearing import Bearing
+    from graphsynth.jamming.joints.limits import Misalignment, bearing_limits
+
+    bearing = Bearing(table.radius_mm, table.height_mm, table.clearance_mm)
+    limits = bearing_limits(bearing, table.condition, clearance_tolerance=table.clearance_tolerance_mm)
+    driver, alpha, spread = moved.motion.mechanism.drivers[0], table.alpha, table.alpha_tolerance
+    tilt = Misalignment(
+        driver.base,
+        driver.link,
+        alpha,
+        table.direction,
+        alpha_range=(max(alpha - spread, 0.0), alpha + spread) if spread else None,
+        direction_range=(0.0, math.tau) if table.any_direction else None,
+    )
+    return limits, tilt, [part_of(own) for own in table.tolerances]
 
 
 def part_of(table: ToleranceTable) -> PartTolerance:

@@ -28,6 +28,13 @@ def _more(scene: Any) -> tuple[Stage, ...]:
     if table.binding is not None:
         stages.append(Stage("binding", f"{_HERE}.binding:binding", ("moved",), ("bound",), each=True))
         parts.append("bound")
+    if table.risk is not None:
+        stages += [
+            Stage("risk", f"{_HERE}.risk:risk", ("moved",), ("risk", "risked"), each=True, cost=4.0),
+            Stage("tables of the risk", f"{_HERE}.risk:tables", ("risked",), ("tables",)),
+            Stage("cost of less risk", f"{_HERE}.risk:pictures", ("risked",), ("cost_over_risk",)),
+        ]
+        parts.append("risk")
     if table.loads is not None:
         stages.append(Stage("dynamics", f"{_HERE}.stages:dynamics", ("moved",), ("driven",), each=True, cost=3.0))
         parts.append("driven")

@@ -171,6 +171,37 @@ class BindingTable:
 
 
 @dataclass(frozen=True, slots=True)
+class GradeTable:
+    """A grade on offer for a toleranced quantity: a class of ISO 286 for a hole or shaft, or a range; its cost."""
+
+    quantity: str
+    cost: Annotated[float, In(least=0)]
+    tolerance_class: str = ""
+    range: str = ""
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        require(bool(self.tolerance_class) != bool(self.range), "needs either tolerance_class or range")
+
+
+@dataclass(frozen=True, slots=True)
+class RiskTable:
+    """How likely the bearings bind, every quantity with one kind of distribution; and which grades to buy."""
+
+    distribution: Literal["uniform", "normal", "triangular"] = "uniform"
+    width: Annotated[float, In(above=0, most=1)] = 0.01  # of the proved bounds
+    samples: Annotated[int, In(least=0, most=10_000_000)] = 10_000
+    sensitivities: bool = True
+    allowed: tuple[float, ...] = ()
+    grades: tuple[GradeTable, ...] = ()
+    trials: Annotated[int, In(least=1)] = 100
+
+    def __post_init__(self) -> None:
+        require(all(0.0 <= p < 1.0 for p in self.allowed), "has allowed probabilities outside 0 to 1; correct them")
+        require(bool(self.grades) == bool(self.allowed), "needs both grades and allowed, or none of them")
+
+
+@dataclass(frozen=True, slots=True)
 class DirectCurrentTable:
     """A direct-current motor with voltage ``gain`` times what its speed lacks; one constant for torque and back-emf."""
 
@@ -223,6 +254,7 @@ class PlanarTable:
     motion: MotionTable = field(default_factory=MotionTable)
     bearings: BearingsTable | None = None
     binding: BindingTable | None = None
+    risk: RiskTable | None = None
     loads: LoadsTable | None = None
     pictures: Annotated[int, In(least=1)] = 10
 
@@ -237,3 +269,7 @@ class PlanarTable:
             )
             sized = bool(self.files) or self.crank is not None
             require(sized, "has [mechanism.binding] but no crank_mm; a torque needs the size of the mechanism: give it")
+        require(
+            self.risk is None or self.bearings is not None,
+            "has [mechanism.risk] but no [mechanism.bearings]; the risk is that of the bearings: give them",
+        )
