@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -48,7 +49,7 @@ def changed(**risk: object) -> Scene:
     raw = dict(scene.raw)
     raw["mechanism"] = {**raw["mechanism"], "risk": {"samples": 0, "sensitivities": False, **risk}}
     raw["outputs"] = {"products": ["tables"]}
-    return Scene.from_mapping(raw, SCENE)
+    return replace(Scene.from_mapping(raw), folder=SCENE.parent)
 
 
 def test_the_risk_alone() -> None:

@@ -233,7 +233,7 @@ def test_public_name_and_bad_questions() -> None:
             probability_of_jamming(bad)
     with pytest.raises(GeometryError, match="no CommonFactor"):
         probability_of_jamming(ONE, common=["warm"])  # type: ignore[list-item]
-    assert "doubles" in repr(probability_of_jamming(ONE.replace(alpha=0.0145)))
+    assert "floating-point" in repr(probability_of_jamming(ONE.replace(alpha=0.0145)))
     assert "doubles" not in repr(probability_of_jamming(ONE))
     with pytest.raises(GeometryError, match="width"):
         probability_of_jamming(ONE, width=0.0)
