@@ -233,8 +233,8 @@ def test_public_name_and_bad_questions() -> None:
             probability_of_jamming(bad)
     with pytest.raises(GeometryError, match="no CommonFactor"):
         probability_of_jamming(ONE, common=["warm"])  # type: ignore[list-item]
-    assert "floating-point" in repr(probability_of_jamming(ONE.replace(alpha=0.0145)))
-    assert "doubles" not in repr(probability_of_jamming(ONE))
+    assert "floating-point" in probability_of_jamming(ONE.replace(alpha=0.0145)).statement
+    assert "floating-point" not in probability_of_jamming(ONE).statement
     with pytest.raises(GeometryError, match="width"):
         probability_of_jamming(ONE, width=0.0)
     with pytest.raises(GeometryError, match="no Distribution"):
