@@ -252,7 +252,9 @@ def _movements(
             ends = (A, B) if isinstance(system.mechanism.joints[k], Revolute) else (B,)
             moves.append(np.max([np.hypot(size(p.x), size(p.y)) for p in ends], axis=0))
     r = np.stack(moves, axis=1) if moves else np.zeros((count, 0))
-    return r * _ROUNDING, turned * _ROUNDING, sound
+    sound &= np.isfinite(r).all(axis=1) & np.isfinite(turned).all(axis=1)
+    r, turned = (np.where(np.isfinite(value), value * _ROUNDING, 0.0) for value in (r, turned))
+    return r, turned, sound
 
 
 def _beside(first: Interval, second: Interval) -> Interval:
