@@ -8,7 +8,7 @@ products of 3-vectors.  See theory/closure-in-space 2.
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -401,3 +401,9 @@ def _across(parts: list[Any]) -> Any:
     if isinstance(parts[0], Balls):
         return Balls(np.stack([p.mid for p in parts], 1), np.stack([p.rad for p in parts], 1))
     return np.stack(parts, 1)
+
+
+@lru_cache(maxsize=8)
+def closures(model: SpaceModel) -> tuple[Closure, Closure]:
+    """Closure of a model in floats and in balls."""
+    return Closure(model, False), Closure(model, True)

@@ -22,7 +22,7 @@ _ROUNDS = 60
 #: Rounds after which Newton's method is tried before the programs come to rest.
 _TRIES = (6, 10, 16, 26, 40)
 _RANK = 1e-11
-_PROJECTIONS = 100
+_PROJECTIONS, _STEPS = 100, 5
 #: Largest step of an unknown in one round (radians, units).
 _STEP = 0.3
 
@@ -81,6 +81,31 @@ def least_scale(closure: Closure, q: Array) -> Optimum:
                 return early
     last = _finished(closure, q, scale, found.by, converged)
     return last if last.converged else _general(closure, last)
+
+
+def some_closure(closure: Closure, q: Array) -> Optimum:
+    """Find a closure with some room in its limits, not the most: one program, then steps of least use of room.
+
+    ``scale`` is what it uses of the limits; infinite if it is none.
+    """
+    bounds, n = closure.model.bounds, closure.model.size
+    q = _nearer(closure, q)
+    q = _linearised(closure, q, np.array([b.chart(1.0) for b in bounds])).q
+    room = np.ones(n)
+    for bound in bounds:
+        room[list(bound.columns)] = max(bound.chart(1.0), 1e-12)
+    missed = math.inf
+    for _ in range(_STEPS):
+        loops = closure.loops(q[None])
+        value = closure.values(loops)[0]
+        missed = float(np.abs(value).max(initial=0.0))
+        if missed < 1e-13:
+            break
+        J = closure.jacobian(loops)[0][:, :n] * room
+        q[:n] -= room * (np.linalg.pinv(J, rcond=_RANK) @ value)
+    used = max((float(np.linalg.norm(q[list(b.columns)])) / b.chart(1.0) for b in bounds), default=0.0)
+    none = np.zeros(len(closure.rows)), np.zeros(len(bounds))
+    return Optimum(used if missed < 1e-9 else math.inf, q, *none, missed, False)
 
 
 def _general(closure: Closure, found: Optimum) -> Optimum:

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from graphsynth.intervals import check_rounding
 from graphsynth.jamming.space.binding import binds, body_box, multipliers
 from graphsynth.jamming.space.bodies import Bodies, stands_apart
-from graphsynth.jamming.space.closure import Closure
+from graphsynth.jamming.space.closure import Closure, closures
 from graphsynth.jamming.space.model import SHIFT_X, TURN, SpaceModel
-from graphsynth.jamming.space.optimum import Optimum, least_scale
+from graphsynth.jamming.space.optimum import Optimum, least_scale, some_closure
 from graphsynth.jamming.space.proof import Box, Certificate, branch_box, certificates, closes, contract, lower_bounds
 
 Array = NDArray[np.float64]
@@ -56,7 +56,8 @@ def prove_pose(
     given : ndarray, shape (drivers,), optional
         Half widths of a box of the given coordinates; what is proved holds for all of it.
     boxes : int
-        Boxes into which the unknowns are cut at most; 0 for none.
+        Boxes into which the unknowns are cut at most; 0 for none, and then freedom is tried with any closure first,
+        so that ``scale`` may be more than the least factor of what is free.
     reaches : tuple of float
         Half widths tried for the box of a branch.
 
@@ -67,8 +68,12 @@ def prove_pose(
         limits within ``reach`` of the reference.
     """
     check_rounding()
-    floats, enclosed = Closure(model, False), Closure(model, True)
+    floats, enclosed = closures(model)
     given = np.zeros(model.width - model.size) if given is None else given
+    if not boxes:
+        found = some_closure(floats, q)
+        if found.scale < 1.0 and closes(enclosed, found.q, _rates(floats, found.q), given):
+            return PoseProof(1, found.scale, math.inf, "closes within all limits", found)
     found = least_scale(floats, q)
     if found.scale < 1.0 and found.missed < 1e-9:
         free = closes(enclosed, found.q, _rates(floats, found.q), given)
@@ -109,7 +114,7 @@ def _bound_joints(
 ) -> float:
     """Largest reach with a proof of binding in the coordinates of the joints, or 0; first without cuts."""
     model = enclosed.model
-    floats = Closure(model, False)
+    floats = closures(model)[0]
     tried, rate = [], _rates(floats, q, free=True)
     for reach in _reaches(model, q, found, reaches):
         box, empty = contract(enclosed, branch_box(model, q, reach, given, rate))

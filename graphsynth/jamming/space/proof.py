@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from graphsynth.intervals.balls import Balls, exact
-from graphsynth.jamming.space.closure import Closure, swapped, times
+from graphsynth.jamming.space.closure import Closure, Loop, swapped, times
 from graphsynth.jamming.space.model import SLIDE, TILT_X, TILT_Y, SpaceModel
 from graphsynth.jamming.space.optimum import Optimum
 
@@ -43,15 +43,15 @@ def closes(closure: Closure, at: Array, rate: Array, given: Array) -> bool:
     (drivers,) are the half widths of the box; ``rate`` (size, drivers) the change of the unknowns.
     """
     model = closure.model
-    basic = _basic(closure, at) if closure.rows else np.zeros(0, dtype=np.intp)
-    if len(basic) < len(closure.rows):
-        return False
     along = np.concatenate([rate, np.eye(len(given))])
     still = (np.abs(along) @ given) * _UP
     if not closure.rows:
         return _within(model, at, still)
     loops = closure.loops(exact(at[None]))
     value, J = closure.values(loops), closure.jacobian(loops)
+    basic = _basic(model, at, J.mid[0])
+    if len(basic) < len(closure.rows):
+        return False
     inverse = exact(np.linalg.pinv(J.mid[:, :, basic]))
     start = times(inverse, value[..., None])[0, :, 0].size
     start = start + times(inverse, times(J, exact(along[None])))[0].size @ given
@@ -60,34 +60,33 @@ def closes(closure: Closure, at: Array, rate: Array, given: Array) -> bool:
     for _ in range(_FREE_STEPS):
         whole = still.copy()
         whole[basic] += reach
-        H = closure.hessian(closure.loops(Balls(at[None], whole[None])), inverse)[0]
+        around = closure.loops(Balls(at[None], whole[None]))
+        H = closure.hessian(around, inverse)[0]
         turned = times(H, exact(along[None]))
         bend = (times(exact(along.T[None]), turned).size @ given) @ given  # of the given coordinates alone
         bend = bend + 2.0 * (turned.size[:, basic] @ given) @ reach
         bend = bend + ((H.size[:, basic][:, :, basic]) @ reach) @ reach
         image = (start + rest @ reach + 0.5 * bend) * _UP
         if (image < reach).all():
-            return _identity(closure, at, whole) and _within(model, at, whole)
+            return _identity(around) and _within(model, at, whole)
         reach = np.maximum(1.5 * image, reach) + 1e-300
         if not np.isfinite(reach).all() or reach.max() > 1.0:
             return False
     return False
 
 
-def _basic(closure: Closure, at: Array) -> Ints:
+def _basic(model: SpaceModel, at: Array, J: Array) -> Ints:
     """Unknowns to solve for: as many as equations, those with most room in their limits first."""
-    model = closure.model
     room = np.ones(model.size)
     for bound in model.bounds:
         columns = list(bound.columns)
         left = bound.chart(1.0) - float(np.linalg.norm(at[columns]))
         room[columns] = min(1.0, max(left, 1e-12))
-    return _pivots(closure, at, room)
+    return _pivots(J[:, : model.size], room)
 
 
-def _pivots(closure: Closure, at: Array, weight: Array) -> Ints:
-    """Independent columns of the derivative at a point, the largest by weight first."""
-    J = closure.jacobian(closure.loops(exact(at[None]))).mid[0][:, : closure.model.size]
+def _pivots(J: Array, weight: Array) -> Ints:
+    """Independent columns of a derivative, the largest by weight first."""
     _, upper, order = qr(J * weight, mode="economic", pivoting=True)
     diagonal = np.abs(np.diag(upper))
     rank = int((diagonal > 1e-11 * diagonal.max(initial=0.0)).sum())
@@ -104,9 +103,9 @@ def _within(model: SpaceModel, at: Array, radius: Array) -> bool:
     return True
 
 
-def _identity(closure: Closure, at: Array, radius: Array) -> bool:
+def _identity(loops: list[Loop]) -> bool:
     """Whether a symmetric rotation of every loop is the identity: no half turn is within the box."""
-    for loop in closure.loops(Balls(at[None], radius[None])):
+    for loop in loops:
         trace = loop.R[..., 0, 0] + loop.R[..., 1, 1] + loop.R[..., 2, 2]
         if not (trace.mid - trace.rad > -0.99).all():
             return False
@@ -170,7 +169,8 @@ def contract(closure: Closure, box: Box) -> tuple[Box, NDArray[np.bool_]]:
     empty = np.zeros(len(low), dtype=bool)
     ball = box.ball
     weight = np.maximum(ball.rad[0], 1e-300)[: closure.model.size]
-    basic = _pivots(closure, box.unknowns(exact(ball.mid)).mid[0], weight)
+    J = closure.jacobian(closure.loops(exact(box.unknowns(exact(ball.mid[:1])).mid)))
+    basic = _pivots(J.mid[0][:, : closure.model.size], weight)
     for _ in range(_CONTRACTIONS):
         live = np.flatnonzero(~empty)
         before = (high - low)[live]
