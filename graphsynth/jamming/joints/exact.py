@@ -213,8 +213,7 @@ def _movements(
     amounts = np.concatenate([offset, offset, twist], axis=1)
     width, q = n + amounts.shape[1], system.driven(u)
     around = Interval.from_bounds(-amounts, amounts)
-    # rooms of dyads do not depend on the unknowns
-    steps = np.concatenate([np.zeros((count, n)), amounts], axis=1).T
+    steps = np.concatenate([np.zeros((count, n)), amounts], axis=1).T  # dyads do not depend on the unknowns
     system = system.about(tubes.rooms, Interval.from_bounds(-steps, steps))
 
     def rates(x: Interval) -> tuple[list[Any], Interval, Mask]:
