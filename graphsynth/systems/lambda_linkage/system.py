@@ -58,6 +58,7 @@ SYSTEM = System(
         "areas",
         "arc-ends",
         "coupled-joints",
+        "probability",
         "exact-closure",
         "positions",
         "dimensions",
