@@ -26,8 +26,6 @@ DARK = {name: dark for name, (_, dark) in _PAIRS.items()}
 WHITE = "#fefefe"
 #: Colours of paths, in order of use.
 TRACE_COLOURS = ("a", "c", "d", "b")
-
-
 #: Rules that give every element with a light colour its dark one; nothing above it counts, for copies by `use`.
 _RECOLOURED = "".join(
     f'[{what}="{light}"]{{{what}:{dark}}}'
@@ -35,11 +33,17 @@ _RECOLOURED = "".join(
     for what in ("fill", "stroke")
 )
 _ON_LIGHT, _ON_DARK = (";".join(f"--{name}:{value}" for name, value in own.items()) for own in (LIGHT, DARK))
-#: Style sheet of every SVG.  The attributes alone are a right picture, on white paper, for programs that read no style
+#: Rules of pictures.  The attributes alone are a right picture, on white paper, for programs that read no style
 #: sheets; these rules follow readers who ask for dark pages or for reduced motion (see `graphsynth.drawing.moving`).
 STYLE = (
     f"@media (prefers-color-scheme:dark){{svg.gs:root{{color-scheme:dark}}{_RECOLOURED}}}"
     "@media (prefers-reduced-motion:reduce){.gs .move{display:none}.gs .rest{display:inline}}"
+)
+#: Style sheet of every SVG that stands alone: its paper too, for the page it is put in (a notebook) may be of the other
+#: scheme than the one the reader asks the system for.
+STYLE_ALONE = STYLE + "".join(
+    f"@media (prefers-color-scheme:{scheme}){{svg.gs{{background:{own['paper']}}}}}"
+    for scheme, own in (("light", LIGHT), ("dark", DARK))
 )
 #: The same colours by name, for the style sheet of a page.
 VARIABLES = f":root{{color-scheme:light dark;{_ON_LIGHT}}}@media (prefers-color-scheme:dark){{:root{{{_ON_DARK}}}}}"

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from graphsynth.drawing.palette import LIGHT, STYLE
+from graphsynth.drawing.palette import LIGHT, STYLE_ALONE
 from graphsynth.drawing.svg import FONT, sound
 
 if TYPE_CHECKING:
@@ -243,7 +243,7 @@ def themed_svg(figure: Figure, settings: Mapping[str, Any] | None = None) -> str
     body = re.sub(r'( id="| xlink:href="#|url\(#)', rf"\g<1>{mark}-", body)
     head, inside = body.removesuffix("</svg>").split(">", 1)
     return (
-        f'{head.replace("<svg ", f"""<svg class="gs" font-family="{FONT}" """, 1)}><style>{STYLE}</style>'
+        f'{head.replace("<svg ", f"""<svg class="gs" font-family="{FONT}" """, 1)}><style>{STYLE_ALONE}</style>'
         f'<g fill="{LIGHT["ink"]}" stroke-linejoin="round">{inside}</g></svg>'
     )
 

@@ -6,7 +6,7 @@ import html
 import re
 from collections.abc import Callable, Iterable
 
-from graphsynth.drawing.palette import LIGHT, STYLE
+from graphsynth.drawing.palette import LIGHT, STYLE_ALONE
 from graphsynth.drawing.shapes import Circle, Point, Shape, Style, Text
 
 ToPage = Callable[[Point], tuple[float, float]]
@@ -15,8 +15,6 @@ ToPage = Callable[[Point], tuple[float, float]]
 FONT = "system-ui,-apple-system,'Segoe UI',Roboto,sans-serif"
 #: Half the height of a capital or a digit in units of the size: few programs know another baseline than the letters'.
 _HALF_CAPITAL = 0.36
-
-
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -127,7 +125,7 @@ def _text(shape: Text, xy: ToPage, part: str, upright: str) -> str:
     return f"{around[0]}{written}{around[1]}"
 
 
-def picture(body: Iterable[str], width: float, height: float, title: str = "", *, style: str = STYLE) -> str:
+def picture(body: Iterable[str], width: float, height: float, title: str = "", *, style: str = STYLE_ALONE) -> str:
     """Wrap elements in one ``<svg>`` that needs nothing else; without ``style`` the page has the rules."""
     name = f"<title>{escape(title)}</title>" if title else ""
     rules = f"<style>{style}</style>" if style else ""
@@ -140,4 +138,4 @@ def picture(body: Iterable[str], width: float, height: float, title: str = "", *
 
 def bare(svg: str) -> str:
     """Return a picture without its rules, for a page or a picture that has them."""
-    return svg.replace(f"<style>{STYLE}</style>", "", 1)
+    return svg.replace(f"<style>{STYLE_ALONE}</style>", "", 1)

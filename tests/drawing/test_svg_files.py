@@ -263,3 +263,21 @@ def test_all_parts_of_a_picture_have_one_clock(window: Any, tmp_path: Path) -> N
             assert max(worst for worst, _ in seen) < 0.3
     finally:
         window.execute_cdp_cmd("Emulation.setCPUThrottlingRate", {"rate": 1})
+
+
+@pytest.mark.parametrize("page", ["#fff", "#111"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_notebook_of_the_other_scheme_shows_pictures_on_their_own_paper(
+    window: Any, tmp_path: Path, page: str, scheme: str
+) -> None:
+    """A notebook has a scheme of its own, pictures follow that of the system: inks are read on the paper they bring."""
+    figure = new_figure((3.0, 2.0))
+    figure.add_subplot().plot([0.0, 1.0], [0.0, 1.0], color=LIGHT["a"])
+    path = tmp_path / "x.html"
+    path.write_text(f"<!doctype html><body style='margin:0;background:{page}'>{themed_svg(figure)}</body>", "utf-8")
+    shown = in_chromium(window, path, (400, 192), paused=False, **{"color-scheme": scheme}).convert("RGB")
+    colours = LIGHT if scheme == "light" else DARK
+    seen = {f"#{r:02x}{g:02x}{b:02x}" for _, (r, g, b) in shown.crop((0, 0, 288, 192)).getcolors(1 << 24)}
+    assert {colours["paper"], colours["ink"], colours["a"]} <= seen
+    assert "#{:02x}{:02x}{:02x}".format(*shown.getpixel((1, 1))) == colours["paper"]
+    assert "#{:02x}{:02x}{:02x}".format(*shown.getpixel((350, 100))) == f"#{page[1:] * 2}"

@@ -10,7 +10,7 @@
   // for files: plain colours, which every program reads, and rules for dark pages on top; on the page the style sheet
   // gives the names
   const DARK = Object.values(COLOURS).flatMap(([light, dark]) => ["fill", "stroke"].map(what => `[${what}="${light}"]{${what}:${dark}}`));
-  const STYLE = `<style>@media (prefers-color-scheme:dark){svg:root{color-scheme:dark}${DARK.join("")}}</style>`;
+  const STYLE = `<style>@media (prefers-color-scheme:light){svg:root{background:#ffffff}}@media (prefers-color-scheme:dark){svg:root{color-scheme:dark;background:#14181b}${DARK.join("")}}</style>`;
   const plain = body => body.replace(/var\(--(\w+)\)/g, (_, name) => COLOURS[name][0]);
   const short = value => String(Math.round(value * 10) / 10);
   let pictures = 0;
