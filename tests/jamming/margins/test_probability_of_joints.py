@@ -27,6 +27,7 @@ def fixed(value: str) -> Distribution:
     return Distribution("uniform", Range(Fraction(value), Fraction(value)))
 
 
+@pytest.mark.slow
 def test_one_quantity_over_the_full_rotation() -> None:
     """Three equal bearings bind if and only if alpha > 2 t (theory/joints-that-share-a-tilt 6)."""
     margin = joints_margin(FOUR.simulate("0..360 deg"), JointLimits(0.006), ALPHA)
@@ -65,12 +66,12 @@ def test_part_of_a_rotation_is_less_likely_to_bind() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(CASES))
 def test_bounds_hold_the_interval_of_random_members(name: str) -> None:
-    found = probability(CASES[name](), width=5e-3, seconds=20.0)
+    found = probability(CASES[name](), width=5e-3, seconds=5.0)
     drawn = found.sampled(20_000)
     assert drawn.lower <= found.upper and found.lower <= drawn.upper
 
 
-@pytest.mark.parametrize("name", list(CASES))
+@pytest.mark.parametrize("name", ["crank_slider", "fitted", "spherical"])
 def test_sampled_margins_are_those_of_members(name: str) -> None:
     """Signs of sampled margins near binding, against members with their own dimensions."""
     margin, rng = CASES[name](), np.random.default_rng(3)
