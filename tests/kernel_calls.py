@@ -105,6 +105,11 @@ def more_calls() -> None:
     model = DynamicModel(Mechanism(ring, joints, [Driver(0, 1)]), bodies)
     start = {"keep": {(0, 1): 0.0}, "keep_rates": {(0, 1): 10.0}, "modes": {0: 1}}
     simulate_dynamics(model, [0.0, 0.5, 1.0], form="partitioned", **start)
+    chain = gs.enumerate_chains(8)[1]  # no group of three links whose poses are roots of a polynomial
+    at = np.random.default_rng(1).normal(size=(len(chain.joints), 2)).tolist()
+    joints = [Revolute(a, b, (x, y), (x, y)) for (a, b, _), (x, y) in zip(chain.joints, at, strict=True)]
+    frame = gs.MechanismGraph(8, [joint.pair for joint in joints], frame=4)
+    Mechanism(frame, joints, [Driver(4, 5)], pose=((0.0, 0.0, 0.0),) * 8).modes()
 
 
 def main(path: Path, *slow: str) -> None:
