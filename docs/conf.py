@@ -133,6 +133,14 @@ def _long_cells(app: Any, doctree: nodes.document, name: str) -> None:
             cell["classes"].append("long")
 
 
+def _tables_of_keys(app: Any, doctree: nodes.document, name: str) -> None:
+    """Mark tables whose last column, of five, is the meaning: on a phone each row becomes a paragraph."""
+    for table in doctree.findall(nodes.table):
+        heads = [entry.astext() for entry in next(iter(table.findall(nodes.thead))).findall(nodes.entry)]
+        if heads == ["key", "type", "unit", "default", "meaning"]:
+            table["classes"].append("keys")
+
+
 def _dotted_names(app: Any, doctree: nodes.document, name: str) -> None:
     """Let the dotted names of tables and headings break behind a dot, not in a word."""
     places = [place for kind in (nodes.entry, nodes.title) for place in doctree.findall(kind)]
@@ -186,6 +194,7 @@ def setup(app: Any) -> dict[str, bool]:
     app.connect("doctree-read", _spaced_names)
     app.connect("doctree-resolved", _whole_numbers)
     app.connect("doctree-resolved", _long_cells)
+    app.connect("doctree-resolved", _tables_of_keys)
     app.connect("doctree-resolved", _dotted_names)
     app.connect("env-updated", _note_other_names)
     app.add_html_math_renderer("mathml", (_formula, None), (_formula, None))

@@ -21,7 +21,7 @@ def built(graph: MechanismGraph, joints: Iterable[Any], pose: Iterable[Any] | No
 
 
 def four_bar(crank: float, coupler: float, rocker: float, frame: float) -> Mechanism:
-    """Four turning pairs, link 1 driven, the frame's second joint on +x."""
+    """Four revolute joints, link 1 driven, the frame's second joint on +x."""
     from graphsynth.mechanism.joints import Revolute
     from graphsynth.structure.graph import MechanismGraph
 

@@ -229,7 +229,7 @@ def jam_arcs() -> str:
     board.text(384 + 12j, "f − ψ1", size=13)
     board.text(60 + 92j, "sin(f − ψ1)", colour="a", size=13)
     for f in (180, 360):
-        board.text(complex(f + 12, -10), f"{f}°", size=12, colour="note")
+        board.text(complex(f - 12 if f == 180 else f + 12, -10), f"{f}°", size=12, colour="note")
     board.text(180 - 74j, "jam arcs", colour="b", size=13)
     return board.svg("Two jam arcs per turn, where the sine of the tilt exceeds the critical one")
 
@@ -284,8 +284,8 @@ def half_spaces() -> str:
         board.line(*(complex(x, height + shift + slope * (x - at)) for x in (left, right)), colour=colour, width=2.2)
     board.text(345 + 60j, "free at every input", colour="a", size=13)
     board.text(150 + 198j, "binds", colour="b", size=13)
-    board.text(306 + 196j, "a·δ = low", colour="b", size=13)
-    board.text(300 + 158j, "a·δ = c", colour="a", size=13)
+    board.text(306 + 175j, "a·δ = low", colour="b", size=13)
+    board.text(300 + 154j, "a·δ = c", colour="a", size=13)
     board.text(440 - 14j, "limit", size=13)
     board.text(28 + 200j, "tilt", size=13)
     return board.svg("Free members lie between the half spaces of all wrenches; two lines of a box bound what binds")
@@ -307,7 +307,7 @@ def whitney() -> str:
     board.arrow(tip, tip + 17, colour="b", width=2)
     board.text(tip - 22j - 5, "Fz", colour="b")
     board.text(tip + 11 + 6j, "Fx", colour="b")
-    board.span(-45 + 12j, complex(-45, tip.imag), "l", -4)
+    board.span(-43 + 12j, complex(-43, tip.imag), "l", -3.5)
     slope, reach = 0.55, 1.6
     centre = 118 - 5j
     corners = [
@@ -322,7 +322,7 @@ def whitney() -> str:
     board.arrow(centre - 44, centre + 46, colour="note", width=1)
     board.arrow(centre - 50j, centre + 49j, colour="note", width=1)
     board.line(*(centre + corner for corner in corners), fill="c", colour="c", width=2)
-    board.text(centre + 40 - 6j, "Fx / Fz", size=13)
+    board.text(centre + 42.5 - 5.5j, "Fx / Fz", size=13)
     board.text(centre + 18 + 46j, "M / (r Fz)", size=13)
     board.text(centre + 12j - 12, "no jamming", size=13)
     board.text(centre + 38 + 5j, "1/μ", size=12, colour="note")
@@ -413,11 +413,12 @@ def modes() -> str:
         for elbow, corner in zip(elbows, corners, strict=True):
             board.line(elbow, corner, colour=colour, width=1.6, dash="" if colour == "a" else "6 4")
             board.joint(corner)
-    for pivot, elbow, name in zip(g1.D, elbows, ("A1", "A2", "A3"), strict=True):
+    names = (("A1", -0.17 + 0.12j), ("A2", 0.03 - 0.16j), ("A3", 0.16 + 0.08j))
+    for pivot, elbow, (name, aside) in zip(g1.D, elbows, names, strict=True):
         board.line(pivot, elbow, width=3)
         board.ground(pivot)
         board.joint(elbow)
-        board.text(elbow + 0.16 + 0.08j, name)
+        board.text(elbow + aside, name)
     return board.svg("The two assembly modes of a platform: the same rocker angles, two poses")
 
 
@@ -431,7 +432,7 @@ def singular() -> str:
     for D, arm, angle in zip(mock.D, mock.l1, angles, strict=True):
         elbow = D + arm * cmath.exp(1j * float(angle))
         board.line(elbow, -0.3 * elbow, colour="b", width=1.2, dash="6 4")
-    board.text(16 - 9j, "det J = 0", colour="b", size=13)
+    board.text(72 - 38j, "det J = 0", colour="b", size=13)
     return board.svg("A type-II singularity: the lines of the three intermediate links pass through one point")
 
 
@@ -601,8 +602,8 @@ def body() -> str:
     board.arrow(centre, centre - 40j, colour="b", width=2.2)
     board.joint(*ends, centre)
     for at, text, colour in (
-        (centre - 4 + 10j, "(x, y, ψ)", "ink"),
-        ((centre + ends[1]) / 2 - 3 + 9j, "A(ψ) s", "c"),
+        (centre - 20 + 22j, "(x, y, ψ)", "ink"),
+        ((centre + ends[1]) / 2 + 5 - 7j, "A(ψ) s", "c"),
         (ends[1] + 42 + 22j, "−λ", "b"),
         (centre + 14 - 36j, "m g", "b"),
         (28 + 7j, "r", "note"),
@@ -665,7 +666,7 @@ def inverse_design() -> str:
     board.ground(axis, pivot)
     for at, text in (
         (far + 2 + 6j, "C+"),
-        (near - 3 + 6j, "C−"),
+        (near + 8 + 2j, "C−"),
         (3 - 8j, "O"),
         (pivot + 6 + 4j, "D"),
     ):
@@ -724,7 +725,8 @@ def tabled_positions() -> str:
         board.line(0j, a, width=1.6)
         board.line(a, b, colour="a", width=1.6)
         board.joint(a, b)
-        board.text(1.2 * a, f"{f}°", colour="note", size=12)
+        aside = {30: 0.76 * cmath.exp(-0.2j), 45: 0.8 * cmath.exp(0.26j), 90: 0.84}.get(f, 1.2)
+        board.text(aside * a, f"{f}°", colour="note", size=12)
     board.ground(0j, 2 + 0j)
     return board.svg("The lambda linkage at the crank angles of the table: O A, A B and the path of B")
 
@@ -740,7 +742,8 @@ def both_modes_of_legs() -> str:
             elbow = pivot + arm * cmath.exp(1j * float(angle))
             board.line(pivot, elbow, corner, colour=colour, width=2.4, dash="" if sign > 0 else "6 4")
             board.joint(elbow)
-            board.text(elbow + 0.2 * (elbow - pivot) / arm, f"θ{k}({'+' if sign > 0 else '−'})", colour=colour, size=13)
+            aside = 0.2 * (elbow - pivot) / arm if k < 3 else 0.1 * sign + 0.15j
+            board.text(elbow + aside, f"θ{k}({'+' if sign > 0 else '−'})", colour=colour, size=13)
     board.line(*corners, fill="a", colour="a", width=2)
     board.joint(*corners)
     for pivot in g1.D:
@@ -796,7 +799,7 @@ def binding() -> str:
     for at, text, colour in ((90 - 16j, "t", "ink"), (205 - 16j, "|τ|", "ink"), (-2 + 132j, "moment", "note")):
         board.text(at, text, colour=colour, size=13)
     board.text(45 + 12j, "free", colour="c", size=13)
-    board.text(112 + 62j, "k (|τ| − t)", colour="b", size=13)
+    board.text(96 + 68j, "k (|τ| − t)", colour="b", size=13)
     motion = gs.Mechanism.four_bar(0.2, 0.1, 0.25, 0.25).simulate([math.radians(f) for f in range(0, 361, 2)])
     report = motion.binding(tilt=0.0135, joints=Bearing(), stiffness=2000.0, friction=0.1)
     left = 260.0

@@ -21,7 +21,7 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, slots=True)
 class Guide:
-    """The line of a sliding pair or the middle of a slot, from the first to the last place that is used."""
+    """The line of a prismatic joint or the middle of a slot, from the first to the last place that is used."""
 
     joint: JointGeometry
     start: complex

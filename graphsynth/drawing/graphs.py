@@ -31,7 +31,7 @@ def graph_sketch(
 ) -> tuple[Sketch, list[tuple[float, float, float]]]:
     """Build the kinematic diagram of a chain or a mechanism from its automatic sketch.
 
-    `graph`: planar (space 3), joints of mobility 1 (drawn as turning pairs) and 2 (drawn as a pin in a slot).  With a
+    `graph`: planar (space 3), joints of mobility 1 (drawn as revolute joints) and 2 (drawn as a pin in a slot).  With a
     frame its joints stand on the ground; without one all links are alike. `driver`: link on the frame whose joint gets
     the driver's arrow. `width`, `height`: largest size in pixels. `numbers`: write the numbers of the links. `title`:
     read out by screen readers. The diagram and the pose it is drawn in: ``sketch.svg(pose)``.  The mean distance of

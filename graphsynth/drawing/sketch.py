@@ -4,8 +4,8 @@ A :class:`Sketch` collects shapes in the units of the mechanism (y upwards).  Sy
 the page whatever the units.  `Sketch.svg` writes one self-contained ``<svg>``; `graphsynth.drawing.export` draws the
 same list of shapes through matplotlib.
 
-Symbols (ISO 3952): a turning pair is an open circle; a pair on the frame stands on a triangle with hatching; a link
-with two pairs is a bar, with more a shaded plate; a gear is a dash-dotted pitch circle with its centre marked.
+Symbols (ISO 3952): a revolute joint is an open circle; one on the frame stands on a triangle with hatching; a link
+with two joints is a bar, with more a shaded plate; a gear is a dash-dotted pitch circle with its centre marked.
 """
 
 from __future__ import annotations

@@ -155,7 +155,7 @@ def _guide_ground(plan: Plan, guide: Guide, aside: float) -> None:
 
 
 def draw_joints(plan: Plan) -> list[tuple[complex, complex]]:
-    """Draw every turning pair and pin once; return where ground stands and which way it points."""
+    """Draw every revolute joint and pin once; return where ground stands and which way it points."""
     sketch = plan.sketch
     grounds: list[tuple[complex, complex]] = []
     for joint in plan.mechanism.joints:
@@ -206,7 +206,7 @@ def _ground_direction(plan: Plan, at: complex, link: int) -> complex:
 
 
 def draw_arrow(plan: Plan, driver: Driver, grounds: list[tuple[complex, complex]]) -> None:
-    """Sense of a driver: an arc around a turning pair, a straight arrow beside a slider."""
+    """Sense of a driver: an arc around a revolute joint, a straight arrow beside a slider."""
     joint = plan.mechanism.joint(*driver.pair)
     rate = np.asarray(driver.law(np.array([0.0, 1.0]))[1], dtype=np.float64)
     sense = -1.0 if np.isfinite(rate[0]) and rate[0] < 0.0 else 1.0

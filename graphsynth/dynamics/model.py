@@ -211,7 +211,7 @@ class DynamicModel:
         joint = self.mechanism.joint(element.a, element.b)
         if isinstance(joint, Revolute):
             if not element.radius > 0.0:
-                raise GeometryError(f"friction in turning pair {element.a}-{element.b} needs the radius of the pin")
+                raise GeometryError(f"friction in revolute joint {element.a}-{element.b} needs the radius of the pin")
         elif not isinstance(joint, Prismatic | PinSlot):
             raise GeometryError(
                 f"friction in joint {element.a}-{element.b}: only R and P joints and pins in slots, not {joint.kind}"

@@ -209,7 +209,10 @@ class Goals:
         distances of a tracing point from the joints of its link count among the long ones.
     target : LineGoal, PathGoal, PosesGoal or FunctionGoal, optional
 
-    `GeometryError` for a bound that nothing can satisfy, or a target of another type.
+    Raises
+    ------
+    GeometryError
+        A bound that nothing can satisfy, or a target of another type.
 
     Examples
     --------

@@ -149,7 +149,7 @@ def _crank(mechanism: Mechanism) -> float:
 
 
 def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
-    """Return the mechanism with all lengths multiplied (turning and sliding pairs, pins in slots).
+    """Return the mechanism with all lengths multiplied (revolute and prismatic joints, pins in slots).
 
     >>> from graphsynth.mechanism.model import Mechanism
     >>> scaled(Mechanism.four_bar(2.0, 1.0, 2.5, 2.5), 0.5).joint(2, 3).at_a

@@ -49,7 +49,7 @@ class PistonLoads:
     slot : ndarray, shape (n,)
         Normal force of the crosshead's slot on the piston; 0 without a second group.
     yoke : ndarray, shape (n,)
-        Normal force of the block on the yoke; 0 for a crank-slider.
+        Normal force of the block on the yoke; 0 for a slider-crank.
     guide_couple, wall_couple : ndarray, shape (n,)
         With a crowned slot, which carries no couple.  One couple may circulate on top of it in a sliding one, see
         `self_stress`.

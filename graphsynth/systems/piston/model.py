@@ -1,6 +1,6 @@
 """The floating piston: a crank drive and, on its crosshead, a piston in a structural group of its own; closed forms.
 
-Drives are the crank-slider (RRP) and the Scotch yoke (RPP); positions have two derivatives by the crank angle.
+Drives are the slider-crank (RRP) and the Scotch yoke (RPP); positions have two derivatives by the crank angle.
 """
 
 from __future__ import annotations
@@ -79,8 +79,8 @@ class CrankSlider:
     kind: ClassVar[str] = "RRP"
 
     def __post_init__(self) -> None:
-        _finite(self, "crank-slider", "crank", "rod", check=positive)
-        _finite(self, "crank-slider", "offset")
+        _finite(self, "slider-crank", "crank", "rod", check=positive)
+        _finite(self, "slider-crank", "offset")
         if self.branch not in (1, -1):
             raise GeometryError(f"branch = {self.branch!r} must be 1 or -1: the side of the crosshead")
         check_fields(self, ("crank", "rod"), small=("offset",))
@@ -355,7 +355,7 @@ class FloatingPiston:
 
     @classmethod
     def crank_slider(cls, crank: float, rod: float, offset: float = 0.0, **group: float) -> FloatingPiston:
-        """Return the crank-slider with a floating piston; further keywords are those of `FloatingGroup`."""
+        """Return the slider-crank with a floating piston; further keywords are those of `FloatingGroup`."""
         return cls(CrankSlider(crank, rod, offset), FloatingGroup(**group))
 
     @classmethod

@@ -71,7 +71,7 @@ class _Drawing:
             reach += [self._slot_end(sense) for sense in (1.0, -1.0)]
         low = complex(min(p.real for p in reach), min(p.imag for p in reach))
         high = complex(max(p.real for p in reach), max(p.imag for p in reach))
-        what = "crank-slider" if self.slider else "Scotch yoke"
+        what = "slider-crank" if self.slider else "Scotch yoke"
         title = f"{what} {'with' if group is not None else 'without'} floating piston, crank at {degrees(angle)}"
         self.sketch = Sketch(low, high, width, 26.0, title, symbol=min(1.0, width / 560.0))
         self._draw()
@@ -179,7 +179,7 @@ class _Drawing:
             sketch.label(self._slot_end(1.0, self.crosshead), "3", 11j, colour="note")
             sketch.label(self._on_axis(self.place + self.stem), "4", 0j, colour="note")
         else:
-            # beside the pin of a crank-slider's piston, in the middle of a yoke's
+            # beside the pin of a slider-crank's piston, in the middle of a yoke's
             at = self.crosshead + (0.17 * self.r if self.slider else self.stem)
             sketch.label(at, "3", 0j, colour="note")
         sketch.on()

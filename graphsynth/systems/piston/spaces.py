@@ -249,7 +249,7 @@ def _check_basis(graph: MechanismGraph, loops: Sequence[Sequence[int]]) -> None:
 
 _JOINTS = ((0, 1), (1, 2), (2, 3), (0, 3), (3, 4), (0, 4))
 _FULL_TURN = {
-    "RR": (True, "crank-slider: the crank turns fully if the rod is longer than crank + |offset|"),
+    "RR": (True, "slider-crank: the crank turns fully if the rod is longer than crank + |offset|"),
     "RP": (True, "Scotch yoke: the crank turns fully with any dimensions"),
     "PR": (False, "swinging block: the pin runs to infinity where the crank is parallel to the guide"),
 }

@@ -22,7 +22,7 @@ from graphsynth.systems.piston.spaces import Assignment, LoopSpaces, loop_spaces
 from graphsynth.systems.piston.turn import PistonComparison, PistonTurn, compare_pistons
 
 Loops = tuple[tuple[tuple[str, LoopSpaces], ...], tuple[Assignment, ...]]
-_KINDS = {"crank_slider": "crank-slider", "scotch_yoke": "Scotch yoke"}
+_KINDS = {"crank_slider": "slider-crank", "scotch_yoke": "Scotch yoke"}
 _POSES = (1.0, 4.0)
 
 

@@ -20,7 +20,7 @@ Inertia = Annotated[float, In("kg m^2")]
 
 @dataclass(frozen=True, slots=True)
 class DriveTable:
-    """The first group: crank, rod (of the crank-slider), angle of the yoke's slot, offset of the crosshead's axis."""
+    """The first group: crank, rod (of the slider-crank), angle of the yoke's slot, offset of the crosshead's axis."""
 
     crank: Size
     rod: Length = math.nan

@@ -145,8 +145,8 @@ def test_angle_at_a_dead_centre(ends):
     [
         (lambda: CrankSlider(0.1, 0.12, 0.03), r"rod of 0\.12 m is too short.*longer than.*0\.13 m; lengthen"),
         (lambda: CrankSlider(0.1, 0.1), "too short for a full turn"),
-        (lambda: CrankSlider(-0.1, 0.2), "crank of the crank-slider"),
-        (lambda: CrankSlider(0.1, math.nan), "rod of the crank-slider"),
+        (lambda: CrankSlider(-0.1, 0.2), "crank of the slider-crank"),
+        (lambda: CrankSlider(0.1, math.nan), "rod of the slider-crank"),
         (lambda: CrankSlider(0.1, 0.2, branch=0), "branch = 0"),
         (lambda: ScotchYoke(0.1, yoke_angle=0.0), "does not drive the yoke"),
         (lambda: ScotchYoke(0.0), "crank of the Scotch yoke"),

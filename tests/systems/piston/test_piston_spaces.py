@@ -14,7 +14,7 @@ from graphsynth.systems.piston import FloatingPiston, ScotchYoke, loop_spaces, r
 from graphsynth.systems.piston.model import FloatingGroup
 
 BOTH = {
-    "crank-slider": FloatingPiston.crank_slider(0.05, 0.2, 0.01, cylinder_angle=0.1, lead=0.05),
+    "slider-crank": FloatingPiston.crank_slider(0.05, 0.2, 0.01, cylinder_angle=0.1, lead=0.05),
     "Scotch yoke": FloatingPiston(ScotchYoke(0.05, 0.01, 1.3), FloatingGroup(slot_angle=1.5)),
 }
 
@@ -40,23 +40,23 @@ def test_both_source_mechanisms(machine):
 
 
 def test_the_load_that_circulates_is_a_couple():
-    second = loop_spaces(BOTH["crank-slider"].mechanism()).loops[1]
+    second = loop_spaces(BOTH["slider-crank"].mechanism()).loops[1]
     assert second.idle.shape == (1, 3)
     assert np.abs(np.abs(second.idle[0]) - [1.0, 0.0, 0.0]).max() < 1e-12
 
 
 def test_uniform_count_of_the_graph_is_the_generic_one():
     # at random geometry (no three parallel directions) the same graph is a structure
-    assert BOTH["crank-slider"].graph.generic_mobility().mobility == 0
+    assert BOTH["slider-crank"].graph.generic_mobility().mobility == 0
 
 
 def test_crowned_slot_makes_the_uniform_count_right():
-    found = loop_spaces(BOTH["crank-slider"].mechanism("crowned"))
+    found = loop_spaces(BOTH["slider-crank"].mechanism("crowned"))
     assert (found.sub_edges, found.spaces, found.mobility, found.uniform, found.redundant) == (7, (3, 3), 1, 1, 0)
 
 
 def test_the_choice_of_loops_changes_spans_but_not_the_mobility():
-    mechanism = BOTH["crank-slider"].mechanism()
+    mechanism = BOTH["slider-crank"].mechanism()
     found = loop_spaces(mechanism, loops=[(0, 1, 2, 3), (0, 1, 2, 3, 4)])
     assert [loop.own for loop in found.loops] == [3, 3]
     assert found.own_count == 0  # spans taken loop by loop miss the freedom
@@ -134,4 +134,4 @@ def test_the_third_assignment_stops_before_a_quarter_turn():
 )
 def test_bad_loops(loops, sentence):
     with pytest.raises(GraphError, match=sentence):
-        loop_spaces(BOTH["crank-slider"].mechanism(), loops=loops)
+        loop_spaces(BOTH["slider-crank"].mechanism(), loops=loops)

@@ -92,7 +92,7 @@
   Atlas.judge = function (graph, names) {
     const name = link => (names ? names[link] : link);
     if (graph.space !== 3) return "It is a graph of another space than the plane; the atlas holds planar chains.";
-    if (graph.joints.some(joint => joint[2] !== 1)) return "It has joints of mobility 2; the atlas holds chains of turning and sliding pairs (mobility 1).";
+    if (graph.joints.some(joint => joint[2] !== 1)) return "It has joints of mobility 2; the atlas holds chains of revolute and prismatic joints (mobility 1).";
     if (!Atlas.isConnected(graph)) return "It is not connected: it is several chains, not one.";
     const near = Atlas.neighbours(graph), loose = near.findIndex(list => list.length < 2);
     if (loose >= 0) return `Link ${name(loose)} has ${near[loose].length === 1 ? "only one joint" : "no joint"}: links of a closed chain have two or more.`;
