@@ -1,8 +1,8 @@
 """Kinematic diagrams of dimensioned mechanisms: the joints' and links' symbols, each fixed to its link.
 
-Symbols follow ISO 3952: revolute joints are open circles, those on the frame stand on hatched ground, a slider is a block
-on its guide, a pin runs in a slot, gears are dash-dotted pitch circles.  The driven link and the arrow of its sense are
-drawn in a second colour.
+Symbols follow ISO 3952: revolute joints are open circles, those on the frame stand on hatched ground, a slider is a
+block on its guide, a pin runs in a slot, gears are dash-dotted pitch circles.  The driven link and the arrow of its
+sense are drawn in a second colour.
 """
 
 from __future__ import annotations
