@@ -197,6 +197,8 @@ Target = LineGoal | PathGoal | PosesGoal | FunctionGoal
 class Goals:
     """What an embodiment shall achieve: bounds that every accepted result keeps, and at most one target.
 
+    `GeometryError` for a bound that nothing can satisfy, or a target of another type.
+
     Parameters
     ----------
     span : float
@@ -208,11 +210,6 @@ class Goals:
         Longest over shortest distance of two revolute joints on one link, over all links, the frame included; the
         distances of a tracing point from the joints of its link count among the long ones.
     target : LineGoal, PathGoal, PosesGoal or FunctionGoal, optional
-
-    Raises
-    ------
-    GeometryError
-        A bound that nothing can satisfy, or a target of another type.
 
     Examples
     --------

@@ -246,20 +246,16 @@ def _spans(spans: tuple[Span, ...]) -> str:
     return ", ".join(texts) or "nowhere"
 
 
-def _undecided(spans: tuple[Span, ...]) -> str:
-    """Length of the spans that are left, in degrees, and how many they are."""
-    left = math.degrees(sum(span.length for span in spans))
-    if not spans or left >= 360.0:
-        return "a full rotation" if spans else "nowhere"
-    return f"{left:{'.0f' if left >= 10.0 else '.2g'}}° in {len(spans)} piece{'s' if len(spans) > 1 else ''}"
-
-
 #: What a certificate proves: row of the table, and its text.
 _PROVED: dict[str, Callable[[JamCertificate], str]] = {
     "largest interference, mm": lambda f: _bounds(f.largest_interference.lo, f.largest_interference.hi),
     "binds for certain": lambda f: _spans(f.arcs.inner),
     "free for certain": lambda f: _spans(f.arcs.free),
-    "neither is proved": lambda f: _undecided(f.arcs.undecided),
+    "neither is proved": lambda f: (
+        f"{math.degrees(sum(span.length for span in f.arcs.undecided)):.3g}°, pieces: {len(f.arcs.undecided)}"
+        if f.arcs.undecided
+        else "nowhere"
+    ),
     "assembled": lambda f: f.assembles,
 }
 
