@@ -42,13 +42,18 @@ def test_ten_lines_suffice_in_a_fresh_process(task, tmp_path):
 
 def test_main_objects_print_at_most_ten_lines_and_show_themselves():
     import graphsynth as gs
+    from graphsynth.jamming import ToleranceBox, certify_jamming
+    from graphsynth.pipeline.products import Table
 
     linkage = gs.Mechanism.four_bar(2, 1, 2.5, 2.5, coupler_point=(5, 0))
     motion = linkage.simulate()
     found = gs.embody(gs.enumerate_chains(4)[0])
     report = gs.assess_jamming(gs.LambdaLinkage(alpha=1 / 30))
     coupled = motion.assess_jamming(tilt="0.5 deg", joints="1 deg")
+    assert re.search(r"at most, at input [0-9.]+ rad$", repr(coupled), re.MULTILINE)
+    table = Table("a title", ("a", "b"), (("1", "2"),) * 20)
     shown = [linkage, motion, found, report, coupled, motion.forces({"P": (0, -1)}), gs.enumerate_chains(6)]
+    shown += [table, certify_jamming(ToleranceBox())]
     for thing in shown:
         lines = repr(thing).splitlines()
         assert 1 <= len(lines) <= 10 and all(len(line) <= 120 for line in lines)

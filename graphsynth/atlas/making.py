@@ -24,7 +24,6 @@ from graphsynth.synthesis.chunks import Chunk, estimates
 if TYPE_CHECKING:
     from graphsynth.synthesis.problem import EnumerationProblem, WorkItem
 
-
 Watch = Callable[[BuildStep], None]
 
 #: What the kernels are laid out for, see :mod:`graphsynth.atlas.kernels.facts`.

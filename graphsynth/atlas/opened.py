@@ -89,10 +89,7 @@ def _reading_only(connection: sqlite3.Connection, seconds: float | None, late: l
 
 
 class OpenCatalogue:
-    """What an open file answers whatever its tables mean; base of :class:`graphsynth.Catalogue`.
-
-    One may be used from several threads: they take turns.
-    """
+    """What an open file answers whatever its tables mean, to one thread at a time; base of `graphsynth.Catalogue`."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
@@ -109,6 +106,9 @@ class OpenCatalogue:
         """Close the file."""
         with self._turn:
             self.connection.close()
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({str(self.path)!r})"
 
     def __len__(self) -> int:
         """Return the number of chains."""

@@ -20,7 +20,6 @@ from graphsynth.atlas.stored import TIED, data_of, fingerprint
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
 
-
 #: ``same(field, where, stored, recomputed)``
 Same = Callable[[str, str, Any, Any], None]
 

@@ -266,6 +266,6 @@ def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
 def _put_frame(frame: pd.DataFrame) -> None:
     """Print a table as text that scripts can cut; on a terminal too narrow for it, some columns below the others."""
     if len(frame.columns) and len(frame):
-        shown = frame.map(lambda value: wording.plain(value) if isinstance(value, str) else value)
-        text = shown.rename(columns=wording.plain)
-        console.put(text.to_string(index=False, max_colwidth=60, line_width=console.columns()))
+        text = frame.map(lambda value: wording.plain(value) if isinstance(value, str) else value)
+        text = text.rename(columns=wording.plain)
+        console.put(text.to_string(index=False, max_colwidth=60, line_width=console.columns()).replace("<NA>", "   -"))

@@ -207,7 +207,7 @@ _ACTIONS: dict[str, tuple[str, *tuple[Option, ...]]] = {
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        note(f"{self.format_usage()}{self.prog}: error: {message}")  # nobody may be there to read it
+        note(f"{self.prog}: {message} (see {self.prog} --help)")  # nobody may be there to read it
         sys.exit(USAGE_ERROR)
 
 

@@ -133,8 +133,8 @@ class Finding:
     value: str = ""  # printed large, over the caption; empty for a sentence
 
 
-@dataclass(frozen=True, slots=True)
-class Table:
+@dataclass(frozen=True, slots=True, repr=False)
+class Table(Shown):
     """A table of the report: strings, ready to print."""
 
     title: str
@@ -142,6 +142,10 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
     findings: tuple[Finding, ...] = ()  # what the first screen says about it
+
+    def _told(self) -> tuple[str, list[tuple[str, str]]]:
+        lines = [self.columns, *self.rows] if any(self.columns) else self.rows
+        return self.title, [(line[0], " | ".join(line[1:])) for line in lines]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,7 +19,6 @@ from graphsynth.mechanism.four_bar import TiltedFourBar
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
 
-
 #: Doubles around 2 pi.
 TURN_LOW, TURN_HIGH = 6.283185307179586, 6.283185307179587
 _TURNS = (0.0, 1.0, -1.0, 2.0, -2.0)

@@ -30,7 +30,6 @@ from graphsynth.jamming.bearing.parameters import ToleranceBox
 if TYPE_CHECKING:
     from graphsynth.intervals import Dual, Interval
 
-
 Array = NDArray[np.float64]
 _ROUND = 4096  # boxes evaluated at once
 _ENOUGH = 64

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from graphsynth.core.checks import checked
+from graphsynth.core.shown import Shown
 from graphsynth.intervals import Interval, check_rounding, pi, sin
 from graphsynth.intervals.reading import shortened
 from graphsynth.jamming.bearing import corners
@@ -21,7 +22,6 @@ from graphsynth.jamming.verdict import METHOD_CERTIFIED, Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
-
 
 #: What the verdict is about, and what that neglects.
 MODEL = "L0 with exact tilts: the bearing at B takes the whole misalignment, the other joints none; rigid parts"
@@ -41,8 +41,8 @@ class Witness:
     interference: Enclosure
 
 
-@dataclass(frozen=True, eq=False)
-class JamCertificate:
+@dataclass(frozen=True, eq=False, repr=False)
+class JamCertificate(Shown):
     """What is proved about the bearing at B, for every crank angle and every parameter vector of the box.
 
     Attributes
@@ -113,6 +113,10 @@ class JamCertificate:
             case _:
                 text = f"undecided: {self.reason}"
         return f"{text} (contact condition {self.condition}, exact tilt, taken by this bearing alone){given}"
+
+    def _told(self) -> tuple[str, list[tuple[str, str]]]:
+        told = {"interference": (self.largest_interference, "mm"), "critical tilt": (self.critical_tilt, "rad")}
+        return self.statement, [(name, f"{x.lo:.9g} to {x.hi:.9g} {unit}") for name, (x, unit) in told.items()]
 
     @checked
     def over(self, start: float, stop: float) -> Verdict:

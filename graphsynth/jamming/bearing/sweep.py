@@ -26,7 +26,6 @@ from graphsynth.jamming.bearing.parameters import ToleranceBox
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
 
-
 Mask = NDArray[np.bool_]
 _FREE, _JAMS, _OPEN, _OUT = 0, 1, 2, 3  # in the order of the fields of `TurnPartition`
 _ENOUGH = 64

@@ -168,8 +168,7 @@ class BindingReport(Shown):
     @property
     def _linear(self) -> bool:
         """Whether a guide is driven."""
-        mechanism = self.motion.mechanism
-        return isinstance(mechanism.joint(*mechanism.drivers[0].pair), Prismatic)
+        return isinstance(self.motion.mechanism.joint(*self.motion.mechanism.drivers[0].pair), Prismatic)
 
     @property
     def _effort(self) -> str:
@@ -256,8 +255,9 @@ class BindingReport(Shown):
         levels = [] if self.motor_torque is None else [line([x[0]], [self.motor_torque], "motor", "ink", ":")]
         bands = [band(a, b, "contact" if k == 0 else "", "c") for k, (a, b) in enumerate(self._runs(self.energy > 0.0))]
         bands += [band(a, b, "blocks" if k == 0 else "", "jam") for k, (a, b) in enumerate(self._runs(self.blocked))]
-        label = "input" if self._linear else "input, degrees"
-        chart: gs.Chart = work("chart")(lines, label, f"torque of binding, {self._effort}", bands, (), levels)
+        label = "driver displacement [length]" if self._linear else "driver angle [°]"
+        name = f"{'force' if self._linear else 'torque'} of binding [{self._effort}]"
+        chart: gs.Chart = work("chart")(lines, label, name, bands, (), levels)
         if ax is not None:
             chart.draw(ax)
         return chart

@@ -17,16 +17,15 @@ from graphsynth.jamming.joints.drawing import Tolerances, drawn
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.program import Bearings, JointProblem, check_motion, problem
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, Assessment, Verdict
+from graphsynth.mechanism.joints import Prismatic
 
 if TYPE_CHECKING:
     from graphsynth.jamming.joints.certify import TurnCertificate
     from graphsynth.jamming.joints.limits import Limits, Misalignment
     from graphsynth.kinematics.engine.result import Motion
 
-
 Array = NDArray[np.float64]
 METHOD_SAMPLES = "convex program at the samples, double precision, not certified"
-
 
 _EXTREMES = ("worst_input", "worst_factor", "smallest_scale", "smallest_scale_input")
 
@@ -100,13 +99,12 @@ class CoupledReport(Assessment):
     seconds: float = field(default=0.0, compare=False)
     small_tilts: str = "L1 with small tilts (first order): neglects terms of relative order alpha squared"
     small_tilt_error: float = math.nan
+    input_unit: str = "rad"  # empty for a driven guide
 
     def _figures(self) -> list[tuple[str, str]]:
-        growth = f"may be {self.smallest_scale:.6g} times as large, by input {self.smallest_scale_input:.6g}"
-        rows = [
-            ("limits", f"used to {100.0 * self.worst_factor:.4g} % at most, at input {self.worst_input:.6g}"),
-            ("misalignments", growth),
-        ]
+        used, growth = f"used to {100.0 * self.worst_factor:.4g} %", f"may be {self.smallest_scale:.6g} times as large"
+        at, by = (f"{u:.6g} {self.input_unit}".strip() for u in (self.worst_input, self.smallest_scale_input))
+        rows = [("limits", f"{used} at most, at input {at}"), ("misalignments", f"{growth}, by input {by}")]
         for (a, b), what, gain in self.sensitivities[:3]:
             rows.append((f"joint {a}-{b}", f"1 % more {what} allows at most {gain:.3f} % more misalignment"))
         about = self.small_tilts.partition(":")[0]
@@ -289,6 +287,7 @@ def _report(given: JointProblem, motion: Motion, condition: Condition, begin: fl
         condition=condition,
         notes=tuple(notes),
         seconds=perf_counter() - begin,
+        input_unit="" if isinstance(motion.mechanism.joint(*motion.mechanism.drivers[0].pair), Prismatic) else "rad",
     )
 
 
