@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 from graphsynth.pipeline.planar.stages import Moved, Part
 from graphsynth.pipeline.planar.tables import BearingsTable, BindingTable, PlanarTable
-from graphsynth.pipeline.products import Outcome, Picture, Quantity, Ranking
+from graphsynth.pipeline.products import Outcome, Picture, Quantity
 from graphsynth.pipeline.stages import Context
 
 if TYPE_CHECKING:
     from graphsynth.jamming.binding.report import BindingReport
     from graphsynth.kinematics.engine.result import Motion
+    from graphsynth.pipeline.planar.stages_pictures import Best
 
 
 def binding(context: Context, moved: Moved) -> Part:
@@ -52,14 +53,14 @@ def _report(context: Context, motion: Motion) -> BindingReport:
     )
 
 
-def curves(context: Context, written: tuple[Outcome, ...], ranking: Ranking) -> tuple[Picture, ...]:
+def curves(context: Context, written: tuple[Outcome, ...], best: Best) -> tuple[Picture, ...]:
     """Plot the torque that binding costs the best candidates, and name the joint that wears first."""
     from graphsynth.pipeline.planar.stages_pictures import best_motions
 
     pictures = []
-    for place, (number, motion) in enumerate(best_motions(context, written, ranking), 1):
+    for title, _, motion in best_motions(context, written, best):
         report = _report(context, motion)
         worn = [row for row in report.wear if row.wear > 0.0]
         first = f" Joint {worn[0].joint[0]}-{worn[0].joint[1]} wears first." if worn else ""
-        pictures.append(Picture(f"Place {place}: candidate {number}", report.plot().svg(), report.statement + first))
+        pictures.append(Picture(title, report.plot().svg(), report.statement + first))
     return tuple(pictures)

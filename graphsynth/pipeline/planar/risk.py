@@ -14,6 +14,7 @@ from graphsynth.pipeline.products import Finding, Outcome, Picture, Quantity, Ta
 from graphsynth.pipeline.stages import Context
 
 if TYPE_CHECKING:
+    from graphsynth.jamming.bearing.parameters import Range
     from graphsynth.jamming.chance.allocation import Grade
     from graphsynth.jamming.chance.distributions import Distribution
     from graphsynth.jamming.margins.margin import JointsMargin
@@ -48,9 +49,7 @@ def risk(context: Context, moved: Moved) -> tuple[Part, dict[str, Any]]:
         "lower": found.lower,
         "upper": found.upper,
         "samples": None if drawn is None else (drawn.binding, drawn.count, drawn.lower, drawn.upper),
-        "quantities": [
-            (name, str(value), repr(given[name]).split(".")[1].split("(")[0]) for name, value in margin.ranges.items()
-        ],
+        "quantities": [(name, _numbers(value), _kind(given[name])) for name, value in margin.ranges.items()],
         "changes": [tuple(row) for row in changes],
         "bought": [
             (
@@ -82,6 +81,7 @@ def _distribution(kind: str, support: Any) -> Distribution:
 
 def _grades(context: Context, margin: JointsMargin, own: RiskTable) -> dict[str, list[Grade]]:
     """Return the grades offered for each quantity; a `SceneError` refuses a quantity that does not exist."""
+    from graphsynth.jamming.bearing.parameters import Range
     from graphsynth.jamming.bearing.parameters import Range
     from graphsynth.jamming.chance.allocation import Grade
     from graphsynth.tolerances.iso286 import limit_deviations
@@ -120,6 +120,14 @@ def _percent(value: float, side: int) -> str:
     return f"{shortened(100.0 * value, side, 3)} %"
 
 
+def _numbers(value: Range) -> str:
+    return f"{float(value.lower):.6g} to {float(value.upper):.6g}"
+
+
+def _kind(given: Any) -> str:
+    return repr(given).split(".")[1].split("(")[0]
+
+
 def _between(low: float, high: float) -> str:
     return f"{_percent(low, -1)} to {_percent(high, 1)}"
 
@@ -142,7 +150,7 @@ def _of_one(values: Mapping[str, Any], whose: str) -> list[Table]:
         binding, count, least, most = values["samples"]
         rows.append(("random members that bind", f"{binding} of {count}"))
         rows.append((f"their interval (Clopper and Pearson, {_CONFIDENCE:.1%})", _between(least, most)))
-    note = f"Of {values['model']}. Random members are solved in floating point, as an independent check."
+    note = f"Of {values['model']}. Random members, each solved by itself in floating point, stand beside it as a check."
     if values["bought"]:
         findings.append(_advice(values["bought"]))
     tables = [table(f"Probability of binding{whose}", ("what", "value"), rows, note, *findings)]

@@ -16,8 +16,12 @@ if TYPE_CHECKING:
 _FRAMES = 72
 
 
-def best_motions(context: Context, written: tuple[Outcome, ...], ranking: Ranking) -> list[tuple[int, Motion]]:
-    """Return number and motion of the best candidates, the best first."""
+#: What names the best candidates: their ranking, or the records of all in their order.
+Best = Ranking | tuple[Record, ...]
+
+
+def best_motions(context: Context, written: tuple[Outcome, ...], best: Best) -> list[tuple[str, int, Motion]]:
+    """Return title, number and motion of the best candidates, the best first; without a ranking of the first ones."""
     import numpy as np
 
     from graphsynth.kinematics.simulation import simulate
@@ -25,11 +29,15 @@ def best_motions(context: Context, written: tuple[Outcome, ...], ranking: Rankin
     table: PlanarTable = context.scene.mechanism
     outcomes = {outcome.number: outcome for outcome in written}
     inputs = np.linspace(0.0, table.motion.span, 181)
-    return [(n, simulate(restored(outcomes[n]), inputs)) for n in ranking.numbers[: table.pictures]]
+    if isinstance(best, Ranking):
+        named = [(f"Place {place}: candidate {n}", n) for place, n in enumerate(best.numbers, 1)]
+    else:
+        named = [(f"Candidate {record.number}", record.number) for record in best if record.status == "assessed"]
+    return [(title, n, simulate(restored(outcomes[n]), inputs)) for title, n in named[: table.pictures]]
 
 
 def sketches(
-    context: Context, written: tuple[Outcome, ...], ranking: Ranking, records: tuple[Record, ...]
+    context: Context, written: tuple[Outcome, ...], best: Best, records: tuple[Record, ...]
 ) -> tuple[Picture, ...]:
     """Draw the best candidates where their joints are well apart."""
     import numpy as np
@@ -38,43 +46,42 @@ def sketches(
 
     by_number = {record.number: record for record in records}
     pictures = []
-    for place, (number, motion) in enumerate(best_motions(context, written, ranking), 1):
+    for title, number, motion in best_motions(context, written, best):
         # the sample in which the nearest two joints of different links are farthest apart
         joints = np.stack([motion.point(j.a, j.at_a).position for j in motion.mechanism.joints], axis=1)
         apart = np.linalg.norm(joints[:, :, None] - joints[:, None], axis=-1) + 1e9 * np.eye(joints.shape[1])
         clear = int(apart.min(axis=(1, 2)).argmax())
-        svg = mechanism_svg(motion, clear, width=420, height=320, title=f"Place {place}")
+        svg = mechanism_svg(motion, clear, width=420, height=320, title=title)
         record = by_number[number]
         margins = ", ".join(f"{m.name} {m.value:.3g}{behind(m.unit)}" for m in record.margins[:5])
         text = f"{record.verdict[:1].upper()}{record.verdict[1:]}: {margins}."
-        pictures.append(Picture(f"Place {place}: candidate {number}", svg, text))
+        pictures.append(Picture(title, svg, text))
     return tuple(pictures)
 
 
 def animations(
-    context: Context, written: tuple[Outcome, ...], ranking: Ranking, records: tuple[Record, ...]
+    context: Context, written: tuple[Outcome, ...], best: Best, records: tuple[Record, ...]
 ) -> tuple[Picture, ...]:
     """Show the best candidates in motion, with the path of a tracing point."""
     from graphsynth.drawing.animation import animated_svg
     from graphsynth.drawing.frames import with_trace_points
 
     pictures = []
-    for place, (number, motion) in enumerate(best_motions(context, written, ranking), 1):
-        title = f"Place {place}: candidate {number}"
+    for title, number, motion in best_motions(context, written, best):
         traced = with_trace_points(motion)
         svg = animated_svg(traced, frames=_FRAMES, title=title, seconds=4.0, width=420.0, height=320.0)
         pictures.append(Picture(title, svg, next(r.solution for r in records if r.number == number)))
     return tuple(pictures)
 
 
-def plots(context: Context, written: tuple[Outcome, ...], ranking: Ranking) -> tuple[Picture, ...]:
+def plots(context: Context, written: tuple[Outcome, ...], best: Best) -> tuple[Picture, ...]:
     """Plot the paths of the tracing points of the best candidates, or how far their assembly modes are apart."""
     from graphsynth.drawing.motion_charts import coupler_curves, margin_chart
 
     pictures = []
-    for place, (number, motion) in enumerate(best_motions(context, written, ranking), 1):
+    for title, _, motion in best_motions(context, written, best):
         named = bool(motion.mechanism.points)
         chart = coupler_curves(motion) if named else margin_chart(motion)
         what = "path of the point" if named else "margins of the groups: 0 where two assembly modes meet"
-        pictures.append(Picture(f"Place {place}: candidate {number}", chart.svg(), f"The {what}."))
+        pictures.append(Picture(title, chart.svg(), f"The {what}."))
     return tuple(pictures)

@@ -39,15 +39,14 @@ def _more(scene: Any) -> tuple[Stage, ...]:
         stages.append(Stage("dynamics", f"{_HERE}.stages:dynamics", ("moved",), ("driven",), each=True, cost=3.0))
         parts.append("driven")
     stages.append(Stage("assess", f"{_HERE}.stages:assess", tuple(parts), ("record",), each=True))
-    if scene.ranking is not None:
-        best = ("written", "ranking")
-        stages += [
-            Stage("sketch best", f"{_HERE}.stages_pictures:sketches", (*best, "records"), ("mechanism_pictures",)),
-            Stage("animate best", f"{_HERE}.stages_pictures:animations", (*best, "records"), ("animations",)),
-            Stage("plot best", f"{_HERE}.stages_pictures:plots", best, ("plots",)),
-        ]
-        if table.binding is not None:
-            stages.append(Stage("plot binding", f"{_HERE}.binding:curves", best, ("binding_curves",)))
+    best = ("written", "records" if scene.ranking is None else "ranking")
+    stages += [
+        Stage("sketch best", f"{_HERE}.stages_pictures:sketches", (*best, "records"), ("mechanism_pictures",)),
+        Stage("animate best", f"{_HERE}.stages_pictures:animations", (*best, "records"), ("animations",)),
+        Stage("plot best", f"{_HERE}.stages_pictures:plots", best, ("plots",)),
+    ]
+    if table.binding is not None:
+        stages.append(Stage("plot binding", f"{_HERE}.binding:curves", best, ("binding_curves",)))
     return tuple(stages)
 
 
