@@ -82,7 +82,6 @@ def _distribution(kind: str, support: Any) -> Distribution:
 def _grades(context: Context, margin: JointsMargin, own: RiskTable) -> dict[str, list[Grade]]:
     """Return the grades offered for each quantity; a `SceneError` refuses a quantity that does not exist."""
     from graphsynth.jamming.bearing.parameters import Range
-    from graphsynth.jamming.bearing.parameters import Range
     from graphsynth.jamming.chance.allocation import Grade
     from graphsynth.tolerances.iso286 import limit_deviations
 
