@@ -49,7 +49,7 @@ def risk(context: Context, moved: Moved) -> tuple[Part, dict[str, Any]]:
         "lower": found.lower,
         "upper": found.upper,
         "samples": None if drawn is None else (drawn.binding, drawn.count, drawn.lower, drawn.upper),
-        "quantities": [(name, _numbers(value), _kind(given[name])) for name, value in margin.ranges.items()],
+        "quantities": [_row(name, value, given[name]) for name, value in margin.ranges.items()],
         "changes": [tuple(row) for row in changes],
         "bought": [
             (
@@ -119,12 +119,9 @@ def _percent(value: float, side: int) -> str:
     return f"{shortened(100.0 * value, side, 3)} %"
 
 
-def _numbers(value: Range) -> str:
-    return f"{float(value.lower):.6g} to {float(value.upper):.6g}"
-
-
-def _kind(given: Any) -> str:
-    return repr(given).split(".")[1].split("(")[0]
+def _row(name: str, value: Range, given: Distribution) -> tuple[str, str, str]:
+    kind = repr(given).split(".")[1].split("(")[0]
+    return name, f"{float(value.lower):.6g} to {float(value.upper):.6g}", kind
 
 
 def _between(low: float, high: float) -> str:

@@ -51,11 +51,10 @@ def sketches(
         joints = np.stack([motion.point(j.a, j.at_a).position for j in motion.mechanism.joints], axis=1)
         apart = np.linalg.norm(joints[:, :, None] - joints[:, None], axis=-1) + 1e9 * np.eye(joints.shape[1])
         clear = int(apart.min(axis=(1, 2)).argmax())
-        svg = mechanism_svg(motion, clear, width=420, height=320, title=title)
         record = by_number[number]
         margins = ", ".join(f"{m.name} {m.value:.3g}{behind(m.unit)}" for m in record.margins[:5])
         text = f"{record.verdict[:1].upper()}{record.verdict[1:]}: {margins}."
-        pictures.append(Picture(title, svg, text))
+        pictures.append(Picture(title, mechanism_svg(motion, clear, width=420, height=320, title=title), text))
     return tuple(pictures)
 
 
