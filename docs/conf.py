@@ -108,6 +108,8 @@ def _whole_numbers(app: Any, tree: Any, name: str) -> None:
         if len(parts) > 1 and not isinstance(text.parent, nodes.math | nodes.literal):
             numbers = [nodes.inline("", s, classes=["number"]) if k % 2 else nodes.Text(s) for k, s in enumerate(parts)]
             text.parent.replace(text, numbers)
+    for code in [code for code in tree.findall(nodes.literal) if max(map(len, code.astext().split()), default=0) <= 16]:
+        code["classes"].append("words")  # ``--links`` too
 
 
 def _note_other_names(app: Any, env: Any) -> None:
