@@ -26,7 +26,7 @@ def test_bounds_agree_with_random_members(report) -> None:  # type: ignore[no-un
     assert upper.guarantee == "certified" and 0.175 < upper.value < 0.195 and upper.error <= 0.015
     risk = report["tables"][0]
     shown = dict(risk.rows)
-    assert shown["random members that bind"].endswith(" of 2000")
+    assert shown["random members that bind"].endswith(" of 1000")
     bounds, drawn = (
         [float(part.strip(" %")) for part in text.split(" to ")] for text in (risk.rows[0][1], risk.rows[2][1])
     )

@@ -108,8 +108,8 @@ def _hull(ranges: Sequence[Range]) -> Range:
 class _Search:
     """Choices as rows of option numbers; estimates and enclosures of their probabilities."""
 
-    def __init__(self, problem: ChanceProblem, grades: Mapping[str, Sequence[Grade]], allowed: float) -> None:
-        self.problem, self.allowed = problem, allowed
+    def __init__(self, problem: ChanceProblem, grades: Mapping[str, Sequence[Grade]]) -> None:
+        self.problem, self.allowed = problem, 0.0
         self.grades = {name: sorted(offered, key=lambda grade: grade.cost) for name, offered in grades.items()}
         self.sizes = [len(offered) for offered in self.grades.values()]
         self.group = np.repeat(np.arange(len(self.sizes)), self.sizes)
@@ -117,11 +117,16 @@ class _Search:
         self.costs = np.concatenate([[grade.cost for grade in offered] for offered in self.grades.values()])
         self.known: dict[tuple[int, ...], Bounds] = {}
         if hasattr(problem.subject, "covering"):  # positions are proved once, for the widest of all grades
-            widest = {
-                name: _hull([grade.distribution.support for grade in offered]) for name, offered in grades.items()
-            }
+            widest = {name: _hull([grade.distribution.support for grade in own]) for name, own in grades.items()}
             self.problem = replace(problem, subject=problem.subject.covering(widest))
         self._estimate()
+
+    def ask(self, allowed: float) -> None:
+        """Ask for another probability; enclosures that decide about it too are kept."""
+        if not 0.0 <= finite("allowed", allowed) < 1.0:
+            raise GeometryError(f"allowed = {allowed} is no probability to ask for; give 0 or more, below 1")
+        self.allowed = allowed
+        self.known = {k: own for k, own in self.known.items() if own.upper <= allowed or own.lower > allowed}
 
     def chosen(self, choice: Sequence[int]) -> dict[str, Grade]:
         return {name: offered[k] for (name, offered), k in zip(self.grades.items(), choice)}
@@ -255,20 +260,13 @@ def allocate_tolerances(
     GeometryError
         No grades, negative costs, a probability that is none.
     """
-    begin = process_time()
-    if not 0.0 <= finite("allowed", allowed) < 1.0:
-        raise GeometryError(f"allowed = {allowed} is no probability to ask for; give 0 or more, below 1")
-    if not grades or not all(grades.values()):
-        raise GeometryError("there is a quantity without grades, or none at all; give at least one Grade each")
-    if not all(isinstance(grade, Grade) for offered in grades.values() for grade in offered):
-        raise GeometryError("grades hold something else than Grade(name, tolerance, cost); correct them")
-    if any(finite("cost", grade.cost) < 0.0 for offered in grades.values() for grade in offered):
-        raise GeometryError("a grade costs less than nothing; give costs of zero or more")
-    search = _Search(ChanceProblem(subject, dict(distributions or {}), tuple(common), condition), grades, allowed)
-    return _allocated(search, trials, begin, begin + seconds)
+    given: dict[str, Any] = {"condition": condition, "trials": trials, "seconds": seconds}
+    return pareto_curve(subject, grades, [allowed], distributions, common, **given).points[0]
 
 
-def _allocated(search: _Search, trials: int, begin: float, end: float) -> Allocation:
+def _allocated(search: _Search, allowed: float, trials: int, seconds: float) -> Allocation:
+    end = (begin := process_time()) + seconds
+    search.ask(allowed)
     best, cost = _first_good(search, trials, end)
     every = math.prod(search.sizes) <= trials
     index = -math.inf
@@ -284,15 +282,14 @@ def _allocated(search: _Search, trials: int, begin: float, end: float) -> Alloca
             break
         if search.enclose(choice, max(end - process_time(), 0.1)).upper <= search.allowed:
             best, cost = choice, search.cost(choice)
-    known = search.known
-    cheaper = [found for choice, found in known.items() if search.cost(choice) < cost]
+    cheaper = [found for choice, found in search.known.items() if search.cost(choice) < cost]
     rejected = sum(found.lower > search.allowed for found in cheaper)
     if not reason and not every:
         reason = "every cheaper choice that was not ruled out by an estimate is rejected"
     proved = every and not reason and rejected == len(cheaper)
     if every and not reason and not proved:
         reason = f"{len(cheaper) - rejected} cheaper choices are neither proved nor rejected"
-    found = known[best] if best is not None else Bounds(0.0, 1.0, 0, "")
+    found = search.known[best] if best is not None else Bounds(0.0, 1.0, 0, "")
     return Allocation(
         allowed=search.allowed,
         choice=search.chosen(best) if best is not None else {},
@@ -300,7 +297,7 @@ def _allocated(search: _Search, trials: int, begin: float, end: float) -> Alloca
         lower=found.lower,
         upper=found.upper,
         cheapest=proved and best is not None,
-        tried=len(known),
+        tried=len(search.known),
         rejected=rejected,
         undecided=len(cheaper) - rejected,
         reason=reason,
@@ -402,6 +399,11 @@ def pareto_curve(
     ParetoCurve
         Every point certified.
     """
-    shared = tuple(common)
-    given: dict[str, Any] = {"condition": condition, "trials": trials, "seconds": seconds}
-    return ParetoCurve(tuple(allocate_tolerances(subject, grades, p, distributions, shared, **given) for p in allowed))
+    if not grades or not all(grades.values()):
+        raise GeometryError("there is a quantity without grades, or none at all; give at least one Grade each")
+    if not all(isinstance(grade, Grade) for offered in grades.values() for grade in offered):
+        raise GeometryError("grades hold something else than Grade(name, tolerance, cost); correct them")
+    if any(finite("cost", grade.cost) < 0.0 for offered in grades.values() for grade in offered):
+        raise GeometryError("a grade costs less than nothing; give costs of zero or more")
+    search = _Search(ChanceProblem(subject, dict(distributions or {}), tuple(common), condition), grades)
+    return ParetoCurve(tuple(_allocated(search, own, trials, seconds) for own in allowed))

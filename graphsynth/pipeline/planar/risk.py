@@ -26,7 +26,7 @@ _CONFIDENCE = 0.999
 
 def risk(context: Context, moved: Moved) -> tuple[Part, dict[str, Any]]:
     """Enclose the probability of binding, what each tolerance does to it, and buy grades; plain values."""
-    from graphsynth.jamming.chance.allocation import allocate_tolerances
+    from graphsynth.jamming.chance.allocation import pareto_curve
     from graphsynth.jamming.chance.probability import probability_of_jamming
     from graphsynth.jamming.margins.margin import joints_margin
 
@@ -35,13 +35,11 @@ def risk(context: Context, moved: Moved) -> tuple[Part, dict[str, Any]]:
     limits, tilt, parts = bearings_of(bearings, moved)
     margin = joints_margin(moved.motion, limits, tilt, parts, condition=bearings.condition)
     given = {name: _distribution(own.distribution, value) for name, value in margin.ranges.items()}
+    grades = _grades(context, margin, own)
     found = probability_of_jamming(margin, given, width=own.width, seconds=_NEVER, samples=own.samples)
     changes = found.sensitivities(width=own.width, seconds=_NEVER).rows if own.sensitivities else ()
-    grades = _grades(context, margin, own)
-    bought = [
-        allocate_tolerances(margin, grades, allowed, given, seconds=_NEVER, trials=own.trials)
-        for allowed in (own.allowed if grades else ())
-    ]
+    curve = pareto_curve(margin, grades, own.allowed, given, seconds=_NEVER, trials=own.trials) if grades else None
+    bought = curve.points if curve is not None else ()
     proved = {one.cost: min(own.upper for own in bought if own.choice == one.choice) for one in bought}
     drawn = found.samples
     values = {

@@ -130,6 +130,21 @@ def test_pareto_curve_falls_and_draws_itself() -> None:
     assert curve.chart().svg().startswith("<svg")
 
 
+def test_points_of_a_curve_share_enclosures_and_are_those_found_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    runs = []
+    run = Paver.run
+    monkeypatch.setattr(Paver, "run", lambda own: runs.append(own) or run(own))
+    allowed = [0.2, 0.02]
+    together = pareto_curve(BOX, GRADES, allowed).points
+    shared = len(runs)
+    alone = [allocate_tolerances(BOX, GRADES, p) for p in allowed]
+    assert shared < len(runs) - shared
+    assert [(own.choice, own.cost, own.cheapest) for own in together] == [
+        (own.choice, own.cost, own.cheapest) for own in alone
+    ]
+    assert all(own.upper <= p for own, p in zip(together, allowed))
+
+
 class _Edge:
     """Binds below a quarter: with a probability of exactly a quarter."""
 
