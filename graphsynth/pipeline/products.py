@@ -30,8 +30,7 @@ class Candidate:
 class Rejected(Exception):  # noqa: N818  # not an error: a candidate that does not meet a goal
     """Raised by a stage for each candidate: this one does not meet a goal, and later stages need not look at it.
 
-    ``cause`` is the reason in words that are the same for all candidates it holds for, since causes are counted;
-    ``detail`` holds for this candidate only, as in ``"transmission angle 12.3°, at least 30° is asked"``.
+    ``cause`` is the reason in words that can be counted; ``detail`` holds for this candidate only.
     """
 
     def __init__(self, cause: str, detail: str = "") -> None:
@@ -43,8 +42,7 @@ class Rejected(Exception):  # noqa: N818  # not an error: a candidate that does 
 class Outcome:
     """What became of one candidate in the stages for each candidate: through all, stopped by a goal, or failed.
 
-    ``products`` is what later stages and the report need of it: text, numbers, booleans, None, tuples, dictionaries
-    with text keys, and the frozen dataclasses of this module.
+    ``products``, for later stages and the report: plain values, tuples, dictionaries, dataclasses of this module.
     """
 
     number: int  # from 1, in the order of the stream
@@ -144,16 +142,14 @@ class Table(Shown):
     findings: tuple[Finding, ...] = ()  # what the first screen says about it
 
     def _told(self) -> tuple[str, list[tuple[str, str]]]:
-        lines = [self.columns, *self.rows] if any(self.columns) else self.rows
-        return self.title, [(line[0], " | ".join(line[1:])) for line in lines]
+        return self.title, [(line[0], " | ".join(line[1:])) for line in (self.columns, *self.rows) if any(line)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
     """Numbers by the column, for files rather than for the page: curves, a survey of many dimension sets.
 
-    What a stage for each candidate gives as `Columns` is written at once, as ``<name>/part-<number>.csv``, and a `Part`
-    stands for it from then on: memory does not grow with the number of rows.
+    Those of one candidate are written at once, as ``<name>/part-<number>.csv``; from then on a `Part` stands for them.
     """
 
     name: str  # of the files: ``<name>.csv``, ``<name>.parquet``
