@@ -267,7 +267,7 @@ class Paver:
             self.boxes += len(lo)
             low, high = _contracted(lo, hi, line)
             alive = (low < high).all(axis=1)
-            shrunk = alive & (np.prod(np.where(hi > lo, (high - low) / (hi - lo), 1.0), axis=1) < 0.8)
+            shrunk = alive & (np.prod((high - low) / np.where(hi > lo, hi - lo, 1.0), axis=1) < 0.8)
             done = alive & ~shrunk
             found.append((lo[done], hi[done], *(part[done] for part in line), known[done]))
             lo, hi, known = low[shrunk], high[shrunk], known[shrunk]

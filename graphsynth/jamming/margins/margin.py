@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import Shown
-from graphsynth.intervals import check_rounding
+from graphsynth.intervals import Interval, check_rounding
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.bearing.parameters import Range
 from graphsynth.jamming.chance.paving import Affine
@@ -103,7 +103,12 @@ class JointsMargin(Shown):
         if layout.loops == 0:
             raise GeometryError("no closed loop of guided joints: nothing can bind, and no probability is needed")
         self.stations = Stations(quantities.given, motion, quantities.box)
-        self.items = Items.of(layout, self.stations.places.r.mid)
+        whole = quantities.values([Interval(float(own.lower), float(own.upper)) for own in quantities.ranges.values()])
+        most = np.array([0.0 if own is None else float(own.hi) for own in (*whole.limits, *whole.plays)])
+        items = Items.of(layout, self.stations.places.r.mid)
+        self.items = items._replace(costly=~items.free & (most > 0.0))  # a limit may be zero in the middle of its range
+        if not self.items.costly.any():
+            raise GeometryError("no joint has a limit above zero to be used up; give one at least a clearance")
         self.sampler: Sampler | None = None
         low, high = self.stations.work.low, self.stations.work.high
         self.model = (
@@ -219,11 +224,8 @@ class JointsMargin(Shown):
     def _pairs(self, boxes: Boxes, box: Rows, station: Rows) -> _Pairs:
         if not len(box):
             return self._empty(boxes)
-        parts = [
-            self._evaluated(boxes, box[k : k + _TOGETHER], station[k : k + _TOGETHER])
-            for k in range(0, len(box), _TOGETHER)
-        ]
-        return _Pairs.join(parts)
+        cuts = range(0, len(box), _TOGETHER)
+        return _Pairs.join([self._evaluated(boxes, box[k : k + _TOGETHER], station[k : k + _TOGETHER]) for k in cuts])
 
     def _empty(self, boxes: Boxes) -> _Pairs:
         """Return no pairs."""

@@ -120,6 +120,26 @@ def test_what_has_no_answer_is_refused() -> None:
         probability(joints_margin(motion, PLAIN, ALPHA), {"nonsense": Distribution.uniform("[0, 1]")})
 
 
+def test_limits_that_are_zero_by_name_count_with_their_range() -> None:
+    """Free or not depends on what a limit may be; without any the question is refused."""
+    motion = FOUR.simulate("60..120 deg")
+    pairs = (0, 3), (1, 2), (2, 3)
+    named = [
+        joints_margin(motion, {pair: JointLimits(own, tilt_range=(0.0, 0.02)) for pair in pairs}, ALPHA)
+        for own in (0.0, 0.01)
+    ]
+    x = np.array([[0.007, 0.007, 0.007, 0.012], [0.005, 0.005, 0.005, 0.012]])
+    assert list(named[0].names)[-1] == "alpha 0-1"
+    found = [margin.sampled(x) for margin in named]
+    assert found[0] == pytest.approx(found[1], abs=1e-9) and found[0][0] > 0.0 > found[0][1]
+    wide = {name: fixed("0.007") for name in named[0].names[:-1]} | {
+        "alpha 0-1": Distribution.uniform("[0.010, 0.013]")
+    }
+    assert [probability(margin, wide).upper for margin in named] == [0.0, 0.0]
+    with pytest.raises(GeometryError, match="no joint has a limit above zero"):
+        joints_margin(motion, JointLimits(0.0), ALPHA)
+
+
 def test_tolerances_of_no_width_are_no_quantities() -> None:
     motion = FOUR.simulate("30..120 deg")
     none = [AxisAngle(2, 3, 0.0), LengthTolerance(1, (0, 2), 0.0)]
