@@ -234,7 +234,7 @@ def test_the_first_run_is_as_the_tutorial_tells(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SceneError) as caught:
         load_scene("mine.toml")
-    assert str(caught.value) == message.strip()
+    assert f"graphsynth: {caught.value}" == message.strip()
 
 
 def verbs():

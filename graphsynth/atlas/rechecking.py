@@ -143,7 +143,7 @@ _GAP, _JUMP = 1e-11, 0.1
 
 
 class Turning:
-    """A mechanism of turning joints, as its JSON document gives it.
+    """A mechanism of revolute joints, as its JSON document gives it.
 
     ``document`` is what :meth:`graphsynth.Mechanism.to_json` writes: R joints, and linear drivers that follow the
     input; ``drivers`` are the driven links, jointed to the frame. A `ValueError` refuses other drivers, joints, laws.
@@ -152,7 +152,7 @@ class Turning:
     def __init__(self, document: dict[str, Any], frame: int, drivers: tuple[int, ...]) -> None:
         joints, laws = document["joints"], document["drivers"]
         if any(joint["kind"] != "R" for joint in joints):
-            raise ValueError("only turning joints are recomputed")
+            raise ValueError("only revolute joints are recomputed")
         if sorted((own["base"], own["link"]) for own in laws) != [(frame, link) for link in sorted(drivers)]:
             raise ValueError(f"the mechanism is not driven by the links {drivers} on frame {frame}")
         if any(own["law"]["kind"] != "linear" or own["law"]["rate"] != 1.0 for own in laws):

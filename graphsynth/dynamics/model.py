@@ -204,7 +204,7 @@ class DynamicModel:
         if isinstance(element, MotorDrive) and not isinstance(
             self.mechanism.joint(element.a, element.b), Revolute | PinSlot
         ):
-            raise GeometryError(f"a motor drive needs a turning joint, and joint {element.a}-{element.b} is none")
+            raise GeometryError(f"a motor drive needs a revolute joint, and joint {element.a}-{element.b} is none")
         return element
 
     def _check_friction(self, element: JointFriction) -> None:

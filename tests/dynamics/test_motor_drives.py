@@ -251,7 +251,7 @@ REFUSED = {
     "is not a Train": lambda: MotorDrive(0, 1, DC, 3.0),
     "2 currents of motor drive 0-1 given for a motor with 1": lambda: MotorDrive(0, 1, DC, currents=(1.0, 2.0)),
     "are not a list": lambda: MotorDrive(0, 1, DC, currents=3.0),
-    "needs a turning joint, and joint 0-2 is none": lambda: yoke(MotorDrive(0, 2, DC)),
+    "needs a revolute joint, and joint 0-2 is none": lambda: yoke(MotorDrive(0, 2, DC)),
     "itself does nothing": lambda: MotorDrive(1, 1, DC),
     "names link 9": lambda: driven_four_bar(MotorDrive(0, 9, DC)),
 }

@@ -91,7 +91,7 @@ def binding_torque(
     >>> motion = Mechanism.four_bar(0.2, 0.1, 0.25, 0.25).simulate("0..360 deg")
     >>> report = binding_torque(motion, tilt="2 deg", joints="0.35 deg", stiffness=2000.0)
     >>> report.answer, round(report.peak_torque, 2)
-    ('binds', 0.36)
+    ('binds', 0.13)
     """
     begin = perf_counter()
     check_motion(motion)

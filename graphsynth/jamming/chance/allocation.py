@@ -48,8 +48,7 @@ class Grade:
     @property
     def distribution(self) -> Distribution:
         """Its distribution; uniform for a range."""
-        given = self.tolerance
-        return given if isinstance(given, Distribution) else Distribution.uniform(given)
+        return self.tolerance if isinstance(self.tolerance, Distribution) else Distribution.uniform(self.tolerance)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -351,15 +350,11 @@ class ParetoCurve(Shown):
         """Return the points as a table."""
         import pandas as pd
 
-        columns = ("allowed", "cost", "lower", "upper", "cheapest")
-        rows = [[getattr(point, name) for name in columns] for point in self.points if point.choice]
-        return pd.DataFrame(rows, columns=columns)
+        columns = ["allowed", "cost", "lower", "upper", "cheapest"]
+        return pd.DataFrame([vars(point) for point in self.points if point.choice], columns=columns)
 
     def chart(self) -> Any:
-        """Return the picture: cost over the logarithm of the proved probability, as a `graphsynth.Chart`.
-
-        Steps: between two points nothing can be bought.
-        """
+        """Return the picture, a `graphsynth.Chart`: cost over the logarithm of the proved probability, in steps."""
         return curve([(point.upper, point.cost) for point in self.points if point.choice])
 
     def _picture(self) -> str:
@@ -398,6 +393,11 @@ def pareto_curve(
     -------
     ParetoCurve
         Every point certified.
+
+    Raises
+    ------
+    GeometryError
+        As `allocate_tolerances`.
     """
     if not grades or not all(grades.values()):
         raise GeometryError("there is a quantity without grades, or none at all; give at least one Grade each")

@@ -134,7 +134,7 @@ def compare_sensitivities(
     >>> from graphsynth.jamming import Bearing
     >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate(np.radians([90.0]))
     >>> table = compare_sensitivities(motion, Bearing(), Misalignment(0, 1, 0.01))
-    >>> [(row.joint, row.what, round(row.promised, 4)) for row in table.rows]
+    >>> sorted((row.joint, row.what, round(row.promised, 4)) for row in table.rows)
     [((0, 3), 'tilt', 0.5), ((1, 2), 'tilt', 0.5), ((2, 3), 'tilt', 0.0)]
     """
     if not finite("by", by) > 0.0:

@@ -47,10 +47,11 @@ def sketches(
     by_number = {record.number: record for record in records}
     pictures = []
     for title, number, motion in best_motions(context, written, best):
-        # the sample in which the nearest two joints of different links are farthest apart
+        # the sample in which the nearest two joints are far apart, and all of them from one line
         joints = np.stack([motion.point(j.a, j.at_a).position for j in motion.mechanism.joints], axis=1)
         apart = np.linalg.norm(joints[:, :, None] - joints[:, None], axis=-1) + 1e9 * np.eye(joints.shape[1])
-        clear = int(apart.min(axis=(1, 2)).argmax())
+        flat = np.linalg.svd(joints - joints.mean(axis=1, keepdims=True), compute_uv=False)[:, 1]
+        clear = int(np.fmin(apart.min(axis=(1, 2)), flat).argmax())
         record = by_number[number]
         margins = ", ".join(f"{m.name} {m.value:.3g}{behind(m.unit)}" for m in record.margins[:5])
         text = f"{record.verdict[:1].upper()}{record.verdict[1:]}: {margins}."

@@ -48,7 +48,7 @@ def pointing_picture(
     --------
     >>> from graphsynth.systems.antenna import PointingMechanism
     >>> pointing_picture(PointingMechanism(), 0.5, 0.3).axes[0].get_zlabel()
-    'z'
+    'z [m]'
     """
     from matplotlib.ticker import MaxNLocator
 
