@@ -29,6 +29,7 @@ _shown.WORK.update(
         "draw motion": "graphsynth.drawing.methods:draw_motion",
         "plot motion": "graphsynth.drawing.methods:plot_motion",
         "animate motion": "graphsynth.drawing.methods:animate_motion",
+        "chart burmester": "graphsynth.drawing.burmester:burmester_chart",
         "chart": "graphsynth.drawing.plots:Chart",
         "chart line": "graphsynth.drawing.plots:Line",
         "chart band": "graphsynth.drawing.plots:Band",

@@ -74,6 +74,15 @@ def run_session(source, page, line, namespace):
     assert results.failed == 0, said.getvalue()
 
 
+def differ(one, other):
+    """Whether two pictures differ by more than half a pixel in any number, or in anything else."""
+    numbers = r"-?\d+(?:\.\d+)?"
+    texts = [path.read_text(encoding="utf-8").strip() for path in (one, other)]
+    found = [[float(value) for value in re.findall(numbers, text)] for text in texts]
+    plain = [re.sub(numbers, "#", text) for text in texts]
+    return plain[0] != plain[1] or max(map(abs, map(float.__sub__, *found)), default=0.0) > 0.5
+
+
 #: Pages whose examples search or sweep for seconds, or repeat what tests/test_newcomer.py, atlas and testing run.
 SLOW_PAGES = (
     *("embody", "point-an-antenna", "jamming-of-any-mechanism", "the-deck-reproduced", "bearing-jamming"),
@@ -97,6 +106,9 @@ def test_examples_run(page, tmp_path, monkeypatch):
     for language, body, line in fences(page):
         if is_example(language, body):
             (run_session if ">>> " in body else run_plain)(body, page, line, namespace)
+    kept = {path.name: path for path in (ROOT / "docs" / "pictures").iterdir()}
+    stale = [own.name for own in tmp_path.glob("*.svg") if own.name in kept and differ(own, kept[own.name])]
+    assert stale == [], "draw the pictures anew: python docs/pictures/make.py"
 
 
 def test_every_page_of_the_theory_has_a_drawing():

@@ -12,7 +12,7 @@ README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 TASKS = {
     "move my own linkage": ("motion.html", r"closed after one pass"),
     "list the chains of eight links": ("chain.svg", r"chains of 8 links"),
-    "find a four-bar through points": ("path.svg", r"accepted after .* searches"),
+    "find a four-bar through points": ("path.svg", r"accepted after .* search"),
     "see whether it binds": (None, r"CERTIFIED_FREE\nProved: nothing binds over the whole range"),
     "read the forces": (None, r"joint 1-2 +force up to"),
 }

@@ -1,7 +1,8 @@
 """Draw the pictures of the README and of the pages anew: ``python docs/pictures/make.py [FOLDER]``.
 
-The gallery's own examples write its pictures.  Those of other pages are taken from the reports of shipped scenes,
-three minutes in all; tribometer-error-time.svg is measured on a quiet machine, by ``graphsynth accuracy tribometer``.
+Examples of the gallery and of some pages write their own pictures.  Those of other pages are taken from the reports of
+shipped scenes, three minutes in all; tribometer-error-time.svg is measured on a quiet machine, by ``graphsynth
+accuracy tribometer``.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from graphsynth.pipeline.runner import run
 
 CHOSEN = 5  # of the sixteen chains: the one that becomes a mechanism
 CELL, GAP, COLUMNS = 150, 10, 8
+#: Pages whose examples write pictures.
+WITH_EXAMPLES = ("gallery.md", "explanation/jamming-in-space.md")
 #: Pictures of the pages: scene, file, title in the report.
 FROM_SCENES = {
     "antenna": {
@@ -86,18 +89,19 @@ def scene_pictures(scene: str, wanted: dict[str, str]) -> dict[str, str]:
     return {f"{name}.svg": found[title] + "\n" for name, title in wanted.items()}
 
 
-def gallery_pictures(folder: Path) -> None:
-    """Run the examples of the gallery in the folder; what they write are its pictures."""
-    page = (Path(__file__).parents[1] / "gallery.md").read_text("utf-8")
+def pictures_of_examples(page: str, folder: Path) -> None:
+    """Run the examples of a page in the folder; what they write are its pictures."""
+    text = (Path(__file__).parents[1] / page).read_text("utf-8")
     names: dict[str, object] = {}
     with contextlib.chdir(folder):
-        for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
+        for code in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
             exec(code, names)
 
 
 def make(folder: Path) -> list[Path]:
     """Write the pictures; return their paths."""
-    gallery_pictures(folder)
+    for page in WITH_EXAMPLES:
+        pictures_of_examples(page, folder)
     chains = list(gs.enumerate_chains(8))
     found = gs.embody(chains[CHOSEN], seed=0)
     assert found.accepted, found.statement

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import graphsynth as gs
+from graphsynth.design import burmester_curves, four_bars_for_poses
 from graphsynth.drawing.svg import number, painted, picture, words
 from graphsynth.jamming import Bearing
 from graphsynth.mechanism.four_bar import TiltedFourBar
@@ -125,8 +126,8 @@ def tilted_bearing() -> str:
             for x, y in ((-radius, -length), (radius, -length), (radius, length), (-radius, length))
         ]
         board.line(*body, fill="a", colour="a", width=2)
-        board.line(shift - 33j, shift + 33j, colour="note", width=1, dash="8 3 2 3")
-        board.line(shift - 33j * tilt, shift + 33j * tilt, colour="a", width=1, dash="8 3 2 3")
+        board.line(shift - 28j, shift + 33j, colour="note", width=1, dash="8 3 2 3")
+        board.line(shift - 28j * tilt, shift + 33j * tilt, colour="a", width=1, dash="8 3 2 3")
         board.arc(shift, 30, math.pi / 2, math.pi / 2 - math.radians(12))
         board.text(shift + 3.5 + 34.5j, "t")
         touch = [tilt * complex(radius, half), -tilt * complex(radius, half)]
@@ -137,9 +138,9 @@ def tilted_bearing() -> str:
             board.parts.append(f'<circle cx="{x}" cy="{y}" r="6" {painted(stroke="b", width=2.5)}/>')
     board.span(-radius - clearance - 29j, radius + clearance - 29j, "2 Rh = 2 (R + c)", -4j)
     board.span(tilt * (-radius - 9j) - 2, tilt * (-radius + 9j) - 2, "", 0j)
-    board.text(-12 - 0.5j, "Hb = 2 h")
-    board.text(-37j, "A: short bearing, long hole", size=15)
-    board.text(82 - 37j, "B: long shaft, short hole", size=15)
+    board.text(9.5 - 0.5j, "Hb = 2 h")
+    board.text(-38.5j, "A: short bearing, long hole", size=15)
+    board.text(82 - 38.5j, "B: long shaft, short hole", size=15)
     board.span(82 + 25 - 9j, 82 + 25 + 9j, "Hb", 4.5)
     return board.svg("A bearing whose axis is tilted by t touches its hole at two opposite points")
 
@@ -173,7 +174,7 @@ def lambda_linkage() -> str:
         board.text(at, text)
     for at, text in (
         (0.62 + 0.22j, "f"),
-        (1 - 0.22j, "l1"),
+        (1.45 - 0.22j, "l1"),
         (a / 2 - 0.2 + 0.1j, "l2"),
         ((a + b) / 2 - 0.22, "l3"),
         ((2 + b) / 2 + 0.26, "l4"),
@@ -195,7 +196,7 @@ def circle_and_ellipse() -> str:
     board.text(25.5 + 0j, "u", colour="note")
     board.line(-half * math.sin(tilt) + 0j, half * math.sin(tilt) + 0j, width=4)
     board.text(3.4 - 1.8j, "h sin t")
-    board.text(-27 + 13j, "shaft, radius R", colour="b", anchor="start")
+    board.text(-18 + 13.5j, "shaft, radius R", colour="b", anchor="end")
     board.text(14 + 18j, "top lid", colour="a", anchor="start")
     board.text(-20 - 18j, "bottom lid", colour="c", anchor="end")
     board.text(-20.5j, "semi-axes Rh cos t along u, Rh across", colour="note", size=13)
@@ -820,6 +821,41 @@ def binding() -> str:
     return board.svg("A joint is free within its limit and a spring beyond it; the torque that this costs over a turn")
 
 
+def four_poses() -> str:
+    """Draw the curves of four poses, their asymptotes, the four bodies and one dyad."""
+    poses = [(0.0, 0.0, 0.0), (1.2, 1.1, 0.65), (1.9, 2.3, 1.3), (3.4, 3.3, 1.65)]
+    curves = burmester_curves(poses)
+    board = Board(620, 470, 210 + 340j, 68.0)
+
+    def inside(z: complex) -> bool:
+        return -2.9 < z.real < 5.8 and -1.7 < z.imag < 4.8
+
+    for curve, colour in ((curves.centre, "a"), (curves.circle, "b")):  # the first pose is the frame of both
+        for branch in curve.points(500):
+            run: list[complex] = []
+            for x, y in [*branch.tolist(), (99.0, 99.0)]:
+                if inside(z := complex(x, y)):
+                    run.append(z)
+                elif run:
+                    board.curve(run, colour=colour, width=2)
+                    run = []
+        (x, y), angle = curve.asymptote
+        ends = [z for k in range(-400, 401) if inside(z := complex(x, y) + 0.05 * k * cmath.exp(1j * angle))]
+        board.line(ends[0], ends[-1], colour=colour, width=1.2, dash="6 4")
+    linkage = four_bars_for_poses(poses, pivots=((-2.5, 5.5), (-1.5, 4.5)), count=1)[0]
+    for x, y, angle in poses:
+        corners = [complex(x, y) + cmath.exp(1j * angle) * z for z in (0j, 0.55 + 0j, 0.4j)]
+        board.line(*corners, fill="soft", colour="ink", width=1.2)
+    for dyad in linkage.dyads:
+        end = complex(*dyad.point)
+        board.line(complex(*dyad.pivot), end, width=3)
+        board.ground(complex(*dyad.pivot))
+        board.joint(end)
+    board.text(4.6 - 1.0j, "centre points", colour="a")
+    board.text(4.6 - 1.35j, "circle points", colour="b")
+    return board.svg("Centre points and circle points of four poses, their asymptotes, and a four-bar on them")
+
+
 DRAWINGS = {
     "theory-arcs": jam_arcs,
     "theory-bearing": tilted_bearing,
@@ -838,6 +874,7 @@ DRAWINGS = {
     "theory-linkage": lambda_linkage,
     "theory-modes": modes,
     "theory-platform": platform,
+    "theory-poses": four_poses,
     "theory-probability": binding_corner,
     "theory-probability-of-joints": half_spaces,
     "theory-shared-tilt": shared_tilt,

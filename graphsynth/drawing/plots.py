@@ -69,7 +69,7 @@ class Chart:
 
     `xlabel`, `ylabel`: with units. `bands`: shaded ranges of x. `marks`: events. `levels`: horizontal thresholds; only
     the first value of `y` is used, `x` is ignored. `equal`: the same scale on both axes, for paths. `in_pi`: mark the x
-    axis in quarters of a turn: 0, pi/2, pi, ... `size`: inches; an SVG scales with the page.
+    axis in quarters of a turn. `decades`: a logarithmic x axis. `size`: inches; an SVG scales with the page.
     """
 
     lines: Sequence[Line]
@@ -81,6 +81,7 @@ class Chart:
     xticks: Sequence[float] | None = None
     equal: bool = False
     in_pi: bool = False
+    decades: bool = False
     size: tuple[float, float] = (5.4, 2.8)
 
     def draw(self, ax: Any = None) -> Any:
@@ -111,6 +112,8 @@ class Chart:
             axes.set_aspect("equal", adjustable="datalim")
         else:
             axes.margins(x=0)
+        if self.decades:
+            axes.set_xscale("log")
         if self.in_pi:
             low, high = axes.get_xlim()
             quarter = math.pi / 2 * max(1, math.ceil((high - low) / (4.5 * math.pi)))

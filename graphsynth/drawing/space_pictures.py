@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from itertools import pairwise, product
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     from graphsynth.jamming.space import SpaceModel
 
 Array = NDArray[np.float64]
-#: Pixels round the mechanism, of a letter and of a line; colours of links.
-_MARGIN, _LETTER, _LINE, _COLOURS = 44.0, 8.0, 18.0, ("a", "c", "d", "b")
+#: Pixels round the mechanism, of a letter and of a line, from a joint to its label at most; colours of links.
+_MARGIN, _LETTER, _LINE, _FAR, _COLOURS = 44.0, 8.0, 18.0, 60.0, ("a", "c", "d", "b")
 
 
 def mechanism_in_space(
@@ -75,34 +76,24 @@ def mechanism_in_space(
     places = [joint.place for joint in joints] + ([] if centre is None else [np.array(centre)])
     page = _Page(view, np.array(places), width)
     thin = painted(stroke="soft", width=1.0)
+    colours = ["soft" if k == model.frame else _COLOURS[(k - 1) % len(_COLOURS)] for k in range(model.links)]
     body = [page.path([np.array(centre), joint.place], thin) for joint in joints if centre is not None]
     parts = []
     for link in range(model.links):
         corners = np.array([joint.place for joint in joints if link in joint.links])
-        parts.append(page.link(corners, _colour(model, link), link == model.frame))
+        parts.append(page.link(corners, colours[link], link == model.frame))
     body += [text for _, text in sorted(parts, key=lambda part: part[0])]
     ahead = sorted(joints, key=lambda joint: page.depth(joint.place))
-    body += [page.joint(joint, _colour(model, max(joint.links, key=lambda own: own != model.frame))) for joint in ahead]
-    middle = np.mean([page.xy(joint.place) for joint in joints], axis=0)
-    labels = [page.label(joint, (names or {}).get(joint.number, ""), middle) for joint in joints]
-    body += [words(text, x, y, size=15.0, colour="ink", halo=4.0) for x, y, text in _apart(labels)]
+    body += [page.joint(joint, colours[joint.links[1]]) for joint in ahead]
+    texts = [(joint.place, _text(joint, (names or {}).get(joint.number, ""))) for joint in joints]
+    body += page.labels([(place, text) for place, text in texts if text])
     return picture(body, width, page.height, title)
 
 
-def _colour(model: SpaceModel, link: int) -> str:
-    return "soft" if link == model.frame else _COLOURS[(link - 1) % len(_COLOURS)]
-
-
-def _apart(labels: Sequence[tuple[float, float, str]]) -> list[tuple[float, float, str]]:
-    """Move labels down that would stand on others."""
-    kept: list[tuple[float, float, str]] = []
-    for x, y, text in sorted((label for label in labels if label[2]), key=lambda label: label[1]):
-        wide = _LETTER * len(text)
-        for left, height, other in kept:
-            if x < left + _LETTER * len(other) and left < x + wide and y < height + _LINE:
-                y = height + _LINE
-        kept.append((x, y, text))
-    return kept
+def _text(joint: _Seen, name: str) -> str:
+    """Write the name of a joint, the use of its limit, and how far its axis was made wrong."""
+    share = f"{100.0 * joint.share:.0f} %" if math.isfinite(joint.share) else ""
+    return " · ".join(filter(None, (name, share, f"{joint.off:.2g}° off" if joint.off > 1e-6 else "")))
 
 
 def _turned(vector: Sequence[float] | Array) -> Array:
@@ -175,6 +166,7 @@ class _Page:
         self.scale = (width - 2.0 * _MARGIN) / float(max(high[0] - low[0], 1e-300))
         self.height = float(high[1] - low[1]) * self.scale + 2.0 * _MARGIN
         self.corner = np.array([low[0], high[1]])
+        self.taken: list[Array] = []  # points along all that is drawn
 
     def xy(self, point: Array) -> Array:
         """Place on the page."""
@@ -187,7 +179,10 @@ class _Page:
 
     def path(self, points: Sequence[Array], paint: str, closed: bool = False) -> str:
         """Write a polyline."""
-        at = " L".join(" ".join(map(number, self.xy(point))) for point in points)
+        corners = [self.xy(point) for point in points]
+        for p, q in pairwise([*corners, *corners[: int(closed)]]):
+            self.taken += [p + s * (q - p) for s in np.linspace(0.0, 1.0, 2 + int(np.hypot(*(q - p)) / 4.0))]
+        at = " L".join(" ".join(map(number, corner)) for corner in corners)
         return f'<path d="M{at}{"Z" if closed else ""}" {paint} stroke-linejoin="round" stroke-linecap="round"/>'
 
     def link(self, corners: Array, colour: str, still: bool) -> tuple[float, str]:
@@ -211,14 +206,22 @@ class _Page:
         dashes = f'{painted(stroke="ink", width=1.3)} stroke-dasharray="9 3 2 3"'
         return disc + self.path(ends, dashes) + self.path(lean, painted(stroke=colour, width=2.6)) + dot
 
-    def label(self, joint: _Seen, name: str, middle: Array) -> tuple[float, float, str]:
-        """Place and text of the name of a joint, the use of its limit, and how far its axis was made wrong."""
-        notes = [f"{100.0 * joint.share:.0f} %"] if math.isfinite(joint.share) else []
-        notes += [f"{joint.off:.2g}° off"] if joint.off > 1e-6 else []
-        at = self.xy(joint.place)
-        side = 1.0 if at[0] >= middle[0] else -1.0
-        x, y = at[0] + side * 18.0, at[1] + (22.0 if at[1] > middle[1] else -14.0)
-        text = " · ".join([name, *notes] if name else notes)
-        room = _LETTER * len(text)
-        x = min(max(x if side > 0.0 else x - room, 4.0), self.width - room - 4.0)
-        return x, y, text
+    def labels(self, labels: Sequence[tuple[Array, str]]) -> list[str]:
+        """Write texts near points: where they cover least of the lines and of each other, and are not far away."""
+        lines, points = np.array(self.taken), np.array([self.xy(point) for point, _ in labels])
+        halves = [0.5 * np.array([_LETTER * len(text), _LINE]) for _, text in labels]
+        places = []
+        for k, half in enumerate(halves):
+            near = np.stack(np.meshgrid(*(np.arange(-far, far + 1.0, 5.0) for far in half + _FAR)), -1).reshape(-1, 2)
+            spots = np.clip(points[k] + near, half + 2.0, np.maximum([self.width, self.height] - half - 2.0, half))
+            away = np.hypot(*np.maximum(np.abs(spots[:, None] - points) - half, 0.0).T)
+            cost = 3.0 * (np.abs(lines - spots[:, None]) < half + 5.0).all(-1).sum(-1) + 0.12 * away[k]
+            places.append((spots, cost + 0.4 * np.maximum(away[k] - np.delete(away, k, 0) + 9.0, 0.0).sum(0)))
+        at = points + np.inf
+        for weight, k in product((0.001, 0.01, 0.1, 1.0, 1.0), range(len(labels))):
+            (spots, cost), at[k] = places[k], np.inf
+            for half, other in zip(halves, at):
+                cost = cost + weight * np.maximum(half + halves[k] - np.abs(spots - other), 0.0).prod(-1)
+            at[k] = spots[np.argmin(cost)]
+        look: dict[str, Any] = {"size": 15.0, "colour": "ink", "anchor": "middle", "halo": 4.0}
+        return [words(text, x, y + 5.4, **look) for (_, text), (x, y) in zip(labels, at)]

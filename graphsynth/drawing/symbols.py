@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from graphsynth.drawing.bodies import Guide, LinkBody, outline, rounded, thickness, world
 from graphsynth.drawing.palette import TRACE_COLOURS
+from graphsynth.drawing.shapes import FIXED, Circle, Path
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.mechanism.joints import Cam, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
@@ -266,19 +267,19 @@ class _Room:
             self.taken.append(self._world(link, points))
             self.own += [own] * len(points)
 
-    def clearances(self, link: int, points: Sequence[complex]) -> list[float]:
+    def clearances(self, link: int, points: Sequence[complex], own: int) -> list[float]:
         """Distances of points to the nearest thing, at most 22 pixels: the worst pose and the mean count half each."""
         others = np.concatenate([np.empty((0, self.count), dtype=np.complex128), *self.taken])
-        others = others[np.array(self.own, dtype=np.intp) != link]
+        others = others[np.array(self.own, dtype=np.intp) != own]
         gaps = np.abs(self._world(link, points)[:, None] - others) / self.pixel
         near: Array = gaps.min(axis=1, initial=22.0)
         return list((0.5 * near.min(axis=1) + 0.5 * near.mean(axis=1)).tolist())
 
-    def best(self, link: int, candidates: Sequence[complex]) -> complex:
-        """Choose the first of the freest candidates, and take it."""
-        scores = [clear - 0.4 * k for k, clear in enumerate(self.clearances(link, candidates))]
+    def best(self, link: int, candidates: Sequence[complex], own: int = -2) -> complex:
+        """Choose the first of the freest candidates, and take it; things of link ``own`` may be near."""
+        scores = [clear - 0.4 * k for k, clear in enumerate(self.clearances(link, candidates, own))]
         chosen = candidates[scores.index(max(scores))]
-        self.add(link, [chosen])
+        self.add(link, [chosen + d * self.pixel for d in (5, -5, 5j, -5j)])
         return chosen
 
 
@@ -286,23 +287,17 @@ def place_letters(plan: Plan, grounds: list[tuple[complex, complex]], numbers: b
     """Write the names of points and the numbers of links; the letters move with their link and stay upright."""
     sketch, mechanism, px = plan.sketch, plan.mechanism, plan.px
     room = _Room(plan.poses, px)
-    for body in plan.bodies:
-        if not plan.fixed(body.link):
-            room.add(body.link, _along(outline(body.vertices(), 2.0 * px), 14.0 * px), body.link)
-        room.add(body.link, body.points)
-        for guide in body.guides:
-            room.add(body.link, _along([guide.start, guide.stop], 14.0 * px), body.link)
-    for at, down in grounds:
-        room.add(mechanism.frame, [at + down * r * px for r in (8.0, 16.0, 23.0)])
-        room.add(mechanism.frame, [at + down * 18.0 * px + 1j * down * s * 12.0 * px for s in (-1, 1)])
-    for driver in mechanism.drivers:
-        joint = mechanism.joint(*driver.pair)
-        at = complex(*(joint.at_a if joint.a == driver.base else joint.at_b))
-        room.add(driver.base, [at + 19.0 * px * cmath.exp(1j * math.radians(a)) for a in range(0, 360, 45)])
+    for shape in sketch.shapes:
+        if isinstance(shape, Circle):
+            room.add(shape.link, [shape.centre])
+        elif isinstance(shape, Path) and shape.link != FIXED:  # paths of points may be covered
+            own = shape.link if shape.layer in ("plate", "bar", "block") else -1
+            for run in shape.runs:
+                room.add(shape.link, _along([*run, *run[: int(shape.closed)]], 9.0 * px), own)
+    ways = [r * px * cmath.exp(1j * math.radians(45 * k)) for r in (15.0, 23.0) for k in (1, 3, 2, 0, 4, 7, 5, 6)]
     for name, (link, local) in mechanism.points.items():
-        centre = complex(*local)
-        ring = [centre + 15.0 * px * cmath.exp(1j * math.radians(45 * k)) for k in (1, 3, 2, 0, 4, 7, 5, 6)]
-        sketch.on(link, "label", f"name {name}").label(room.best(link, ring), name, size=14.0 * sketch.symbol)
+        at = room.best(link, [complex(*local) + way for way in ways])
+        sketch.on(link, "label", f"name {name}").label(at, name, size=14.0 * sketch.symbol)
     if not numbers:
         return
     for body in plan.bodies:
@@ -312,16 +307,15 @@ def place_letters(plan: Plan, grounds: list[tuple[complex, complex]], numbers: b
         else:
             spots = _beside(body, px)
         sketch.on(body.link, "label", f"number {body.link}")
-        sketch.label(room.best(body.link, spots), str(body.link), colour="note", size=13.0 * sketch.symbol)
+        sketch.label(room.best(body.link, spots, body.link), str(body.link), colour="note", size=13.0 * sketch.symbol)
 
 
-def _along(corners: list[complex], step: float) -> list[complex]:
-    """Points along the sides of a figure, at most a step apart."""
-    sides = list(pairwise([*corners, corners[0]] if len(corners) > 2 else corners))
-    found = []
-    for p, q in sides:
+def _along(run: Sequence[complex], step: float) -> list[complex]:
+    """Points along a line, at most a step apart."""
+    found = list(run[:1])
+    for p, q in pairwise(run):
         count = min(40, max(1, math.ceil(abs(q - p) / step)))
-        found += [p + (q - p) * k / count for k in range(count + 1)]
+        found += [p + (q - p) * k / count for k in range(1, count + 1)]
     return found
 
 
@@ -335,7 +329,7 @@ def _beside(body: LinkBody, px: float) -> list[complex]:
         p, q = max(pairwise([*corners, corners[0]]), key=lambda side: abs(side[1] - side[0]))
         thin = thickness(corners) < 12.0 * px
         aside = -1j * (q - p) / abs(q - p) * (18.0 if thin and body.joints > 2 else 12.0) * px
-        sides = (1, -1) if thin else (1,)  # corners run anticlockwise: the outside of a plate comes first
-        return [p + (q - p) * s + side * aside for s in (0.5, 0.36, 0.64, 0.22, 0.78) for side in sides]
+        sides = (1, -1, 1.7, -1.7) if thin else (1,)  # corners run anticlockwise: the outside of a plate comes first
+        return [p + (q - p) * s + side * aside for side in sides for s in (0.5, 0.36, 0.64, 0.22, 0.78)]
     at = corners[0] if corners else 0j
     return [at + 24.0 * px * d for d in (0.8j, -0.8j, 1, -1, 0.8 + 0.8j, -0.8 + 0.8j)]

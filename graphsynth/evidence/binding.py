@@ -1,4 +1,4 @@
-"""Torque that binding costs: the derivative of the least energy, and differences of energies, against a closed form."""
+"""Torque that binding costs: derivatives and differences of the least energy against a closed form; small tilts."""
 
 from __future__ import annotations
 
@@ -8,17 +8,23 @@ from typing import Any
 
 import mpmath
 import numpy as np
+from numpy.typing import NDArray
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.evidence.rows import Effort, Problem, Row, best_of
+from graphsynth.jamming.binding.report import BindingReport
 from graphsynth.jamming.binding.torque import binding_torque
 from graphsynth.jamming.joints.limits import RIGID, SPHERICAL, JointLimits
 from graphsynth.kinematics.engine.result import Motion
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.model import Mechanism
 
+Array = NDArray[np.float64]
 #: Frame, crank, coupler, rocker (m), tilt and limit (rad), stiffness (N m/rad).
 _LENGTHS = 0.2, 0.1, 0.25, 0.25
 _TILT, _LIMIT, _STIFFNESS = 0.03, 0.006, 900.0
+#: Positions among which the peak is sought for the reference.
+_FINE = 1440
 
 
 def exact_torque() -> float:
@@ -57,3 +63,40 @@ def binding_problem(effort: Effort | None = None) -> Problem:
     note = "Both miss the peak between the samples; the derivative itself is exact to 1e-9."
     question = "Largest torque over the turn that a tilted motor axis costs a lambda linkage"
     return Problem("binding", question, "relative", tuple(rows), note=note)
+
+
+def small_tilts_problem(
+    mechanism: Mechanism, given: dict[str, Any], name: str, span: float, effort: Effort | None = None
+) -> Problem:
+    """Find the largest elastic torque of a mechanism with small tilts and with every loop closed in space.
+
+    ``given``: arguments of `binding_torque`, rigid links.  `GeometryError` where nothing binds.
+    """
+    effort = effort or Effort()
+
+    def report(inputs: Array) -> BindingReport:
+        return binding_torque(simulate(mechanism, inputs, events=False), **given)
+
+    def small(inputs: Array) -> float:
+        return float(np.nanmax(np.abs(report(inputs).elastic_torque)))
+
+    def exact(inputs: Array) -> float:
+        return float(np.nanmax(np.abs(report(inputs).exact().torque)))
+
+    turn = report(np.linspace(0.0, span, _FINE + 1))
+    if turn.answer != "binds":
+        raise GeometryError(f"there is no torque to measure: {turn.statement}")
+    peak = int(np.nanargmax(np.abs(turn.elastic_torque)))
+    wanted = exact(np.linspace(turn.inputs[max(peak - 1, 0)], turn.inputs[min(peak + 1, _FINE)], 9))
+    rows = []
+    methods = ("small tilts", small, (36, 120, 360, 1440)), ("exact closure", exact, (12, 36, 120))
+    for method, solve, counts in methods:
+        for count in effort.some(counts):
+            found, *timed = best_of(partial(solve, np.linspace(0.0, span, count + 1)), effort, warm=count == counts[0])
+            own: Any = {"reference": "exact closure round the peak", "default": count == 360}
+            rows.append(Row.of(method, f"{count} positions", abs(found / wanted - 1.0), timed, **own))
+    note = (
+        "Links are rigid and friction is left out. Both miss the peak between the samples; small tilts besides err by "
+        "the square of the tilt."
+    )
+    return Problem("binding-in-space", f"Largest elastic torque of {name}", "relative", tuple(rows), note=note)

@@ -265,7 +265,8 @@ def _gap_row(
     low, high, reference = truth
     why = "" if found.low <= high and low <= found.high else "the reference lies outside of what is proved"
     why = why or (found.reason if found.relative_gap > gap else "")
-    setting, against = f"gap {gap:g}, {found.evaluated} pieces", f"none needed; checked to hold the {reference}"
+    setting = f"gap {gap:g}, {found.evaluated} pieces".removesuffix(", 0 pieces")
+    against = f"none needed; checked to hold the {reference}"
     more = {"kind": "gap between the proved bounds", "reference": against, "proved": True, "value": gap}
     return Row.of("certified gap", setting, found.relative_gap, timed, why, default=default, **more)
 

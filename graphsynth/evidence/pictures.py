@@ -6,6 +6,8 @@ import math
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from graphsynth.core.errors import SpecError
 from graphsynth.drawing.palette import LIGHT
 from graphsynth.evidence.rows import FLOOR, Problem, Row, RowStatus
@@ -138,23 +140,21 @@ _SPOTS = tuple(
 
 
 def _part(figure: Any, axes: Any, names: list[Any]) -> None:
-    """Move names of settings that overlap each other, a marker or the edge to a free spot; drop those without one."""
+    """Move names of settings that overlap each other, a line or the edge to a free spot; drop those without one."""
     from matplotlib.transforms import Bbox
 
     figure.draw_without_rendering()
     inside = axes.get_window_extent()
-    points = [axes.transData.transform(xy) for line in axes.lines for xy in line.get_xydata()]
+    lines = [axes.transData.transform(line.get_xydata()) for line in axes.lines]
+    points = [at for own in lines for k in range(len(own)) for at in np.linspace(own[max(k - 1, 0)], own[k], 32)]
     kept: list[Any] = []
     for text in names:
         for offset, side in _SPOTS:
             text.set(ha=side, position=offset)
             box = text.get_window_extent()
             within = inside.x0 <= box.x0 and box.x1 <= figure.bbox.x1 and inside.y0 <= box.y0 and box.y1 <= inside.y1
-            if (
-                within
-                and not any(box.overlaps(other) for other in kept)
-                and not any(box.contains(*at) for at in points)
-            ):
+            free = not any(box.overlaps(other) for other in kept) and not any(box.contains(*at) for at in points)
+            if within and free:
                 kept.append(Bbox(box.padded(1.0)))
                 break
         else:

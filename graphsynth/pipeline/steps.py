@@ -43,7 +43,7 @@ def solve(context: Context) -> tuple[LinkAssortment, ...]:
                 "asks for 'solutions', but graphs are given and there is no question to solve; remove it"
             )
         return ()
-    return tuple(_spec(context).solve())
+    return tuple(spec_of(context).solve())
 
 
 def _structure(context: Context) -> StructureTable:
@@ -52,7 +52,8 @@ def _structure(context: Context) -> StructureTable:
     return table
 
 
-def _spec(context: Context) -> StructuralSpec:
+def spec_of(context: Context) -> StructuralSpec:
+    """Return the structural question of a scene; a `SceneError` if it cannot be read."""
     from graphsynth.structure.system.spec import StructuralSpec
 
     place = context.scene.place / "structure" / "question"
@@ -112,10 +113,10 @@ def _filtered(context: Context) -> Iterator[MechanismGraph]:
     if table.graphs:
         found = (_read(context, i, text) for i, text in enumerate(table.graphs))
     elif options.sample is not None:
-        drawn = sample_mechanisms(_spec(context), options.sample, context.scene.scene.seed)
+        drawn = sample_mechanisms(spec_of(context), options.sample, context.scene.scene.seed)
         found = {graph.key: graph for graph in drawn}.values()
     else:
-        found = enumerate_mechanisms(_spec(context), symmetry=options.symmetry)
+        found = enumerate_mechanisms(spec_of(context), symmetry=options.symmetry)
     fixed = options.fixed_moving_links
     for graph in found:
         if (fixed is None or has_threefold_symmetry(graph, fixed)) and (not options.planar or graph.is_planar):

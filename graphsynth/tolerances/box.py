@@ -7,8 +7,10 @@ See theory/drawing-tolerances 2.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
@@ -20,6 +22,9 @@ from graphsynth.mechanism.equations import Pair
 from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+#: Relative step back from the rim of the box, so that rounding leaves a member inside.
+_INSIDE = 1e-9
 #: Parameter, and how far one unit of it moves the point: intervals, for a unit vector is no pair of floats.
 Term: TypeAlias = tuple[int, Interval | float, Interval | float]
 
@@ -67,6 +72,7 @@ class ParameterBox:
         Of every joint of the mechanism, on its links a and b.
     discs : tuple of (int, int)
         Pairs of parameters of which only those in a disc are meant: holes within a circle.  The box encloses it.
+        The radius is the upper bound of either.
     """
 
     names: tuple[str, ...]
@@ -84,6 +90,32 @@ class ParameterBox:
     def whole(self) -> Interval:
         """The box, shape (m,)."""
         return Interval.from_bounds(self.low, self.high)
+
+    def holds(self, values: Array) -> bool:
+        """Whether these parameters are those of a member: inside the box and all its discs (exact)."""
+        exact = [Fraction(value) for value in values.tolist()]
+        inside = bool(((self.low <= values) & (values <= self.high)).all())
+        return inside and all(exact[i] ** 2 + exact[j] ** 2 <= Fraction(self.high[i]) ** 2 for i, j in self.discs)
+
+    def furthest(self, rises: Array) -> Array:
+        """Return the member (m,) furthest in a direction, by so little inside that rounding leaves it a member."""
+        p = np.where(rises < 0.0, self.low, self.high)
+        for pair in map(list, self.discs):
+            rise = math.hypot(*rises[pair])
+            p[pair] = self.high[pair] * (rises[pair] / rise if rise > 0.0 else (1.0, 0.0))
+        return np.asarray(p * (1.0 - _INSIDE))
+
+    def in_discs(self, p: Interval) -> tuple[Interval, Mask]:
+        """Narrow boxes (N, m) to what encloses their part of all discs; tell which hold a member at all (certified)."""
+        low, high = p.lo.copy(), p.hi.copy()
+        for pair in self.discs:
+            for k, other in (pair, pair[::-1]):
+                least = Interval(p[:, other].mig)
+                left = (Interval(self.high[k]).sqr() - least.sqr()).hi
+                reach = np.where(left < 0.0, -1.0, Interval(np.maximum(left, 0.0)).sqrt().hi)
+                low[:, k], high[:, k] = np.maximum(low[:, k], -reach), np.minimum(high[:, k], reach)
+        held: Mask = np.asarray((low <= high).all(axis=1))
+        return Interval.from_bounds(np.minimum(low, high), np.maximum(low, high)), held
 
     @cached_property
     def _still(self) -> list[tuple[Pair | None, ...]]:

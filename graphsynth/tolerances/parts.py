@@ -103,6 +103,7 @@ class ThermalExpansion:
 class FitClearance:
     """Clearance of a joint as an ISO 286 fit with its size, ``"25 H7/g6"``, and the height of the bearing, mm.
 
+    Sizes are those at the temperature of the drawing: a `ThermalExpansion` does not change the clearance.
     ``condition`` is the contact condition of the bearing (theory/bearing-contact): "A", a short bearing in a long
     hole, or "B", a long shaft in a hole of that height.
     """

@@ -2,11 +2,13 @@
 
 import math
 import re
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from graphsynth.core.errors import GeometryError
+from graphsynth.drawing.palette import LIGHT
 from graphsynth.drawing.space_pictures import mechanism_in_space
 from graphsynth.jamming.joints import JointLimits
 from graphsynth.jamming.space import Axis, from_axes
@@ -57,6 +59,39 @@ def test_the_frame_of_links_follows_the_turns():
 
 def test_a_centre_is_joined_with_every_joint():
     assert mechanism_in_space(four_bar(), centre=(1, 1, 1)).count('stroke-width="1"') == 4
+
+
+def covered(svg):
+    """Lines that run through letters, and letters that stand on others; a letter is seven pixels wide here."""
+    found = re.findall(r'<g [^>]*><text x="([^"]*)" y="([^"]*)" [^>]*>([^<]*)<', svg)
+    boxes = [np.array([[float(x) - 3.5 * len(t), float(y) - 11.0], [float(x) + 3.5 * len(t), float(y)]])
+             for x, y, t in found]  # fmt: skip
+    lines = [[complex(*map(float, p.split())) for p in path.strip("Z").split(" L")]
+             for path in re.findall(r'<path d="M([^"]*)"', svg)]  # fmt: skip
+    points = np.concatenate([np.linspace(p, q, 400) for line in lines for p, q in pairwise([*line, line[0]])])
+    points = np.column_stack([points.real, points.imag])
+    crossed = [t for (*_, t), (low, high) in zip(found, boxes) if ((low < points) & (points < high)).all(1).any()]
+    return crossed + [(s[2], t[2]) for k, (s, a) in enumerate(zip(found, boxes)) for t, b in zip(found[:k], boxes)
+                      if (a[0] < b[1]).all() and (b[0] < a[1]).all()]  # fmt: skip
+
+
+@pytest.mark.parametrize("view", [(-70.0, 25.0), (-60.0, 25.0), (10.0, 40.0), (120.0, 60.0), (-90.0, 90.0)])
+def test_labels_stand_on_no_line_and_on_no_other_label(view):
+    """Four axes, each off in its own direction, and long labels; from above the axes are points."""
+    off = ((0.01, 0.0), (0.004, -0.012), (-0.011, -0.013), (0.009, 0.016))
+    model = from_axes([Axis((k - 1) % 4, k, p, (0, 0, 1), JointLimits(0.01, 0.01), k == 1, (p, (x, y, 1.0)))
+                       for k, (p, (x, y)) in enumerate(zip(CORNERS[3:] + CORNERS[:3], off))])  # fmt: skip
+    q = np.zeros(model.width)
+    q[model.column[:, 1]] = 0.004
+    svg = mechanism_in_space(model, q, view=view, magnified=10.0, names=dict(enumerate("COAB")))
+    assert len(texts(svg)) == 4 and covered(svg) == []
+
+
+def test_an_axis_has_the_colour_of_the_second_link():
+    """Of joints between links 0-1, 1-2, 2-3 and 3-0, of which link 0 is the frame."""
+    svg = mechanism_in_space(four_bar())
+    axes = re.findall(r'stroke="([^"]*)" stroke-width="2.6"', svg)
+    assert sorted(axes) == sorted(LIGHT[name] for name in ("a", "c", "d", "soft"))
 
 
 def test_bad_input_is_refused():

@@ -98,6 +98,21 @@ def test_the_torque_of_binding_has_errors_of_its_sampling():
     assert by(problem, "derivative of the energy")[-1].error < 1e-4
 
 
+def test_small_tilts_err_by_their_square():
+    """Against the exact closure of the shipped press, tilted ten times as much."""
+    from graphsynth.evidence.binding import small_tilts_problem
+    from graphsynth.jamming.joints import JointLimits, Misalignment
+    from graphsynth.mechanism.model import Mechanism
+
+    press = Mechanism.slider_crank(0.04, 0.08)
+    given = {"tilt": Misalignment(0, 1, 0.05, 0.5), "joints": JointLimits(0.025), "stiffness": 4e4}
+    problem = small_tilts_problem(press, given, "a press", math.tau, QUICK)
+    assert all(row.good for row in problem.rows)
+    assert 1e-5 < by(problem, "small tilts")[-1].error < 0.05**2
+    with pytest.raises(GeometryError, match="free"):
+        small_tilts_problem(press, given | {"joints": JointLimits(0.4)}, "a press", math.tau, QUICK)
+
+
 @pytest.mark.slow
 def test_coupled_joints_of_another_linkage_have_proved_bounds():
     linkage = LambdaLinkage(2.2, 1.0, 2.4, 2.3)

@@ -17,8 +17,8 @@ PACKAGE = ROOT / "graphsynth"
 #: Rooms from the lowest to the highest; those in one line do not import each other.
 ORDER = (
     ("core",), ("intervals", "structure"), ("synthesis", "mechanism"), ("tolerances",), ("kinematics",),
-    ("jamming", "dynamics"), ("drawing", "formats"), ("evidence",), ("pipeline",), ("systems",), ("atlas",),
-    ("cli", "testing"),
+    ("jamming", "dynamics"), ("design",), ("drawing", "formats"), ("evidence",), ("pipeline",), ("systems",),
+    ("atlas",), ("cli", "testing"),
 )  # fmt: skip
 #: Modules whose methods are written down elsewhere and looked up on first use.
 FACADES = {"graphsynth.structure.graph", "graphsynth.mechanism.model"}
@@ -171,7 +171,10 @@ def repeated_public_names() -> Iterator[str]:
 
 
 #: Folders of modules with a line of their own in the budget, beside the systems.
-FOLDERS = {"jamming/assembly", "jamming/binding", "jamming/chance", "jamming/margins", "jamming/space"}
+FOLDERS = {
+    "jamming/assembly", "jamming/binding", "jamming/chance", "jamming/margins", "jamming/space",
+    "design/poses", "design/nine_points",
+}  # fmt: skip
 
 
 def sizes() -> dict[str, tuple[int, int]]:

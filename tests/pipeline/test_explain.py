@@ -30,7 +30,7 @@ print("\\n".join(set(sys.modules) - before))
 def loaded(scene: str, out: Path) -> set[str]:
     """Every module that a run of a scene imports in a fresh process."""
     command = [sys.executable, "-c", PROBE, scene, str(out)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=1800)
     return set(done.stdout.split())
 
 

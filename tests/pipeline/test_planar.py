@@ -265,7 +265,7 @@ def test_goals_that_nothing_meets_and_one_that_fails(monkeypatch: pytest.MonkeyP
     )
     tables["structure"]["question"]["links"] = 4
     rejected = execute(Scene.from_mapping(tables))["records"][0]
-    assert rejected.status == "rejected" and rejected.cause.startswith("embody: no dimensions were found: ")
+    assert rejected.status == "rejected" and rejected.cause.startswith("embody: moves, but ")
     assert "nothing was accepted in 1 search" in rejected.reason
 
     usual = stages.embody

@@ -35,6 +35,9 @@ def test_every_standard_tolerance_is_the_published_one():
             assert standard_tolerance(grade, end) * 1000 == F(value), (grade, end)
         for grade in (17, 18):  # from IT11 on, five grades are a factor of ten: exact in the standard
             assert standard_tolerance(grade, end) == 10 * standard_tolerance(grade - 5, end)
+    for end, row in zip(SIZES, rows("coarse_and_j"), strict=True):
+        assert [standard_tolerance(grade, end) * 1000 for grade in (17, 18)] == [F(own) for own in row[1:3]]
+        assert [-micro(own, row[0])[1] for own in ("j5", "j6", "j7")] == [F(row[3]), F(row[3]), F(row[4])]
 
 
 def test_every_hole_a_to_h_and_its_shaft_is_the_published_one():
@@ -49,11 +52,12 @@ def test_every_hole_a_to_h_and_its_shaft_is_the_published_one():
 
 
 def test_the_letters_of_the_latest_edition_are_geometric_means_of_their_neighbours():
-    for letter in ("cd", "ef", "fg"):
-        for size in (14, 18, 24, 30, 40):
+    for column, (letter, step) in enumerate({"cd": 5, "ef": 1, "fg": 1}.items(), 1):
+        for size, *published in rows("between"):
             value = -micro(letter + "8", size)[0]
             first, last = (-micro(own + "8", size)[0] for own in letter)
-            assert abs(float(value) / math.sqrt(first * last) - 1.0) < 0.03, (letter, size)
+            # rounded to whole micrometres, from 60 on to fives
+            assert value == step * round(math.sqrt(first * last) / step) == F(published[column - 1]), (letter, size)
         with pytest.raises(GeometryError, match="not standardised at 51 mm"):
             limit_deviations(letter + "8", 51)
 

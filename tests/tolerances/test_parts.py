@@ -2,20 +2,38 @@
 
 import itertools
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from graphsynth import Driver, Mechanism, MechanismGraph, Prismatic, Revolute, assess_jamming, simulate
+from graphsynth import (
+    Driver,
+    Mechanism,
+    MechanismGraph,
+    Prismatic,
+    Revolute,
+    assess_jamming,
+    enumerate_chains,
+    simulate,
+)
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval
 from graphsynth.jamming import Bearing, Fit
 from graphsynth.jamming.assembly.positions import Positions
 from graphsynth.jamming.assembly.tubes import prove_tubes, slopes
-from graphsynth.jamming.joints import JointLimits, Misalignment, assess_coupled, certify_coupled, largest_scale
+from graphsynth.jamming.joints import (
+    JointLimits,
+    Misalignment,
+    assess_coupled,
+    bearing_limits,
+    certify_coupled,
+    largest_scale,
+)
 from graphsynth.jamming.joints.closure import joint_places
 from graphsynth.jamming.joints.drawing import drawn, fit_limits
+from graphsynth.kinematics.dimensional import embody
 from graphsynth.tolerances import (
     AxisAngle,
     EndFloat,
@@ -26,6 +44,7 @@ from graphsynth.tolerances import (
     ThermalExpansion,
     parameter_box,
 )
+from graphsynth.tolerances.box import relative_box
 
 LIMITS, TILT = JointLimits(0.006), Misalignment(0, 1, 1e-3)
 TURN = np.linspace(0.0, 2.0 * math.pi, 73)
@@ -96,6 +115,30 @@ def test_places_are_what_the_drawing_says():
     assert complex(*member.joint(0, 1).at_b) == at[0]  # the datum
     assert complex(*member.joint(0, 3).at_a) == pytest.approx((2.002 - 0.003j) * (1.0 + 40.0 * 1e-5), abs=1e-15)
     assert member.joint(2, 3) == mechanism.joint(2, 3)  # no tolerance, no coefficient
+
+
+def test_boxes_are_narrowed_to_their_part_of_a_disc():
+    """Every point of a box and the disc stays inside; a box without a common point is found; against sampled points."""
+    box = parameter_box(LAMBDA, [LengthTolerance(1, (0, 2), 0.1), HolePosition(2, 3, 2.0)])
+    rng = np.random.default_rng(4)
+    ends = np.sort(rng.uniform(box.low, box.high, (400, 3)) + rng.uniform(-0.3, 0.3, (2, 400, 3)), axis=0)
+    ends = np.clip(ends, box.low, box.high)
+    ends[:, 0] = (0.0, 0.6, 0.8), (0.1, 1.0, 1.0)  # touches the rim in one point, in decimals
+    whole = Interval.from_bounds(*ends)
+    narrow, held = box.in_discs(whole)
+    assert 0.02 < (~held).mean() < 0.5
+    assert (narrow.lo >= whole.lo)[held].all() and (narrow.hi <= whole.hi)[held].all()
+    nearest = np.clip(0.0, ends[0], ends[1])[:, 1:]
+    apart = np.hypot(*nearest.T)
+    assert held[apart < 1.0 - 1e-12].all() and not held[apart > 1.0 + 1e-12].any()
+    for _ in range(200):
+        p = rng.uniform(*ends)
+        inside = np.hypot(p[:, 1], p[:, 2]) <= 1.0
+        assert ((narrow.lo <= p) & (p <= narrow.hi)).all(axis=1)[inside].all()
+        assert [box.holds(one) for one in p[:20]] == inside[:20].tolist()
+    assert (narrow.hi - narrow.lo < whole.hi - whole.lo)[held].any()
+    assert box.holds(np.array([0.1, 0.0, 1.0])) and not box.holds(np.array([0.11, 0.0, 0.0]))
+    assert not box.holds(np.array([0.0, 2.0**-40, 1.0]))  # exact: in doubles the sum of squares is 1
 
 
 def test_lengths_of_a_link_are_chained_from_their_datum():
@@ -230,10 +273,71 @@ def test_a_dyad_that_some_member_cannot_close_is_not_proved():
         system = Positions(mechanism, box, motion.poses[0])
         x, counted = np.zeros((1, 0)), system.count(motion.poses[:1])
         tubes = prove_tubes(system, (0, 1, 2, 3), u, x, counted)
-        assert tubes.proved[0] == proved and (float(tubes.rooms.lo[0, 0]) > 0.0) == proved
+        assert tubes.proved[0] == proved and (float(tubes.dyads.lo[0, 0, 0]) > 0.0) == proved
         for a, b in itertools.product((-plus, plus), repeat=2):  # room of the triangle with sides 3, 1.6 + a, 1.45 + b
             share = 0.5 + ((1.6 + a) ** 2 - (1.45 + b) ** 2) / 18.0
-            assert tubes.rooms[0, 0].contains((1.6 + a) ** 2 / 9.0 - share**2)
+            assert tubes.dyads[0, 0, 0].contains((1.6 + a) ** 2 / 9.0 - share**2)
+
+
+@pytest.mark.parametrize(("sizes", "signs"), [((2, 1, 1.6, 1.45), (1, 1, -1, -1)), ((2, 1, 2.5, 1.55), (-1, 1, 1, -1))])
+def test_a_member_that_does_not_turn_fully_is_named(sizes, signs):
+    """Near the verge: stretched, coupler and rocker do not reach; folded, the coupler is too long."""
+    ends = {0: (1, 3), 1: (0, 2), 2: (1, 3), 3: (0, 2)}
+    given = [LengthTolerance(link, ends[link], 0.04 * sizes[link]) for link in range(4)]
+    motion = simulate(Mechanism.four_bar(*sizes), TURN)
+    found = certify_coupled(motion, LIMITS, TILT, tolerances=given, max_pieces=1500)
+    assert found.verdict.name == "UNDECIDED" and found.decided > 0.5
+    told = re.search(r"the member \((.*)\) cannot be assembled at the input ([^,]+), proved", found.reason)
+    values = [float(own.split()[-1]) for own in told[1].split(", ")]
+    assert np.sign(values).tolist() == list(signs)
+    a, b, c, d = np.add(sizes, values)
+    reach = math.sqrt(a * a + b * b - 2.0 * a * b * math.cos(float(told[2])))
+    assert not abs(c - d) < reach < c + d
+    plain = certify_coupled(motion, LIMITS, TILT, tolerances=[LengthTolerance(1, (0, 2), 0.001)], max_pieces=128)
+    assert "cannot be assembled" not in plain.reason
+
+
+def test_a_tolerance_of_nothing_changes_nothing():
+    """A parameter without width is no reason not to cut the input."""
+    given, motion = [LengthTolerance(1, (0, 2), 0.0), HolePosition(2, 3, 0.0)], simulate(LAMBDA, TURN)
+    tilt = Misalignment(0, 1, 0.01199)
+    bare, same = (certify_coupled(motion, LIMITS, tilt, tolerances=own) for own in ([], given))
+    assert bare.verdict.name == same.verdict.name == "CERTIFIED_FREE"
+    assert same.evaluated > 128 and same.decided == 1.0
+
+
+def test_tubes_of_chained_dyads_hold_every_member():
+    """The second dyad stands on the first: joints of random members lie inside, and the boxes are no idle ones."""
+    mechanism = embody(next(iter(enumerate_chains(6))), seed=0).mechanism
+    box, rng = relative_box(mechanism, 0.02), np.random.default_rng(8)
+    edges = np.linspace(0.0, 2.0 * math.pi, 129)
+    motion = simulate(mechanism, edges[:-1])
+    system, joints = Positions(mechanism, box, motion.poses[0]), tuple(range(7))
+    assert len(system.dyads) == 2 and system.size == 0
+    u = Interval.from_bounds(edges[:-1], edges[1:])
+    tubes = prove_tubes(system, joints, u, np.zeros((128, 0)), system.count(motion.poses))
+    assert tubes.proved.all()
+    low, high = np.full((128, 7, 2), np.inf), np.full((128, 7, 2), -np.inf)
+    for k in range(60):
+        p = rng.uniform(box.low, box.high) if k % 2 else rng.choice([-1.0, 1.0], box.size) * box.high
+        inputs = edges[:-1] + rng.uniform(0.0, 1.0, 128) * np.diff(edges)
+        member = box.member(mechanism, p)
+        found = simulate(member, inputs, start=motion.poses[0], events=False)
+        r = joint_places(member, joints, found.poses)[0]
+        assert found.assembled.all() and ((tubes.r.lo <= r) & (r <= tubes.r.hi)).all()
+        low, high = np.minimum(low, r), np.maximum(high, r)
+    assert np.median((tubes.r.hi - tubes.r.lo)[:, [2, 4, 5, 6]] / (high - low)[:, [2, 4, 5, 6]]) < 6.0
+
+
+@pytest.mark.parametrize("width", [0.02, pytest.param(0.03, marks=pytest.mark.slow)])
+def test_chained_dyads_are_decided_for_wide_boxes(width):
+    """A six-bar of two dyads with 14 toleranced coordinates, at half its limit."""
+    mechanism = embody(next(iter(enumerate_chains(6))), seed=0).mechanism
+    (driver,), motion = mechanism.drivers, simulate(mechanism, TURN)
+    tilt = Misalignment(driver.base, driver.link, 0.00595)
+    assert assess_coupled(motion, LIMITS, tilt).smallest_scale > 2.0
+    found = certify_coupled(motion, LIMITS, tilt, tolerances=width, seconds=600.0)
+    assert found.verdict.name == "CERTIFIED_FREE" and found.one_branch and found.decided == 1.0
 
 
 @pytest.mark.slow
@@ -260,6 +364,35 @@ def test_a_member_that_binds_is_named_and_binds():
     reached = simulate(member, np.sort([0.0, at]), start=motion.poses[0], events=False)
     factor = assess_coupled(reached, LIMITS, Misalignment(0, 1, alpha)).factor
     assert factor.max() >= found.witness.factor * (1.0 - 1e-9) > 1.0
+
+
+def test_a_named_member_has_its_hole_inside_the_circle():
+    """Of a square round the circle the corners bind by far: pieces there are proved to bind, but hold no member."""
+    mechanism, radius = Mechanism.four_bar(2, 0.7, 1.6, 1.9), 0.45
+    given, motion = [HolePosition(1, 2, 2.0 * radius)], simulate(mechanism, np.linspace(0.4, 0.45, 3))
+    tilt = Misalignment(0, 1, 0.011616, alpha_range=(0.0, 0.011616))
+    found = certify_coupled(motion, LIMITS, tilt, tolerances=given, resolution=1e-2)
+    assert found.verdict.name == "CERTIFIED_JAMMED_FOR_SOME" and (found.state == 0).all(), found.reason
+    (joint,) = (own for own in found.witness.mechanism.joints if own.pair == (1, 2))
+    x, y = np.subtract(joint.at_a, (0.7, 0.0))
+    assert math.hypot(x, y) <= radius
+    named = found.witness.summary()["deviations"]
+    assert named == pytest.approx({"x of the hole 1-2 of link 1": x, "y of the hole 1-2 of link 1": y}, abs=1e-15)
+    for name, value in named.items():
+        assert f"{name} {value:+.12g}" in found.reason
+
+
+def test_a_named_member_has_its_limits_and_angle():
+    motion = simulate(LAMBDA, TURN)
+    limits = JointLimits(0.006, tilt_range=(0.0055, 0.0065))
+    tilt = Misalignment(0, 1, 0.0118, alpha_range=(0.0115, 0.0118))
+    found = certify_coupled(motion, limits, tilt, tolerances=lengths(0.001), resolution=1e-2)
+    assert found.verdict.name == "CERTIFIED_JAMMED_FOR_SOME", found.reason
+    assert "alpha = 0.0118 at 0 rad, length 1-3 of link 0 " in found.reason
+    assert "tilt of joint 1-2 = 0.0055" in found.reason and found.witness.limits[1].tilt == pytest.approx(
+        0.0055, rel=1e-8
+    )
+    assert len(found.witness.deviations) == 4 and len(found.witness.chosen_limits) == 3  # the motor's joint is rigid
 
 
 @pytest.mark.parametrize("seed", [pytest.param(k, marks=pytest.mark.slow) for k in range(4)])
@@ -311,8 +444,19 @@ def test_a_fit_limits_the_tilt_for_every_pair_of_parts():
         pin = rng.uniform(*(float(fit.nominal + own) for own in (fit.shaft.lower, fit.shaft.upper))) / 2
         angle = Bearing(pin, rng.uniform(9.9, 10.1), hole - pin).critical_tilt("A").angle
         assert limits.tilt_range[0] <= angle <= limits.tilt_range[1]
-    tightest = Bearing(float(fit.radius.upper), 10.1, float(fit.clearance.lower)).critical_tilt("A").angle
-    assert limits.tilt_range[0] == pytest.approx(tightest, rel=1e-3)
+    # both ends are those of pairs that exist
+    (r, c), (wide, loose) = (map(float, fit.pair(own)) for own in (False, True))
+    ends = Bearing(r, 10.1, c).critical_tilt("A").angle, Bearing(wide, 9.9, loose).critical_tilt("A").angle
+    assert limits.tilt_range == pytest.approx(ends, rel=1e-12)
+
+
+def test_a_pin_in_a_hole_has_no_less_than_both_contacts_allow():
+    """Condition "general" with a range of radii: the least of the larger of both tilts, by dense sampling."""
+    bearing = Bearing(17.5, 10.0, 0.03, 10.002)
+    own = bearing_limits(bearing, "general", radius_tolerance=2.0, clearance_tolerance=0.005)
+    radii = np.linspace(15.5, 19.5, 4001)
+    larger = [max(Bearing(r, 10.0, 0.025, 10.002).critical_tilt(kind).angle for kind in "AB") for r in radii]
+    assert own.tilt_range[0] == pytest.approx(min(larger), rel=1e-6) and own.tilt_range[0] <= min(larger)
 
 
 def test_fits_stand_for_the_limits_of_their_joints():

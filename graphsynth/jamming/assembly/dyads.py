@@ -7,6 +7,7 @@ assembly of that mode, exactly one, and no system has to be solved.  See theory/
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -44,19 +45,19 @@ class Dyad(NamedTuple):
 
 
 class Near(NamedTuple):
-    """Known enclosures of the room of every dyad, and how far the variables of duals lead from them, (K, N)."""
+    """Known enclosures of what `place_dyad` finds, (N, dyads, 7), and how far variables of duals lead on, (K, N)."""
 
-    rooms: Interval
+    known: Interval
     steps: Interval | None = None
 
-    def narrowed(self, room: Any, place: int) -> Any:
-        """Narrow the room of a dyad, by the mean value theorem if it is a dual."""
-        known = self.rooms[:, place]
-        if not isinstance(room, Dual):
-            return _within(room, known)
+    def narrowed(self, value: Any, dyad: int, place: int) -> Any:
+        """Narrow one number of a dyad, by the mean value theorem if it is a dual."""
+        known = self.known[:, dyad, place]
+        if not isinstance(value, Dual):
+            return _within(value, known)
         if self.steps is not None:
-            known = known + (room.grad * self.steps).sum(0)
-        return Dual(_within(room.value, known), room.grad)
+            known = known + (value.grad * self.steps).sum(0)
+        return Dual(_within(value.value, known), value.grad)
 
 
 def _within(value: Interval, known: Interval) -> Interval:
@@ -101,19 +102,20 @@ def find_dyads(mechanism: Mechanism, placed: set[int]) -> list[Dyad]:
 
 
 def place_dyad(
-    plane: Plane, ends: tuple[Pair, Pair], arms: tuple[Pair, Pair], side: float, near: Any
-) -> tuple[Pair, Pair, Any]:
-    """Directions (cos, sin) of both links and the room, for the outer joints and the arms in the frames of the links.
+    plane: Plane, ends: tuple[Pair, Pair], arms: tuple[Pair, Pair], side: float, near: Callable[[Any, int], Any]
+) -> list[Any]:
+    """Return the room, the way between the outer joints (x, y), and cos and sin of both links' angles.
 
-    ``arms`` lead from the outer joint of each link to the inner one; ``near`` narrows the room.
+    ``arms`` lead from the outer joint of each link to the inner one, in its frame; ``near`` narrows each of the seven.
     """
     d = ends[1] - ends[0]
+    d = Pair(near(d.x, 1), near(d.y, 2))
     a, b = (arm.x.sqr() + arm.y.sqr() for arm in arms)
     size = d.x.sqr() + d.y.sqr()
     share = (a - b) / size * 0.5 + 0.5
-    room = near(a / size - share.sqr())
-    way = d * share + plane.left(d) * (room.sqrt() * side)
-    turns = []
+    found = [near(a / size - share.sqr(), 0), d.x, d.y]
+    way = d * share + plane.left(d) * (found[0].sqrt() * side)
     for arm, reached, square in zip(arms, (way, way - d), (a, b)):
-        turns.append(Pair(plane.dot(arm, reached) / square, plane.cross(arm, reached) / square))
-    return turns[0], turns[1], room
+        found.append(near(plane.dot(arm, reached) / square, len(found)))
+        found.append(near(plane.cross(arm, reached) / square, len(found)))
+    return found

@@ -43,12 +43,17 @@ class Unsupported(Exception):  # noqa: N818 - never leaves the package: it becom
 
 
 class Placement(NamedTuple):
-    """Angle, direction (cos, sin) and origin of every link; room of every dyad."""
+    """Angle, direction (cos, sin) and origin of every link; what `place_dyad` finds of every dyad."""
 
     angle: list[Any]
     turn: list[Pair]
     origin: list[Pair]
-    rooms: list[Any]
+    dyads: list[list[Any]]
+
+    @property
+    def rooms(self) -> list[Any]:
+        """Room of every dyad, positive where it closes."""
+        return [own[0] for own in self.dyads]
 
 
 class _Edge(NamedTuple):
@@ -142,10 +147,10 @@ class Positions:
         grow(chosen)
         return edges, size
 
-    def about(self, rooms: Interval, steps: Interval | None = None) -> Positions:
-        """Return the same equations with known enclosures of the rooms of the dyads."""
+    def about(self, known: Interval, steps: Interval | None = None) -> Positions:
+        """Return the same equations with known enclosures of the dyads."""
         other = copy(self)
-        other.near = Near(rooms, steps) if self.dyads else None
+        other.near = Near(known, steps) if self.dyads else None
         return other
 
     def follows(self, poses: Array) -> Mask:
@@ -200,7 +205,7 @@ class Positions:
         at = Placement([zero] * links, [Pair(Interval(1), zero)] * links, [Pair(zero, zero)] * links, [])
         for edge in self.edges:
             if edge.dyad >= 0:
-                if edge.dyad == len(at.rooms):
+                if edge.dyad == len(at.dyads):
                     self._place_dyad(self.dyads[edge.dyad], at, moved)
                 continue
             joint, (at_a, at_b) = self.mechanism.joints[edge.joint], self.local[edge.joint]
@@ -228,8 +233,8 @@ class Positions:
         return at
 
     def _place_dyad(self, dyad: Dyad, at: Placement, moved: Moved | None) -> None:
-        """Place both links of a dyad, and note its room."""
-        joints, (a, b), number = self.mechanism.joints, dyad.links, len(at.rooms)
+        """Place both links of a dyad, and note what was found."""
+        joints, (a, b), number = self.mechanism.joints, dyad.links, len(at.dyads)
 
         def local(k: int, link: int) -> Pair:
             return self.local[k][link != joints[k].a]
@@ -244,11 +249,12 @@ class Positions:
         arms = local(dyad.joints[2], a) - outer[0], local(dyad.joints[2], b) - outer[1]
         near = self.near
 
-        def narrowed(room: Any) -> Any:
-            return room if near is None else near.narrowed(room, number)
+        def narrowed(value: Any, place: int) -> Any:
+            return value if near is None else near.narrowed(value, number, place)
 
-        *turns, room = place_dyad(PLANE, (ends[0], ends[1]), arms, dyad.side, narrowed)
-        at.rooms.append(room)
+        found = place_dyad(PLANE, (ends[0], ends[1]), arms, dyad.side, narrowed)
+        at.dyads.append(found)
+        turns = Pair(*found[3:5]), Pair(*found[5:])
         for link, turn, end, own in zip((a, b), turns, ends, outer):
             at.turn[link], at.angle[link] = turn, PLANE.argument(turn)
             at.origin[link] = end - PLANE.turned(own, turn)

@@ -35,8 +35,8 @@ class Tubes(NamedTuple):
     ``centre`` (N, size): where it lies at the middle of the input and of the parameters;
     ``r``, ``e``, ``base`` (N, joints, 2), (N, joints, 2), (N, joints, 2, 2): positions, guide directions, directions of
     links a and b of the joints asked for.  Certified where proved.  ``reach`` (N, 1 + m): how far the input and each
-    parameter lead the unknowns, in units of their weights (estimated): what is worth cutting.  ``rooms`` (N, dyads): of
-    the dyads, positive where proved.
+    parameter lead the unknowns, in units of their weights (estimated): what is worth cutting.  ``dyads`` (N, dyads, 7):
+    what `graphsynth.jamming.assembly.dyads.place_dyad` finds, the room first, positive where proved.
     """
 
     proved: Mask
@@ -47,7 +47,7 @@ class Tubes(NamedTuple):
     e: Interval
     base: Interval
     reach: Array
-    rooms: Interval
+    dyads: Interval
 
     def take(self, rows: NDArray[np.intp]) -> Tubes:
         """Return some of the pieces."""
@@ -143,8 +143,8 @@ def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, co
     half, weights = steps.mag, system.weights
     proved = np.ones(count, dtype=np.bool_)
     tight = domain = centre = Interval.zeros((count, 0))
-    rooms, reach = _rooms(system, u, p, steps)
-    proved &= (rooms.lo > 0.0).all(axis=1)
+    dyads, reach = _dyads(system, u, p, steps)
+    proved &= (dyads[:, :, 0].lo > 0.0).all(axis=1)
     if size:
         found, centre = _middle(system, u, x, p, counted)
         proved &= found
@@ -163,7 +163,7 @@ def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, co
             if left.size == 0:
                 break
             piece = parts[0][left], parts[1][left], parts[2][left]
-            own, guess = system.about(rooms[left]), (radius[left], move[left])
+            own, guess = system.about(dyads[left]), (radius[left], move[left])
             lead, room, inside = _lead(own, piece, centre[left], counted[left], guess, shells)
             proved[left[inside]], held[left[inside]], radius[left[inside]] = True, lead[inside], room[inside]
             wider = np.where(inside[:, None] | ~(_ROOM * lead < 0.7 * weights), radius[left], _ROOM * lead)
@@ -175,40 +175,57 @@ def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, co
         domain = centre + Interval.from_bounds(-room, room)
     if not joints:
         none, base = Interval.zeros((count, 0, 2)), Interval.zeros((count, 0, 2, 2))
-        return Tubes(proved, domain, tight, centre, none, none, base, reach, rooms)
-    return Tubes(proved, domain, tight, centre, *_placed(system.about(rooms), joints, u, tight, p), reach, rooms)
+        return Tubes(proved, domain, tight, centre, none, none, base, reach, dyads)
+    return Tubes(proved, domain, tight, centre, *_placed(system.about(dyads), joints, u, tight, p), reach, dyads)
 
 
-def _rooms(system: Positions, u: Interval, p: Interval, steps: Interval) -> tuple[Interval, Array]:
-    """Enclose the rooms of dyads, which depend on the input and the parameters alone, by the mean value theorem.
+def _dyads(system: Positions, u: Interval, p: Interval, steps: Interval) -> tuple[Interval, Array]:
+    """Enclose the dyads, which depend on the input and the parameters alone, by the mean value theorem.
 
     And estimate how far each of these turns the links of the dyads, (N, 1 + m).
     """
     count = len(u)
     if not system.dyads:
-        return Interval.zeros((count, 0)), np.zeros(steps.shape)
-    none = [Interval(0)] * system.size
-
-    def placed(near: Positions, u: Interval, p: Interval) -> tuple[Placement, Interval]:
-        box = Interval.stack([u, *columns_of(p)], axis=-1)
-        first, *rest = variables(box)
-        at = near.within(rest).place(none, near.driven(first))
-        rooms = [room.value if isinstance(room, Dual) else room for room in at.rooms]
-        return at, Interval.stack([room + Interval.zeros((count,)) for room in rooms], axis=-1)
-
+        return Interval.zeros((count, 0, 7)), np.zeros(steps.shape)
     with np.errstate(all="ignore"):
-        at, middle = placed(system, points(u.mid), points(p.mid))
+        at, middle = _closed(system, points(u.mid), points(p.mid))
         turned = [at.angle[link] for dyad in system.dyads for link in dyad.links]
         rates = [angle.grad.mag.T for angle in turned if isinstance(angle, Dual)]
         reach = np.nan_to_num(np.max(rates, axis=0), posinf=0.0) * steps.mag if rates else np.zeros(steps.shape)
         near = system.about(middle, Interval.from_bounds(steps.lo.T, steps.hi.T))
-        return placed(near, u, p)[1], reach
+        return _closed(near, u, p)[1], reach
+
+
+def _closed(system: Positions, u: Interval, p: Interval) -> tuple[Placement, Interval]:
+    """Place the dyads over pieces, with derivatives by the input and the parameters; enclosures (N, dyads, 7)."""
+    first, *rest = variables(Interval.stack([u, *columns_of(p)], axis=-1))
+    at = system.within(rest).place([Interval(0)] * system.size, system.driven(first))
+    zero = Interval.zeros((len(u),))
+    values = [[(v.value if isinstance(v, Dual) else v) + zero for v in own] for own in at.dyads]
+    return at, Interval.stack([Interval.stack(own, axis=-1) for own in values], axis=1)
+
+
+def shortest_reach(system: Positions, u: Array) -> tuple[Array, Array]:
+    """Members (N, m) whose dyads seem to reach least far at inputs (N,), and bounds above (N,) of their least room.
+
+    Below zero, proved: that member has no assembly there, on this side of the dyads before.
+    """
+    inputs, box = points(u), system.box
+    members, least = np.zeros((len(u), box.size)), np.full(len(u), np.inf)
+    with np.errstate(all="ignore"):
+        for room in _closed(system, inputs, points(members))[0].rooms:
+            falls = -np.nan_to_num(room.grad.mid[1:].T) if isinstance(room, Dual) else np.zeros_like(members)
+            p = np.array([box.furthest(own) for own in falls])
+            found = np.fmin.reduce(_closed(system, inputs, points(p))[1].hi[:, :, 0], axis=1)
+            better = found < least
+            members[better], least[better] = p[better], found[better]
+    return members, least
 
 
 def middles(system: Positions, joints: tuple[int, ...], u: Interval, tubes: Tubes, p: Interval) -> Tubes:
     """Return tubes of the middles of pieces u and p: where the joints are there."""
     u, p, x = points(u.mid), points(p.mid), tubes.centre
-    return Tubes(tubes.proved, x, x, x, *_placed(system, joints, u, x, p), np.zeros_like(tubes.reach), tubes.rooms)
+    return Tubes(tubes.proved, x, x, x, *_placed(system, joints, u, x, p), np.zeros_like(tubes.reach), tubes.dyads)
 
 
 def _placed(
@@ -318,7 +335,7 @@ def slopes(
     """
     count, n = len(u), system.size
     p = whole_box(system, count) if parameters is None else parameters
-    unknowns, own, rate, fine = _rates(system.about(tubes.rooms), u, tubes.tight, counted, p)
+    unknowns, own, rate, fine = _rates(system.about(tubes.dyads), u, tubes.tight, counted, p)
     kinds = 1 + p.shape[1]
 
     def along(value: Any) -> Interval:

@@ -106,8 +106,8 @@ class ContactFriction:
     coefficient : float
         Of friction.
     radius, length : float
-        Radius of the pin and distance of the contacts at both ends of the bearing, m.  Of a guide ``length`` is that
-        of its contacts, and the radius is not used.
+        Radius of the pin and distance of the contacts at both ends of the bearing, m.  Of a guide ``length`` is the
+        distance of its contacts, along and across it, and the radius half their width, for its wear alone.
     """
 
     coefficient: float

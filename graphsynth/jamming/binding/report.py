@@ -117,6 +117,12 @@ class BindingReport(Shown):
         return math.nan if np.isnan(size).all() else float(self.inputs[int(np.nanargmax(size))])
 
     @property
+    def share(self) -> float:
+        """Share of the assembled inputs at which joints are pressed beyond their limits."""
+        known = np.isfinite(self.energy) | self.blocked
+        return float(np.mean((self.energy > 0.0)[known] | self.blocked[known])) if known.any() else math.nan
+
+    @property
     def loss(self) -> float:
         """Work of friction over the motion, J; the elastic part of a full rotation returns to zero."""
         return float(np.nansum([row.loss for row in self.wear]))
@@ -163,7 +169,8 @@ class BindingReport(Shown):
             return f"Estimated: blocks, at input {at} a misalignment meets neither clearance nor compliance."
         if self.answer == "blocks":
             return f"Estimated: blocks, {peak} at input {at} exceed the motor's {self.motor_torque:.4g} {self._effort}."
-        return f"Estimated: binds with at most {peak}, at input {at}."
+        given = "" if self.motor_torque is None else f"; the motor gives {self.motor_torque:.4g} {self._effort}"
+        return f"Estimated: binds with at most {peak}, at input {at}{given}."
 
     @property
     def _linear(self) -> bool:
@@ -186,9 +193,8 @@ class BindingReport(Shown):
     def _figures(self) -> list[tuple[str, str]]:
         if self.answer in ("free", "not assembled"):
             return []
-        share = np.nanmean(np.where(np.isnan(self.energy), np.nan, self.energy > 0.0) + self.blocked)
         rows = [
-            ("contact", f"over {100.0 * share:.3g} % of the inputs"),
+            ("contact", f"over {100.0 * self.share:.3g} % of the inputs"),
             ("energy", f"{np.nanmax(self.energy[~self.blocked], initial=0.0):.4g} J at most"),
         ]
         if self.loss > 0.0:
@@ -220,6 +226,8 @@ class BindingReport(Shown):
     def details(self) -> str:
         """Return all figures, all joints and all notes in words."""
         rows = [*self._figures(), ("sampling", f"work of the torque off by {self.work_error:.2g} of all work")]
+        if self.loss > 0.0:
+            rows.append(("contacts", "a moment presses on both ends of its bearing, an axial force on its face"))
         rows += [("note", note) for note in self.notes] + [("run time", f"{self.seconds:.2f} s")]
         wide = max(len(name) for name, _ in rows)
         return "\n".join([self.statement, *(f"  {name:<{wide}}  {value}" for name, value in rows)])

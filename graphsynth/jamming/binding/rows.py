@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.jamming.binding.parts import JointStiffness, LinkSection
-from graphsynth.jamming.joints.closure import ROLL, ROUND, joint_places, moment_rows, shifts, work_row
-from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
+from graphsynth.jamming.joints.closure import ROLL, ROUND, carried, joint_places, moment_rows, shifts, work_row
+from graphsynth.mechanism.joints import PinSlot, Prismatic
 
 if TYPE_CHECKING:
     from graphsynth.jamming.joints.program import JointProblem
@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 #: Gauss points of an arm: exact for squares of moments that are linear along it.
 _GAUSS = 0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0)
 _STEP = 1e-40
+#: Arms shorter than this, relative to the farthest place, have no length but by rounding.
+_POINT = 1e-12
 
 
 class Rows(NamedTuple):
@@ -64,7 +66,8 @@ def rows_of(
         shapes = ((0, len(layout.limit), 2, k), (0, k), (0, k, k)) * 2
         return Rows(*(np.zeros(shape) for shape in shapes))
     at = Places(*joint_places(mechanism, layout.joints, poses))
-    by = _place_rates(mechanism, layout.joints, poses, rates)
+    spin = 1j * rates[..., 2] * np.exp(1j * poses[..., 2])
+    by = Places(*carried(mechanism, layout.joints, rates[..., 0] + 1j * rates[..., 1], spin, 0.0))
     at, by = at._replace(r=unit * at.r), by._replace(r=unit * by.r)
 
     def moments(r: Array, e: Array, base: Array) -> Array:
@@ -76,22 +79,6 @@ def rows_of(
     K = _compliance(given, springs, beams, at.r + 1j * _STEP * by.r, at.e + 1j * _STEP * by.e)
     M, W = moments(*at), work(*at)
     return Rows(M, W, K.real.copy(), _bilinear(moments, at, by), _bilinear(work, at, by), K.imag / _STEP)
-
-
-def _place_rates(mechanism: Mechanism, joints: tuple[int, ...], poses: Array, rates: Array) -> Places:
-    """Differentiate `graphsynth.jamming.joints.closure.joint_places` by the input."""
-    turn = np.exp(1j * poses[..., 2])
-    spin = 1j * rates[..., 2] * turn
-    r = np.zeros((len(poses), len(joints)), dtype=np.complex128)
-    e, base = np.zeros_like(r), np.zeros((*r.shape, 2), dtype=np.complex128)
-    for column, k in enumerate(joints):
-        joint = mechanism.joints[k]
-        link, at = (joint.a, joint.at_a) if isinstance(joint, Revolute) else (joint.b, joint.at_b)
-        r[:, column] = rates[:, link, 0] + 1j * rates[:, link, 1] + spin[:, link] * complex(*at)
-        if isinstance(joint, Prismatic | PinSlot):
-            e[:, column] = spin[:, joint.a] * np.exp(1j * joint.angle_a)
-        base[:, column, 0], base[:, column, 1] = spin[:, joint.a], spin[:, joint.b]
-    return Places(*(np.stack([part.real, part.imag], -1) for part in (r, e, base)))
 
 
 def _bilinear(function: Callable[..., Array], at: Places, by: Places) -> Array:
@@ -148,9 +135,11 @@ def _arm(hub: NDArray[Any], end: NDArray[Any], beam: LinkSection) -> NDArray[Any
     """Compliance of a straight arm: bending about the line across it, torsion about its own."""
     way = end - hub
     length = np.sqrt((way**2).sum(axis=1))
-    if not np.abs(length).any():
+    apart = np.abs(length) > _POINT * np.abs(end).max()  # a link whose joints are at one place has no arm there
+    if not apart.any():
         return np.zeros((len(hub), 3, 3))
-    e = way / length[:, None]
+    length = np.where(apart, length, 0.0)
+    e = way / np.where(apart, length, 1.0)[:, None]
     along = e[:, :, None] * e[:, None, :]
     within = along / beam.torsion + (np.eye(2) - along) / beam.bending
     both = sum(_spring(hub + share * way, within) for share in _GAUSS)

@@ -130,7 +130,7 @@ def _report(
     loaded = _loaded(given, parts.springs, rows_of(given, parts.springs, parts.beams, poses, rates, size), size)
     rubbing, rate = parts.rubbing, driven_rate(motion, size)[keep]
     sliding = _sliding(given, rubbing, *joint_rates(motion.mechanism, poses, rates), size)
-    rubs = np.abs(loaded.contact(given, rubbing)) * sliding
+    rubs = loaded.contact(given, rubbing) * sliding
     coefficient = np.array([0.0 if own is None else own.coefficient for own in _of(given, rubbing)])
     known = np.where(moving & (rate != 0.0), rate, math.nan)
     elastic, losses = loaded.slope / known, rubs @ coefficient / np.abs(known)
@@ -255,11 +255,11 @@ def _wear(
             found.append(JointWear(pair, moment, force, *[math.nan] * 4))
             continue
         end = loaded.moment[:, place] / own.length
-        way = np.abs(sliding[:, place])
+        way = sliding[:, place]
         worn = float(np.trapezoid(end / (own.radius * own.length) * way, u))
         lost = float(np.trapezoid(own.coefficient * contact[:, place] * way, u))
-        distance = float(np.trapezoid(way, u))
-        found.append(JointWear(pair, moment, force, float(end.max(initial=0.0)), distance, abs(worn), abs(lost)))
+        sums = (abs(total) for total in (float(np.trapezoid(way, u)), worn, lost))  # inputs may fall
+        found.append(JointWear(pair, moment, force, float(end.max(initial=0.0)), *sums))
     return tuple(sorted(found, key=lambda row: (-np.nan_to_num(row.wear, nan=-1.0), -row.moment)))
 
 

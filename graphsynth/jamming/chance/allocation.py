@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from time import process_time
 from typing import TYPE_CHECKING, Any
 
@@ -33,8 +34,9 @@ Array = NDArray[np.float64]
 #: A choice is tried all the same if the estimate of its safety index is so much too low, or at least the second value:
 #: below the square root of 3, that of one uniform quantity at its worst.
 _SLACK, _SAFE = 0.5, 1.6
-#: Random numbers of the estimate.
-_DRAWN = 2000
+#: Random numbers of the estimate; so many choices are listed, of more an integer program is asked; cheaper by less than
+#: this factor counts as no cheaper.
+_DRAWN, _LISTED, _LESS = 2000, 200_000, 1.0 - 1e-9
 
 
 @dataclass(frozen=True)
@@ -110,22 +112,34 @@ class _Search:
     def __init__(self, problem: ChanceProblem, grades: Mapping[str, Sequence[Grade]]) -> None:
         self.problem, self.allowed = problem, 0.0
         self.grades = {name: sorted(offered, key=lambda grade: grade.cost) for name, offered in grades.items()}
-        self.sizes = [len(offered) for offered in self.grades.values()]
+        self.sizes = tuple(len(offered) for offered in self.grades.values())
         self.group = np.repeat(np.arange(len(self.sizes)), self.sizes)
         self.starts = np.cumsum([0, *self.sizes[:-1]])
         self.costs = np.concatenate([[grade.cost for grade in offered] for offered in self.grades.values()])
+        self.every = self._sums(self.costs) if math.prod(self.sizes) <= _LISTED else None
         self.known: dict[tuple[int, ...], Bounds] = {}
         if hasattr(problem.subject, "covering"):  # positions are proved once, for the widest of all grades
             widest = {name: _hull([grade.distribution.support for grade in own]) for name, own in grades.items()}
             self.problem = replace(problem, subject=problem.subject.covering(widest))
         self._estimate()
 
-    def ask(self, allowed: float) -> None:
-        """Ask for another probability; enclosures that decide about it too are kept."""
+    def _sums(self, values: Array) -> Array:
+        """Add up one value a grade for every choice, in the order of their numbers."""
+        return np.asarray(reduce(np.add.outer, np.split(values, self.starts[1:]))).ravel()
+
+    def ask(self, allowed: float, trials: int, seconds: float) -> None:
+        """Ask for another probability, with limits of the work; enclosures that decide about it too are kept."""
         if not 0.0 <= finite("allowed", allowed) < 1.0:
             raise GeometryError(f"allowed = {allowed} is no probability to ask for; give 0 or more, below 1")
-        self.allowed = allowed
+        self.allowed, self.fresh, self.trials, self.end = allowed, 0, trials, process_time() + seconds
         self.known = {k: own for k, own in self.known.items() if own.upper <= allowed or own.lower > allowed}
+        if self.every is None:
+            return
+        if allowed > 0.0:
+            variance = self.base_variance + self._sums(self.variance)
+            self.safety = (self.base + self._sums(self.mean)) / np.sqrt(np.maximum(variance, 1e-300))
+        else:  # the share of the margin that the worst member leaves
+            self.safety = (self.base - self.base_reach - self._sums(self.worst)) / max(self.base, 1e-300)
 
     def chosen(self, choice: Sequence[int]) -> dict[str, Grade]:
         return {name: offered[k] for (name, offered), k in zip(self.grades.items(), choice)}
@@ -135,12 +149,40 @@ class _Search:
         toleranced = {**self.problem.toleranced, **picked}
         return ChanceProblem(self.problem.subject, toleranced, self.problem.common, self.problem.condition)
 
-    def enclose(self, choice: tuple[int, ...], seconds: float) -> Bounds:
+    @property
+    def stopped(self) -> bool:
+        """Whether a limit of the work is reached."""
+        return self.fresh >= self.trials or process_time() > self.end
+
+    def good(self, choice: tuple[int, ...]) -> bool:
         """Enclose the probability of a choice, no further than it takes to tell whether it is allowed."""
         if choice not in self.known:
-            margin, sources = self.question(choice).model()
-            self.known[choice] = Paver(margin, sources, 1e-3, 1.01, allowed=self.allowed, seconds=seconds).run()
-        return self.known[choice]
+            self.fresh += 1
+            left = max(self.end - process_time(), 0.1)
+            self.known[choice] = Paver(
+                *self.question(choice).model(), 1e-3, 1.01, allowed=self.allowed, seconds=left
+            ).run()
+        return self.known[choice].upper <= self.allowed
+
+    @property
+    def best(self) -> tuple[int, ...] | None:
+        """The cheapest choice that is proved good."""
+        good = (choice for choice, found in self.known.items() if found.upper <= self.allowed)
+        return min(good, key=self.cost, default=None)
+
+    def improved(self, index: float) -> bool:
+        """Enclose all cheaper choices with an estimated safety, in the order of cost; tell whether it was all."""
+        while (choice := self.cheapest(index, self.cost(self.best), list(self.known))) is not None:
+            if self.stopped:
+                return False
+            self.good(choice)
+        return True
+
+    def cheaper(self) -> tuple[list[Bounds], float]:
+        """Return what is known of choices cheaper than the best, and how many others there are (infinite: unknown)."""
+        below = self.cost(self.best) * _LESS
+        known = [found for choice, found in self.known.items() if self.cost(choice) < below]
+        return known, math.inf if self.every is None else int((self.every < below).sum()) - len(known)
 
     def _estimate(self) -> None:
         """Estimate what every grade adds to mean, variance and range of the margin, by slopes at the dearest choice."""
@@ -177,10 +219,15 @@ class _Search:
 
     def cheapest(self, index: float, below: float, without: list[tuple[int, ...]]) -> tuple[int, ...] | None:
         """Propose the cheapest choice with an estimated safety index, a cost below, and none of those known."""
-        if index == -math.inf:
-            return self._solved(None, below, without)
+        if self.every is not None:
+            fits = (self.every < below * _LESS) & (self.safety >= index)
+            if without:
+                fits[np.ravel_multi_index(tuple(np.array(without).T), self.sizes)] = False
+            rows = np.flatnonzero(fits)
+            at = np.unravel_index(rows[self.every[rows].argmin()], self.sizes) if rows.size else ()
+            return tuple(int(k) for k in at) or None
         if self.allowed == 0.0:  # no member may bind: the estimate is a sum
-            return self._solved((self.worst, self.base * (1.0 + index) - self.base_reach), below, without)
+            return self._solved((self.worst, self.base * (1.0 - index) - self.base_reach), below, without)
         # mean >= index * deviation is at least as strict for the tangent (v / s + s) / 2 of the root of the variance
         # at any s, and the same at the right one
         most, least = (
@@ -196,8 +243,8 @@ class _Search:
                 found.append((self.cost(choice), choice))
         return min(found)[1] if found else None
 
-    def cost(self, choice: Sequence[int]) -> float:
-        return math.fsum(self.costs[self.starts + np.array(choice)].tolist())
+    def cost(self, choice: tuple[int, ...] | None) -> float:
+        return math.inf if choice is None else math.fsum(self.costs[self.starts + np.array(choice)].tolist())
 
     def _solved(
         self, bound: tuple[Array, float] | None, below: float, without: list[tuple[int, ...]]
@@ -212,7 +259,7 @@ class _Search:
             scale = max(float(np.abs(bound[0]).max()), 1e-300)
             rows.append(LinearConstraint(bound[0][None] / scale, -np.inf, bound[1] / scale))
         if math.isfinite(below):
-            rows.append(LinearConstraint(self.costs[None], -np.inf, below * (1.0 - 1e-9)))
+            rows.append(LinearConstraint(self.costs[None], -np.inf, below * _LESS))
         if without:
             cuts = np.zeros((len(without), len(group)))
             for cut, choice in zip(cuts, without):
@@ -264,41 +311,33 @@ def allocate_tolerances(
 
 
 def _allocated(search: _Search, allowed: float, trials: int, seconds: float) -> Allocation:
-    end = (begin := process_time()) + seconds
-    search.ask(allowed)
-    best, cost = _first_good(search, trials, end)
-    every = math.prod(search.sizes) <= trials
-    index = -math.inf
-    if not every:
-        index = min(_index(search.allowed) - _SLACK, _SAFE) if search.allowed > 0.0 else 0.1
-    reason = ""
-    while True:  # everything cheaper that the estimate does not rule out, in the order of cost
-        if process_time() > end or len(search.known) >= trials:
-            reason = "cheaper choices may exist: the limit of work was reached"
-            break
-        choice = search.cheapest(index, cost, list(search.known))
-        if choice is None:
-            break
-        if search.enclose(choice, max(end - process_time(), 0.1)).upper <= search.allowed:
-            best, cost = choice, search.cost(choice)
-    cheaper = [found for choice, found in search.known.items() if search.cost(choice) < cost]
-    rejected = sum(found.lower > search.allowed for found in cheaper)
-    if not reason and not every:
-        reason = "every cheaper choice that was not ruled out by an estimate is rejected"
-    proved = every and not reason and rejected == len(cheaper)
-    if every and not reason and not proved:
-        reason = f"{len(cheaper) - rejected} cheaper choices are neither proved nor rejected"
+    begin = process_time()
+    search.ask(allowed, trials, seconds)
+    _find_one(search)
+    done = search.improved(min(_index(allowed) - _SLACK, _SAFE) if allowed > 0.0 else -0.1)
+    if done and search.cheaper()[1] <= trials - search.fresh:  # also those that the estimate rules out
+        search.improved(-math.inf)
+    best = search.best
+    known, left = search.cheaper()
+    rejected = sum(found.lower > allowed for found in known)
+    reason = "" if best is not None else "every choice is proved to bind more often"
+    if not done:
+        reason = "cheaper choices may exist: the limit of work was reached"
+    elif rejected < len(known):
+        reason = f"{len(known) - rejected} cheaper choices are neither proved nor rejected"
+    elif left:
+        reason = f"{f'{left} ' if left < math.inf else ''}cheaper choices are ruled out by an estimate only"
     found = search.known[best] if best is not None else Bounds(0.0, 1.0, 0, "")
     return Allocation(
-        allowed=search.allowed,
+        allowed=allowed,
         choice=search.chosen(best) if best is not None else {},
-        cost=cost,
+        cost=search.cost(best),
         lower=found.lower,
         upper=found.upper,
-        cheapest=proved and best is not None,
+        cheapest=best is not None and not reason,
         tried=len(search.known),
         rejected=rejected,
-        undecided=len(cheaper) - rejected,
+        undecided=len(known) - rejected,
         reason=reason,
         seconds=process_time() - begin,
     )
@@ -311,33 +350,38 @@ def _index(allowed: float) -> float:
     return -float(ndtri(allowed)) if allowed > 0.0 else 0.0
 
 
-def _first_good(search: _Search, trials: int, end: float) -> tuple[tuple[int, ...] | None, float]:
+def _find_one(search: _Search) -> None:
     """Ask the estimate for more and more safety, from less than wanted on, until a choice is proved good enough."""
     index = _index(search.allowed)
     for step in range(-8, 25):
-        asked = index * (1.0 + step / 16.0) if search.allowed > 0.0 else -0.02 * step
+        asked = index + max(abs(index), 0.3) * step / 16.0 if search.allowed > 0.0 else 0.02 * step
         choice = search.cheapest(asked, math.inf, [])
-        if choice is None or len(search.known) >= trials or process_time() > end:
-            break
-        if search.enclose(choice, max(end - process_time(), 0.1)).upper <= search.allowed:
-            return choice, search.cost(choice)
-    return None, math.inf
+        if choice is None or search.stopped or search.good(choice):
+            return
 
 
 def curve(points: Iterable[tuple[float, float]]) -> Any:
     """Return the picture of costs over proved probabilities (upper bound, cost); None without one above zero."""
     line = work("chart line")
-    good = sorted({(upper, cost) for upper, cost in points if upper > 0.0})
+    good: list[tuple[float, float]] = []
+    for upper, cost in sorted(points):
+        if not good or cost < good[-1][1]:  # what binds more often is cheaper, or not worth having
+            good.append((upper, cost))
+    free = next((cost for upper, cost in good if upper == 0.0), math.nan)
+    good = [point for point in good if point[0] > 0.0]
     if not good:
         return None
-    x, y = np.array([[math.log10(upper), cost] for upper, cost in good]).T
-    ends = np.append(np.repeat(x, 2)[1:], x[-1:] + 0.3)
-    lines = [
-        line(ends, np.repeat(y, 2), "least cost found", "a", "-"),
-        line(x, y, "proved choices", "a", "o"),
-        line(x[:1] - 0.3, y[:1]),  # room for the first mark
-    ]
-    return work("chart")(lines, "log10 of the probability of binding, proved upper bound", "cost of the grades")
+    x, y = np.array(good).T
+    ticks = 10.0 ** np.arange(math.floor(math.log10(0.999 * x[0])), math.ceil(math.log10(x[-1])) + 1)
+    steps = [ticks[0], *np.repeat(x, 2), ticks[-1]], [free, free, *np.repeat(y, 2)]
+    return work("chart")(
+        [line(*steps, "least found", "a", "-"), line(x, y, "proved choices", "a", "o")],
+        "probability of binding, proved upper bound",
+        "cost of the grades",
+        levels=[] if math.isnan(free) else [line([], free, f"none binds: {free:g}", "soft", "--")],
+        xticks=ticks[:: 1 + len(ticks) // 9],
+        decades=True,
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

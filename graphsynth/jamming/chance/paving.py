@@ -31,6 +31,12 @@ _GRID = 2.0**32
 _BATCH = 256
 #: A box of less probability is left as it is.
 _NOTHING = 1e-18
+#: A bound that falls no further than by this share, for so many rounds, is not worth more of them.
+_SAME, _STILL_ROUNDS = 0.98, 4
+_UNDECIDED = (
+    " and no part was decided: the tolerances are too wide for it, or positions follow the lengths too fast (near a "
+    "toggle); narrow them or the range of the input, or allow more seconds"
+)
 _PIECE = Trapezoids(np.zeros(1), np.ones(1), np.ones(1), np.ones(1))
 #: Stands for a quantity that does not matter.
 _STILL = Bracket.of(_PIECE, _PIECE)
@@ -212,18 +218,13 @@ class Paver:
         self.masses: list[dict[tuple[float, float], tuple[float, float]]] = [{} for _ in self.every]
         self.brackets: list[dict[tuple[float, float], Bracket]] = [{} for _ in self.every]
         if n == 0:
-            if isinstance(self.margin, LinearMargin):
-                line, _ = linear(self.margin, self.sources, np.zeros((1, 0)), np.zeros((1, 0)), _unknown(1))
-                return Bounds(float(line.low[0] > 0.0), float(line.high[0] > 0.0), 1, "")
-            value = _shaped(self.margin.enclosed(self.sources.quantities([])), ())
-            sure = bool(value.guaranteed)
-            return Bounds(float(sure and value.hi < 0.0), float(not sure or value.lo < 0.0), 1, "")
+            return self._one_member()
         smooth = sum(d.kind in ("normal", "beta") for d in self.every)
         wanted = math.sqrt(40.0 * max(smooth, 1) / max(self.width, 1e-6))
         self.resolution = 1 << min(max(math.ceil(math.log2(wanted)), 5), 12)
         self.goal = self.width
         boxes = self.assessed(np.zeros((1, n)), np.ones((1, n)), _unknown(1))
-        reason = ""
+        reason, before, still = "", 1.0, 0
         while True:
             lower, upper = self.total(boxes)
             self.goal = min(self.width, max((self.ratio - 1.0) * lower, 0.01 * upper if upper > self.least else 0.0))
@@ -233,9 +234,29 @@ class Paver:
                 break
             if self.boxes >= self.max_boxes or process_time() - begin > self.seconds or len(boxes.lo) == 0:
                 reason = f"the limit of work was reached after {self.boxes} boxes"
+                reason += _UNDECIDED if (lower, upper) == (0.0, 1.0) else ""
+                break
+            still = still + 1 if lower == 0.0 and upper > _SAME * before and upper <= self.width else 0
+            before = upper
+            if still >= _STILL_ROUNDS:
+                reason = (
+                    "the tolerances touch the limit of binding: members there are proved neither to bind nor to be free"
+                )
                 break
             boxes = self.refined(boxes)
         return Bounds(lower, upper, self.boxes, reason)
+
+    def _one_member(self) -> Bounds:
+        """Answer where nothing varies."""
+        if isinstance(self.margin, LinearMargin):
+            line, _ = linear(self.margin, self.sources, np.zeros((1, 0)), np.zeros((1, 0)), _unknown(1))
+            binds, may = bool(line.low[0] > 0.0), bool(line.high[0] > 0.0)
+        else:
+            value = _shaped(self.margin.enclosed(self.sources.quantities([])), ())
+            sure = bool(value.guaranteed)
+            binds, may = sure and bool(value.hi < 0.0), not sure or bool(value.lo < 0.0)
+        near = "the one member lies so close to the limit of binding that it is proved neither to bind nor to be free"
+        return Bounds(float(binds), float(may), 1, "" if binds == may else near)
 
     def total(self, boxes: Boxes) -> tuple[float, float]:
         """Bounds of the sum over all boxes."""

@@ -24,7 +24,7 @@ from graphsynth.jamming.joints.drawing import Tolerances, drawn
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.pieces import Found, Work, check_range
 from graphsynth.jamming.joints.program import Bearings, problem
-from graphsynth.jamming.joints.search import Budget, MemberWitness, jamming_member, search
+from graphsynth.jamming.joints.search import Budget, MemberWitness, jamming_member, search, unclosed_member
 from graphsynth.jamming.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -266,7 +266,7 @@ def _proved(work: Work, budget: Budget, pieces: Found, stopped: str) -> TurnCert
         reason = f"{reason}; with small tilts (first order): {first_order}"
     shares = {s: float(pieces.volume[pieces.sure == s].sum()) for s in (1, -1, 0)}
     if work.box.size and verdict is not Verdict.CERTIFIED_FREE:
-        reason = f"{reason}; {_shares_told(shares)}"
+        reason = "; ".join(filter(None, (reason, unclosed_member(work, pieces), _shares_told(shares))))
     columns, seconds = (shown.lo, shown.hi, state, shown.lower, shown.upper), perf_counter() - budget.begin
     found = TurnCertificate(verdict, reason, *columns, branch, witness, work.evaluated, seconds, small)
     return replace(found, decided=1.0 - shares[0])

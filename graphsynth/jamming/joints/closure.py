@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
+Directions = NDArray[np.complex128]
 #: x and y of every joint, intervals or duals of shape (N,).
 Columns: TypeAlias = list[tuple[Any, Any]]
 
@@ -129,13 +130,22 @@ def _loops(pairs: Ints, bodies: int, frame: int) -> Array:
 
 def joint_places(mechanism: Mechanism, joints: tuple[int, ...], poses: Array) -> tuple[Array, Array, Array]:
     """Positions, directions of guides, and directions of the bases, each (N, joints, 2), at poses (N, links, 3)."""
-    turn = np.exp(1j * poses[..., 2])
-    r = np.zeros((len(poses), len(joints)), dtype=np.complex128)
-    e, base = np.ones_like(r), np.ones((*r.shape, 2), dtype=np.complex128)
+    return carried(mechanism, joints, poses[..., 0] + 1j * poses[..., 1], np.exp(1j * poses[..., 2]), 1.0)
+
+
+def carried(
+    mechanism: Mechanism, joints: tuple[int, ...], origin: Directions, turn: Directions, fixed: float
+) -> tuple[Array, Array, Array]:
+    """Places of joints from origins and directions of the links, each (N, links), complex; or their rates from rates.
+
+    ``fixed`` stands where a joint has no guide: 1 for places, 0 for rates.  Results as of `joint_places`.
+    """
+    r = np.zeros((len(origin), len(joints)), dtype=np.complex128)
+    e, base = np.full_like(r, fixed), np.zeros((*r.shape, 2), dtype=np.complex128)
     for column, k in enumerate(joints):
         joint = mechanism.joints[k]
         link, at = (joint.a, joint.at_a) if isinstance(joint, Revolute) else (joint.b, joint.at_b)
-        r[:, column] = poses[:, link, 0] + 1j * poses[:, link, 1] + turn[:, link] * complex(*at)
+        r[:, column] = origin[:, link] + turn[:, link] * complex(*at)
         if isinstance(joint, Prismatic | PinSlot):
             e[:, column] = turn[:, joint.a] * np.exp(1j * joint.angle_a)
         base[:, column, 0], base[:, column, 1] = turn[:, joint.a], turn[:, joint.b]

@@ -11,8 +11,7 @@ from graphsynth.core.checks import finite
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.bearing import Bearing
 from graphsynth.jamming.bearing.fits import Fit
-from graphsynth.jamming.bearing.parameters import Range
-from graphsynth.jamming.joints.limits import JointLimits, Misalignment, SlideLimits, bearing_limits
+from graphsynth.jamming.joints.limits import JointLimits, Misalignment, SlideLimits, bearing_limits, pair_tilt
 from graphsynth.jamming.joints.program import Bearings
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.tolerances.box import ParameterBox, relative_box
@@ -113,7 +112,9 @@ def _with_play(limits: Any, play: EndFloat) -> JointLimits | SlideLimits:
 def fit_limits(given: FitClearance) -> JointLimits:
     """Limits of a joint whose clearance is an ISO 286 fit: the critical tilt, enclosed for every pair of parts.
 
-    Radius and clearance are taken as independent, more pairs than there are, so that freedom holds a fortiori.
+    The critical tilt grows with the hole and falls with the shaft and the height, so that both ends of its range are
+    those of pairs that exist: the largest shaft in the smallest hole, and the smallest in the largest.  Sizes are those
+    at the temperature of the drawing.
 
     Examples
     --------
@@ -121,22 +122,16 @@ def fit_limits(given: FitClearance) -> JointLimits:
     >>> [round(bound, 6) for bound in limits.tilt_range]
     [0.000901, 0.005045]
     """
-    fit = Fit.read(given.fit)
-    (radius, about_radius), (clearance, about_clearance) = _spread(fit.radius), _spread(fit.clearance)
-    return bearing_limits(
-        Bearing(radius, given.height, clearance),
-        "A" if given.condition == "A" else "B",
-        radius_tolerance=about_radius,
-        clearance_tolerance=about_clearance,
-        height_tolerance=given.height_tolerance,
-    )
-
-
-def _spread(own: Range) -> tuple[float, float]:
-    """Return a double inside a range and a tolerance that reaches both ends, if need be a little beyond."""
-    middle = float((own.lower + own.upper) / 2)
-    reach = max(own.upper - Fraction(middle), Fraction(middle) - own.lower)
-    tolerance = float(reach)
-    if Fraction(tolerance) < reach:
-        tolerance = math.nextafter(tolerance, math.inf)
-    return middle, tolerance
+    fit, height, more = Fit.read(given.fit), Fraction(given.height), Fraction(given.height_tolerance)
+    if more >= height:
+        raise GeometryError(
+            f"height_tolerance = {given.height_tolerance} mm leaves no height of {given.height}; reduce it"
+        )
+    ends = [
+        pair_tilt(radius, length, clearance, given.condition)
+        for (radius, clearance), length in ((fit.pair(False), height + more), (fit.pair(True), height - more))
+    ]
+    least, most = ends[0][0], ends[1][1]
+    bearing = Bearing(fit.radius.middle, given.height, fit.clearance.middle)
+    middle = bearing_limits(bearing, "A" if given.condition == "A" else "B").tilt
+    return JointLimits(min(max(middle, least), most), tilt_range=(least, most))

@@ -84,7 +84,7 @@ def neglected(
     ``assumed`` (N, blocks) are tilts below which a proof of freedom will keep all blocks, so that their limits need not
     be looked at; infinity for a proof of binding.
     """
-    count, system = len(tubes.r), system.about(tubes.rooms)
+    count, system = len(tubes.r), system.about(tubes.dyads)
     blocks = np.minimum(layout.limit_range[1], assumed)
     angles = _angles(system, layout, blocks)
     small: Mask = np.asarray((angles.link < LARGEST).all(axis=1) & (angles.joint < LARGEST).all(axis=1))
@@ -214,7 +214,7 @@ def _movements(
     width, q = n + amounts.shape[1], system.driven(u)
     around = Interval.from_bounds(-amounts, amounts)
     steps = np.concatenate([np.zeros((count, n)), amounts], axis=1).T  # dyads do not depend on the unknowns
-    system = system.about(tubes.rooms, Interval.from_bounds(-steps, steps))
+    system = system.about(tubes.dyads, Interval.from_bounds(-steps, steps))
 
     def rates(x: Interval) -> tuple[list[Any], Interval, Mask]:
         """Unknowns with derivatives over a box, and how far its assembly moves."""

@@ -286,10 +286,22 @@ def critical_range(
     found = []
     for kind, length in own:  # lower bound at the tightest corner, upper bound at the loosest one
         small, large = radius if kind == "A" else radius[::-1]
-        below = _tilt(small, length[1], clearance[0], kind)[0]
-        found.append((below, _tilt(large, length[0], clearance[1], kind)[1]))
+        below = pair_tilt(small, length[1], clearance[0], kind)[0]
+        found.append((below, pair_tilt(large, length[0], clearance[1], kind)[1]))
     least, most = (max(pair) for pair in zip(*found))
+    if hole and radius[0] < radius[1]:
+        least = max(least, _least_of_both(radius, (height[1], hole[0][1]), clearance[0]))
     return min(least, nominal), max(most, nominal)
+
+
+def _least_of_both(radius: tuple[Fraction, Fraction], lengths: tuple[Fraction, Fraction], c: Fraction) -> float:
+    """Bound from below the larger of t_A, which grows with the radius, and t_B, which falls: least where they cross."""
+    low, high = radius
+    for _ in range(50):
+        middle = (low + high) / 2
+        a, b = (pair_tilt(middle, length, c, kind)[0] for kind, length in zip("AB", lengths))
+        low, high = (middle, high) if a < b else (low, middle)
+    return max(pair_tilt(low, lengths[0], c, "A")[0], pair_tilt(high, lengths[1], c, "B")[0])
 
 
 def pushed(bearing: Bearing, offset: float, tolerance: float) -> Bearing:
@@ -312,8 +324,8 @@ def pushed(bearing: Bearing, offset: float, tolerance: float) -> Bearing:
     return replace(bearing, clearance=left if Fraction(left) <= exact else math.nextafter(left, 0.0))
 
 
-def _tilt(R: Fraction, H: Fraction, c: Fraction, condition: str) -> tuple[float, float]:
-    """``2 arctan(c / (h + w))``; infinite where there is no critical tilt (exact decision).
+def pair_tilt(R: Fraction, H: Fraction, c: Fraction, condition: str) -> tuple[float, float]:
+    """Enclose the critical tilt, ``2 arctan(c / (h + w))``; infinite where there is none (exact decision).
 
     See theory/bearing-contact 7.
     """

@@ -8,6 +8,8 @@ that lies in the box of a piece proved to hold exactly one assembly for every me
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import product
 from time import perf_counter
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals import Interval
 from graphsynth.intervals.reading import shortened
+from graphsynth.jamming.assembly.tubes import joined, shortest_reach
 from graphsynth.jamming.joints.limits import Limits, Misalignment, bounds
 from graphsynth.jamming.joints.pieces import PARTS, Found, Work, cut
 from graphsynth.jamming.joints.program import problem
@@ -31,6 +34,8 @@ Mask = NDArray[np.bool_]
 _PEAKS = 4
 #: So many pieces may be cut without asking whether it can help.
 _FEW = 8
+#: So many are looked at together where not all of one depth can be.
+_SOME = 256
 #: So many times the parameters of a piece are halved at most; with members of both kinds; what a cut of the input is
 #: worth beside that of a parameter, for it makes more pieces but is needed anyway.
 _CUTS, _MIXED_CUTS, _INPUT = 24, 4, 0.5
@@ -58,17 +63,20 @@ def search(work: Work, budget: Budget) -> tuple[Found, str]:
     stopped = ""
     first = True
     while lo.size:
-        if work.evaluated + lo.size > budget.max_pieces or budget.over:
+        left = budget.max_pieces - work.evaluated
+        # all of one depth as long as that leaves most of the work, then some of them down to the end
+        at = 0 if first or PARTS * lo.size <= left else max(lo.size - _SOME, 0)
+        if lo.size - at > left or budget.over:
             stopped = f"the limit of work was reached after {work.evaluated} pieces"
             parts.append(Found.open(lo, hi, p, work.system.size))
             break
-        found = work.evaluate(lo, hi, p)
+        found, waiting = work.evaluate(lo[at:], hi[at:], p[at:]), (lo[:at], hi[:at], p[:at])
         again = (found.straddles | found.unsure) & _worth(work, found, budget)
         if not first and not budget.over:
             again &= ~_hopeless(work, found, again)
         first = False
         parts.append(found.take(~again))
-        lo, hi, p = _divided(work, found.take(again), budget)
+        lo, hi, p = (joined(list(pair)) for pair in zip(waiting, _divided(work, found.take(again), budget)))
     pieces = Found.join(parts)
     if not (pieces.sure == -1).any() and not ((pieces.upper < 1.0) | ~pieces.proved).all():
         pieces = _with_peak(work, pieces)
@@ -78,7 +86,7 @@ def search(work: Work, budget: Budget) -> tuple[Found, str]:
 def _shares(work: Work, found: Found) -> Array:
     """Width of every parameter of the pieces over that of the whole box, (N, m)."""
     whole = work.box.high - work.box.low
-    return (found.p_hi - found.p_lo) / np.where(whole > 0.0, whole, 1.0)
+    return np.where(whole > 0.0, (found.p_hi - found.p_lo) / np.where(whole > 0.0, whole, 1.0), 1.0)
 
 
 def _worth(work: Work, found: Found, budget: Budget) -> Mask:
@@ -86,13 +94,16 @@ def _worth(work: Work, found: Found, budget: Budget) -> Mask:
     wide = np.asarray(found.hi - found.lo > budget.smallest)
     if work.box.size == 0:
         return wide
-    cuts = -np.log2(_shares(work, found)).sum(axis=1)
+    cuts = -np.log2(np.maximum(_shares(work, found), 1e-300)).sum(axis=1)
     few = np.where(found.mixed & found.proved, _MIXED_CUTS, _CUTS)
     return np.asarray(wide & (cuts < few - 0.5))
 
 
 def _divided(work: Work, found: Found, budget: Budget) -> tuple[Array, Array, Interval]:
-    """Cut every piece where the assembly moves most: the input into `PARTS`, or a parameter in two."""
+    """Cut every piece where the assembly moves most: the input into `PARTS`, or a parameter in two.
+
+    What lies outside a circle of holes holds no member, and is left out.
+    """
     reach = found.reach.copy()
     none = ~found.proved & (reach.max(axis=1, initial=0.0) == 0.0)
     reach[none, 0] = 1.0  # the middle is not assembled: nothing is known of the parameters
@@ -113,11 +124,12 @@ def _divided(work: Work, found: Found, budget: Budget) -> tuple[Array, Array, In
         (high if half == 0 else low)[at] = middle
         parts.append((found.lo[rest], found.hi[rest], low, high))
     lo, hi, low, high = (np.concatenate(columns) for columns in zip(*parts))
-    return lo, hi, Interval.from_bounds(low, high)
+    p, held = work.box.in_discs(Interval.from_bounds(low, high))
+    return lo[held], hi[held], p[held]
 
 
 def _hopeless(work: Work, found: Found, again: Mask) -> Mask:
-    """Tell the pieces that no cut decides: at both ends and in the middle they are as undecided without any width.
+    """Tell the pieces that no cut decides: at both ends and in the middle they are as undecided without width.
 
     Tolerances of which some jam and some do not, a factor of 1 all along, or a distance from 1 that exact tilts may
     close.  A guess about what to leave undecided; it proves nothing.
@@ -128,7 +140,10 @@ def _hopeless(work: Work, found: Found, again: Mask) -> Mask:
         return np.zeros_like(stuck)
     lo, hi = found.lo[rows], found.hi[rows]
     inputs = np.concatenate([lo, 0.5 * (lo + hi), hi])
-    low, high = np.tile(found.p_lo[rows], (3, 1)), np.tile(found.p_hi[rows], (3, 1))
+    # where exact tilts may change the answer, a narrower box of parameters may do too
+    own, near = found.take(rows), found.unsure[rows, None]
+    middle = np.clip(0.5 * (own.p_lo + own.p_hi), own.p_lo, own.p_hi)
+    low, high = (np.tile(np.where(near, middle, end), (3, 1)) for end in (own.p_lo, own.p_hi))
     # neighbours share their ends
     _, one, back = np.unique(np.column_stack([inputs, low, high]), axis=0, return_index=True, return_inverse=True)
     at = work.evaluate(inputs[one], inputs[one], Interval.from_bounds(low[one], high[one])).take(back.reshape(-1))
@@ -174,10 +189,10 @@ def _with_peak(work: Work, pieces: Found) -> Found:
 
 #: Directions tried over the range of each.
 _DIRECTIONS = 9
-#: Relative step back from the corner of the dimensions, so that rounding leaves them inside their box.
-_INSIDE = 1e-9
-#: The corners of a square of this size lie in a disc of radius one.
-_HALF = 0.7071
+
+
+def _deviations(values: Iterable[tuple[str, float]]) -> list[str]:
+    return [f"{name} {value:+.12g}" if value else f"{name} nominal" for name, value in values]
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +201,8 @@ class MemberWitness:
 
     It binds at ``input``, where ``factor``, above 1, is a proved lower bound of the factor on limits and plays; with
     ``exact`` tilts, or with small ones only (first order).  Misalignments, limits (in the order of
-    ``mechanism.joints``) and the dimensions of ``mechanism`` are those of this member, without tolerance.
+    ``mechanism.joints``) and the dimensions of ``mechanism`` are those of this member, without tolerance.  What
+    tolerances leave open has names: ``deviations`` of the dimensions, and ``chosen_limits`` of joints.
     """
 
     input: float
@@ -195,6 +211,8 @@ class MemberWitness:
     limits: tuple[Limits, ...]
     mechanism: Mechanism
     exact: bool = True
+    deviations: tuple[tuple[str, float], ...] = ()
+    chosen_limits: tuple[tuple[str, float], ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Plain values."""
@@ -208,32 +226,52 @@ class MemberWitness:
                 {"base": m.base, "link": m.link, "alpha": m.alpha, "direction": m.direction} for m in self.misalignments
             ],
             "limits": limits,
+            "deviations": dict(self.deviations),
+            "chosen_limits": dict(self.chosen_limits),
             "dimensions": [[list(joint.at_a), list(joint.at_b)] for joint in self.mechanism.joints],
         }
 
     @property
     def sentence(self) -> str:
         """What is proved."""
-        tilts = ", ".join(f"alpha = {m.alpha:.9g} at {m.direction:.9g} rad" for m in self.misalignments)
+        tilts = [f"alpha = {m.alpha:.9g} at {m.direction:.9g} rad" for m in self.misalignments]
+        named = _deviations(self.deviations)
+        named += [f"{name} = {value:.12g}" for name, value in self.chosen_limits]
         return (
-            f"a member of the tolerance boxes ({tilts}) binds at the input {self.input!r}, proved"
+            f"a member of the tolerance boxes ({', '.join(tilts + named)}) binds at the input {self.input!r}, proved"
             f"{'' if self.exact else ' with small tilts (first order) only'}: its limits would "
             f"have to be {shortened(self.factor, -1, 9)} times as large or more with small tilts"
         )
 
 
+def unclosed_member(work: Work, pieces: Found) -> str:
+    """Name a member that cannot be assembled in a piece without proved positions, or return an empty text."""
+    u = np.unique(0.5 * (pieces.lo + pieces.hi)[~pieces.proved])
+    if u.size == 0 or work.box.size == 0 or not work.system.dyads:
+        return ""
+    p, room = shortest_reach(work.system, u)
+    at = int(np.argmin(room))
+    if not room[at] < 0.0:
+        return ""
+    named = ", ".join(_deviations(zip(work.box.names, p[at].tolist())))
+    return f"the member ({named}) cannot be assembled at the input {float(u[at])!r}, proved"
+
+
 def jamming_member(work: Work, pieces: Found, own: Mask) -> MemberWitness | None:
     """Return a member proved to jam in one of the pieces ``own`` (proved to be on the branch), or None."""
     proved = np.flatnonzero(own & (pieces.sure == -1))
-    if proved.size:
-        return _of_a_piece(work, pieces, int(proved[np.argmax(pieces.lower[proved])]))
+    for row in proved[np.argsort(-pieces.lower[proved], kind="stable")].tolist():
+        found = _of_a_piece(work, pieces, row)
+        if found is not None:
+            return found
     left = np.flatnonzero(own & (pieces.upper > 1.0))
     boxes = [bounds(tilt, name) for tilt in work.given.misalignments for name in ("alpha", "direction")]
     lows = []
     for limit in work.given.limits:
         ranges = {name: bounds(limit, name) for name in (*limit.tilts, "axial_clearance")}
         boxes += ranges.values()
-        least: dict[str, Any] = {name: low for name, (low, _) in ranges.items()}
+        # so far above the low end that it is inside whatever enclosed a critical tilt
+        least: dict[str, Any] = {name: min(low * (1.0 + 1e-9), high) for name, (low, high) in ranges.items()}
         lows.append(type(limit)(**least))
     if left.size == 0 or not (work.box.size or any(low < high for low, high in boxes)):
         return None
@@ -252,17 +290,34 @@ def jamming_member(work: Work, pieces: Found, own: Mask) -> MemberWitness | None
     top = int(np.argmax(factor))
     if factor[top] <= 1.0:
         return None
-    given = member.given
-    return MemberWitness(float(at[top]), float(factor[top]), given.misalignments, given.limits, given.mechanism, exact)
+    return _named(work, member, p, (float(at[top]), float(factor[top])), exact)
 
 
-def _of_a_piece(work: Work, pieces: Found, row: int) -> MemberWitness:
-    """Return the member in the middle of a piece in which all bind."""
+def _of_a_piece(work: Work, pieces: Found, row: int) -> MemberWitness | None:
+    """Return a member in a piece in which all bind: the middle if all discs hold it, else what is next to nominal."""
     u = float(0.5 * (pieces.lo[row] + pieces.hi[row]))
-    p = np.clip(0.5 * (pieces.p_lo[row] + pieces.p_hi[row]), pieces.p_lo[row], pieces.p_hi[row])
-    given = work.given
-    tilts, mechanism = tuple(tilt.sharp() for tilt in given.misalignments), work.box.member(given.mechanism, p)
-    return MemberWitness(u, float(pieces.lower[row]), tilts, given.limits, mechanism)
+    low, high = pieces.p_lo[row], pieces.p_hi[row]
+    for p in (np.clip(0.5 * (low + high), low, high), np.clip(0.0, low, high)):
+        if work.box.holds(p):
+            limits: list[Limits] = []
+            for own in work.given.limits:
+                values: Any = {name: getattr(own, name) for name in (*own.tilts, "axial_clearance")}
+                limits.append(type(own)(**values))
+            member = _member(work, p, tuple(limits), tuple(tilt.sharp() for tilt in work.given.misalignments))
+            return _named(work, member, p, (u, float(pieces.lower[row])))
+    return None
+
+
+def _named(work: Work, member: Work, p: Array, at: tuple[float, float], exact: bool = True) -> MemberWitness:
+    """Return the member with names for what the tolerances leave open; ``at`` are the input and the factor there."""
+    given, limits = member.given, []
+    for joint, limit, own in zip(work.given.mechanism.joints, work.given.limits, given.limits):
+        for name in (*limit.tilts, "axial_clearance"):
+            low, high = bounds(limit, name)
+            if low < high:
+                limits.append((f"{name.replace('_', ' ')} of joint {joint.a}-{joint.b}", getattr(own, name)))
+    named = tuple(zip(work.box.names, p.tolist())), tuple(limits)
+    return MemberWitness(*at, given.misalignments, given.limits, given.mechanism, exact, *named)
 
 
 def _in_a_piece(pieces: Found, own: Mask, at: Array, p: Array, points: Found) -> Mask:
@@ -311,25 +366,22 @@ def _worst_tilts(work: Work, member: Work, at: NDArray[np.float64]) -> Work:
 
 
 def _worst_dimensions(work: Work, member: Work, at: NDArray[np.float64]) -> tuple[Work, Array]:
-    """Take every parameter to the end of its box that raises the factor at the worst of the inputs."""
+    """Take every parameter to the end of its box, or the rim of its disc, that raises the factor at the worst input."""
     box = work.box
-    p = np.zeros(box.size)
+    rises = np.zeros(box.size)
     if box.size == 0:
-        return member, p
+        return member, rises
     value = member.estimate(at)
     worst = at[[int(np.argmax(value))]]
     most = float(value.max())
-    low, high = box.low * (1.0 - _INSIDE), box.high * (1.0 - _INSIDE)
-    for pair in box.discs:
-        low[list(pair)], high[list(pair)] = low[list(pair)] * _HALF, high[list(pair)] * _HALF
 
     def moved(values: Array) -> Work:
         return _member(work, values, member.given.limits, member.given.misalignments)
 
     for k in range(box.size):
         one = np.zeros(box.size)
-        one[k] = high[k] if high[k] > 0.0 else low[k]
-        rises = moved(one).estimate(worst)[0] >= most
-        p[k] = high[k] if rises == bool(high[k] > 0.0) else low[k]
+        one[k] = end = box.high[k] if box.high[k] > 0.0 else box.low[k]
+        rises[k] = (moved(one).estimate(worst)[0] - most) * math.copysign(1.0, end)
+    p = box.furthest(rises)
     other = moved(p)
     return (other, p) if float(other.estimate(worst)[0]) > most else (member, np.zeros(box.size))

@@ -46,6 +46,10 @@ class Boxes(NamedTuple):
     p_by: Interval
     half: Array
 
+    def take(self, rows: Rows) -> Boxes:
+        """Return some of the boxes, or one several times."""
+        return Boxes(*(own[:, rows] if name.endswith("_by") else own[rows] for name, own in self._asdict().items()))
+
 
 def boxes_of(quantities: Quantities, items: Items, at: Sequence[Any], over: Sequence[Any], half: Array) -> Boxes:
     """Evaluate quantities: ``at`` the middles (intervals), ``over`` the boxes (duals by the sources)."""
@@ -95,6 +99,11 @@ class Pairs(NamedTuple):
     e_by: Interval
     d_by: Interval
     steps: Interval
+
+    def take(self, rows: Rows) -> Pairs:
+        """Return some of the pairs."""
+        several = "r_by", "e_by", "d_by", "steps"
+        return Pairs(*(own[:, rows] if name in several else own[rows] for name, own in self._asdict().items()))
 
     def at_input(self) -> Interval:
         """Return the steps with the input kept at its middle."""
@@ -267,16 +276,17 @@ class Slack(NamedTuple):
 
 
 @np.errstate(all="ignore")
-def slacks(layout: Layout, items: Items, boxes: Boxes, pairs: Pairs, found: Sharing, a: Array) -> Slack:
+def slacks(layout: Layout, items: Items, boxes: Boxes, pairs: Pairs, found: Sharing, a: Array, loose: Array) -> Slack:
     """Bound what all costly items leave, by a linear rule for their vectors over their limits; ``a`` (1 + n, P).
 
     Loaded items follow so that all of them leave the same share, ``m + a . step``; what then does not close is left to
-    the ways of correction, to first order in the rule, and enclosed for the rest.
+    the ways of correction, to first order in the rule, and enclosed for the rest.  Where ``loose``, loaded items
+    turn less and grow more: less room along the rule, and less lost beside it.
     """
     steps = pairs.steps
     t, t_dual, caps = _limits(items, boxes, steps)
     over = np.where(t.mid > 0.0, t.mid, np.inf)
-    way = ways(items, t.mid, found) / over[..., None, None]
+    way = ways(items, t.mid, found, loose) / over[..., None, None]
     share = found.tau / over[..., None]
     turned = [place for place, _, _ in layout.misalignments]
     here = columns(pairs.r), columns(pairs.e), {place: columns(pairs.d)[place] for place in turned}
@@ -286,12 +296,17 @@ def slacks(layout: Layout, items: Items, boxes: Boxes, pairs: Pairs, found: Shar
         own = [(t[:, k] * share[:, k, 0], t[:, k] * share[:, k, 1]) for k in range(share.shape[1])]
         return _stacked(closure(layout, here[0], here[1], own, here[2]), len(share))
 
-    for _ in range(2):
-        share = share - np.einsum("pijc,pc->pij", way, np.nan_to_num(open_(share).mid))
+    def closed(share: Array) -> Array:
+        for _ in range(2):
+            share = share - np.einsum("pijc,pc->pij", way, np.nan_to_num(open_(share).mid))
+        return share
+
+    share = closed(share)
     size = np.hypot(share[..., 0], share[..., 1])
     unit = np.where(size[..., None] > 0.0, share / np.where(size > 0.0, size, 1.0)[..., None], (1.0, 0.0))
     load = np.einsum("pick,pk->pic", found.rows, found.y)
-    loaded = items.costly & (t.mid * np.hypot(load[..., 0], load[..., 1]) > _LOADED)
+    cost = np.where(items.costly, t.mid * np.hypot(load[..., 0], load[..., 1]), 0.0)
+    loaded = cost > _LOADED
     rule = np.where(loaded[..., None], (caps.mid - a[..., None])[..., None] * unit, 0.0)
     moving = [duals(*own, steps) for own in ((pairs.r, pairs.r_by), (pairs.e, pairs.e_by), (pairs.d, pairs.d_by))]
     for last in (False, True):
@@ -300,6 +315,11 @@ def slacks(layout: Layout, items: Items, boxes: Boxes, pairs: Pairs, found: Shar
         change = Interval.stack([_slopes(own, steps) for own in sums], axis=-1)
         if not last:
             rule = rule - np.einsum("pijc,kpc->kpij", way, np.nan_to_num(change.mid))
+            # what turns most gets more room at the middle, so that all loaded items end with the same
+            turn = np.abs(rule[..., 1] * unit[..., 0] - rule[..., 0] * unit[..., 1]) * steps.mag[..., None]
+            bend = np.where(loaded & items.plane, np.hypot(size, turn.sum(axis=0)) - size, 0.0)
+            even = (cost * bend).sum(axis=1, where=loaded) / np.maximum(cost.sum(axis=1, where=loaded), 1e-300)
+            share = closed(share - np.where(loaded, bend - even[:, None], 0.0)[..., None] * unit)
     missing = open_(share) + (change * steps.reshape(*steps.shape, 1)).sum(0)
     step, fine = enclosed_solve(_matrix(layout, moving, t_dual, way), -missing)
     start = Interval.from_bounds(*(np.where(t.mid > 0.0, own / over, 1.0) for own in (boxes.t.lo, boxes.t.hi)))
@@ -368,17 +388,16 @@ def _slack(
     """Bound ``cap - |share|`` from below by linear functions of the steps, one for each side of every item."""
     (share, rule, unit, way), (steps, step, spread) = made, moved
     half, across = steps.mag, np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
-    move = np.einsum("pijc,pc->pij", np.abs(way), step.mag)  # of every component, by the correction
+    along, aslant = (_moved(own, way, step.mag) for own in (unit, across))  # by the correction, (P, items, sums)
     far, wide = (np.einsum("kpij,pij->kpi", rule, own) for own in (unit, across))
     start, side = ((share * own).sum(axis=-1) for own in (unit, across))
-    rest, turn = ((np.abs(own) * move).sum(axis=-1) for own in (unit, across))
+    rest, turn = along.sum(axis=-1), aslant.sum(axis=-1)
     reach = np.einsum("kpi,kp->pi", np.abs(far), half)
     turn = np.where(items.plane, turn + np.einsum("kpi,kp->pi", np.abs(wide), half) + np.abs(side), 0.0)
     least, most = start - reach - rest, start + reach + rest
     loose = np.einsum("kpi,kp->pi", caps[1].rad, half)
     fixed = _SUMS * (2.0 + np.abs(most) + turn + np.einsum("kpi,kp->pi", caps[1].mag, half)) + loose - caps[0].lo
-    lean = np.einsum("pij,pijc->pic", np.abs(unit), np.abs(way))
-    plain = np.einsum("pic,kpc->pik", lean, spread)
+    plain = np.einsum("pic,kpc->pik", along, spread / np.where(step.mag > 0.0, step.mag, 1.0))
     aside = np.where(items.plane[:, None], np.moveaxis(np.abs(wide) * half[..., None], 0, -1), 0.0)
     sides = []
     for sign in (1.0, -1.0):
@@ -398,6 +417,13 @@ def _slack(
     return Slack(*(np.concatenate(part, axis=1) for part in zip(*sides)))
 
 
+def _moved(unit: Array, way: Array, step: Array) -> Array:
+    """Bound how far a correction moves the items along directions (P, items, 2), for each of its sums."""
+    exact = np.abs(np.einsum("pij,pijc->pic", unit, way))
+    most = np.einsum("pij,pijc->pic", np.abs(unit), np.abs(way))
+    return np.asarray((exact + _SUMS * most) * step[:, None])
+
+
 def thresholds(slack: Slack, a: Array, half: Array) -> tuple[Array, NDArray[np.intp], Array]:
     """Return c (P,) with: free wherever ``a . step >= c``; and the item that sets it, with its multiplier.
 
@@ -408,22 +434,27 @@ def thresholds(slack: Slack, a: Array, half: Array) -> tuple[Array, NDArray[np.i
     if not by.shape[2]:  # nothing varies: free, or not proved
         item = need.argmax(axis=1)
         return np.where(need.max(axis=1) < 0.0, -np.inf, np.inf), item, np.zeros(len(need))
-    size = np.abs(by) * half[:, None]
+    size = (np.abs(by) * half[:, None]).sum(axis=2)
+    best, v = np.full(need.shape, -np.inf), np.zeros(need.shape)
+    rows, items = np.nonzero(~(need + size * (1.0 + 1e-12) < 0.0))  # elsewhere all of the box is free
+    best[rows, items], v[rows, items] = _lifted(need[rows, items], by[rows, items], a[rows], half[rows])
+    item = np.where(best == np.inf, need, best).argmax(axis=1)
+    return best.max(axis=1), item, v[np.arange(len(a)), item]
+
+
+def _lifted(need: Array, by: Array, a: Array, half: Array) -> tuple[Array, Array]:
+    """Return the thresholds of rows (R,), and their multipliers."""
     none = (np.abs(a) * half).sum(axis=1)
     with np.errstate(all="ignore"):
-        v = a[:, None] / by
+        v = a / by
         v = np.where(np.isfinite(v) & (v > 0.0), v, np.nan)
-        gaps = (np.abs(v[..., None] * by[:, :, None] - a[:, None, None]) * half[:, None, None]).sum(axis=-1)
-        c = need[..., None] * v + gaps
-        c = c + _SUMS * ((np.abs(need) + size.sum(axis=-1))[..., None] * v + none[:, None, None])
+        gaps = np.einsum("rmk,rk->rm", np.abs(v[:, :, None] * by[:, None] - a[:, None]), half)
+        size = np.abs(need) + (np.abs(by) * half).sum(axis=1)
+        c = need[:, None] * v + gaps + _SUMS * (size[:, None] * v + none[:, None])
         c = np.where(np.isnan(c), np.inf, c)
-    at = c.argmin(axis=2)[..., None]
-    best, v = (np.take_along_axis(own, at, axis=2)[..., 0] for own in (c, v))
-    best = np.where(best < none[:, None], best, np.inf)
-    best = np.where(need + size.sum(axis=2) * (1.0 + 1e-12) < 0.0, -np.inf, best)
-    item = np.where(best == np.inf, need, best).argmax(axis=1)
-    rows = np.arange(len(a))
-    return best.max(axis=1), item, np.nan_to_num(v[rows, item])
+    at = c.argmin(axis=1)
+    best, v = c[np.arange(len(c)), at], np.nan_to_num(v[np.arange(len(c)), at])
+    return np.where(best < none, best, np.inf), v
 
 
 def solved(layout: Layout, items: Items, boxes: Boxes, pairs: Pairs) -> Sharing:

@@ -32,7 +32,9 @@ Rows = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 #: Rounds of looking closer for one batch of boxes; pairs looked at together, in one round; what the input may add to a
 #: gap; stations of a box that are looked at in a round.
-_ROUNDS, _TOGETHER, _MOST, _SHARE, _NEXT = 5, 2048, 4096, 0.3, 4
+_ROUNDS, _TOGETHER, _MOST, _SHARE, _NEXT = 5, 2048, 4096, 0.15, 4
+#: Share in which a used up joint may tilt further in a correction: near binding, and where there is plenty of room.
+_STIFF, _LOOSE = 1e-3, 0.2
 
 
 class _Pairs(NamedTuple):
@@ -236,16 +238,7 @@ class JointsMargin(Shown):
 
     def _evaluated(self, boxes: Boxes, box: Rows, station: Rows) -> _Pairs:
         layout, items, stations = self.quantities.layout, self.items, self.stations
-        own = Boxes(
-            boxes.t[box],
-            boxes.t_by[:, box],
-            boxes.v[box],
-            boxes.v_over[box],
-            boxes.v_by[:, box],
-            boxes.p[box],
-            boxes.p_by[:, box],
-            boxes.half[box],
-        )
+        own = boxes.take(box)
         pairs = pairs_of(layout, items, own, stations.places.take(station), stations.middle, stations.half[station])
         found = solved(layout, items, own, pairs)
         line = certificates(layout, items, own, pairs, found.y)
@@ -253,8 +246,9 @@ class JointsMargin(Shown):
         loose = np.where(line.sound[:, None], (line.by.rad[1:] * pairs.steps.mag[1:]).T, 0.0)
         low = -line.start.hi - loose.sum(axis=1) * (1.0 + 1e-12)
         low = np.where(line.sound, np.nextafter(low, -np.inf), -np.inf)
-        slack = slacks(layout, items, own, pairs, found, np.nan_to_num(a))
-        start = np.where(line.sound, line.start.hi, np.inf)
+        start, reach = np.where(line.sound, line.start.hi, np.inf), (np.abs(a[1:].T) * own.half).sum(axis=1)
+        room = np.where(line.sound, np.maximum(start, 0.0) / np.where(reach > 0.0, reach, 1.0), 1.0)
+        slack = slacks(layout, items, own, pairs, found, np.nan_to_num(a), np.where(room > 1.0, _LOOSE, _STIFF))
         return _Pairs(box, station, np.ones(len(box), dtype=np.bool_), start, low, a[1:].T, loose, slack)
 
     def _bounds(self, found: _Pairs, half: Array) -> tuple[Any, ...]:
@@ -276,7 +270,7 @@ class JointsMargin(Shown):
         gap = c - low[found.box]
         rows = np.arange(len(c))
         most = np.full(len(low), -np.inf)
-        np.maximum.at(most, found.box, gap)
+        np.maximum.at(most, found.box, np.where(gap < np.inf, gap, -np.inf))
         curved = found.slack.curved[rows, item]
         with np.errstate(all="ignore"):
             wide = (curved[:, 0] > _SHARE * curved[:, 1:].sum(axis=1)) & (

@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 #: Cost of a wrench that nothing else bounds.
 _LEAST = 1e-7
-#: Share in which a used up joint may tilt further in a correction; what joints without limit take beside others.
-_STIFF, _FREE = 1e-3, 1e4
+#: What joints without limit take of a correction beside others.
+_FREE = 1e4
 
 
 class Items(NamedTuple):
@@ -96,10 +96,11 @@ def _carried(forbidden: Array) -> list[tuple[Array, NDArray[np.intp]]]:
     return [(right[rank == n, n:].transpose(0, 2, 1), np.flatnonzero(rank == n)) for n in kinds]
 
 
-def ways(items: Items, t: Array, found: Sharing) -> Array:
+def ways(items: Items, t: Array, found: Sharing, loose: Array) -> Array:
     """Return changes of the items (P, items, 2, 3 loops) that correct the closure, a column for each of its sums.
 
-    In proportion to the squares of the limits; an item that uses its limit as far as any other turns and does not grow.
+    In proportion to the squares of the limits; an item that uses its limit as far as any other turns and grows only
+    ``loose`` times as far.
     """
     top = np.where(items.costly, t, 0.0).max(axis=1, initial=0.0, keepdims=True)
     top = np.where(top > 0.0, top, 1.0)
@@ -109,7 +110,7 @@ def ways(items: Items, t: Array, found: Sharing) -> Array:
     use = np.where(items.costly, size / np.where(t > 0.0, t, np.inf), 0.0)
     left = 1.0 - use / np.maximum(use.max(axis=1, keepdims=True, initial=0.0), 1e-300)
     unit = found.tau / np.where(size > 0.0, size, 1.0)[..., None]
-    unit = unit * np.sqrt(1.0 - np.clip(4.0 * left, _STIFF, 1.0))[..., None]
+    unit = unit * np.sqrt(1.0 - np.clip(4.0 * left, loose[:, None], 1.0))[..., None]
     moves = moves - unit[..., None] * (unit[..., None] * moves).sum(axis=2, keepdims=True)
     flat = found.rows.reshape(len(t), -1, found.rows.shape[3])
     effect = flat.transpose(0, 2, 1) @ moves.reshape(flat.shape)

@@ -116,6 +116,7 @@ class Stations:
         if not (at.proved & fine).all():
             k = int(np.flatnonzero(~(at.proved & fine))[0])
             raise GeometryError(f"the rates of the joints are not enclosed near the input {lo[k]:.6g} (a singularity)")
+        by = self._at_middle(by, here, tubes, x, counted)
         rates = [Interval.from_bounds(np.moveaxis(b.lo, 0, 1), np.moveaxis(b.hi, 0, 1)) for b in by]
         places = Places(at.r, at.e, at.base, *rates)
         start = len(self.lo)
@@ -128,6 +129,28 @@ class Stations:
         self.lo, self.hi = np.concatenate([self.lo, lo]), np.concatenate([self.hi, hi])
         self.depth = np.concatenate([self.depth, np.full(len(lo), depth, dtype=np.intp)])
         return np.arange(start, start + len(lo))
+
+    def _at_middle(self, by: list[Interval], u: Interval, tubes: Tubes, x: Array, counted: Array) -> list[Interval]:
+        """Return the derivatives with those by the lengths at the middle of the input alone, where that is proved.
+
+        Enough for the mean value theorem, which moves the lengths first and the input last.
+        """
+        if not self.work.box.size:
+            return by
+        p = self.work.whole(len(x))
+        at = prove_tubes(self.system, self.joints, u, x, counted, p)
+        inside = ((at.tight.lo >= tubes.domain.lo) & (at.tight.hi <= tubes.domain.hi)).all(axis=1)
+        *own, fine = slopes(self.system, self.joints, u, at, counted, p)
+        use = at.proved & inside & fine
+        found = []
+        for whole, here in zip(by, own):
+            pick = use.reshape(1, -1, *(1,) * (whole.ndim - 2))
+            ends = [
+                np.concatenate([a[:1], np.where(pick, b[1:], a[1:])])
+                for a, b in ((whole.lo, here.lo), (whole.hi, here.hi))
+            ]
+            found.append(Interval.from_bounds(*ends))
+        return found
 
     def cut(self, rows: Rows) -> None:
         """Cut pieces in equal parts, so that ``children`` has them; not below a smallest width."""

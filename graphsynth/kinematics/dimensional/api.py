@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import positive, whole
 from graphsynth.core.errors import GeometryError, GraphError
 from graphsynth.core.shown import Shown
-from graphsynth.kinematics.dimensional.design import Design, Drivers, choices
+from graphsynth.kinematics.dimensional.design import Design, Drivers, choices, joint_kinds
 from graphsynth.kinematics.dimensional.goals import Goals, Target
 from graphsynth.kinematics.dimensional.problem import INCOMPLETE, OUTSIDE, DimensionProblem, dimensioned
+from graphsynth.kinematics.dimensional.refine import refine
 from graphsynth.kinematics.dimensional.verify import Figures, verify
 from graphsynth.structure.graph import MechanismGraph
 
@@ -39,6 +40,8 @@ EXACT = 1e-9
 _DIFFERENCE = 1e-6
 #: Spread of the second population about the best of the first, where least squares do not help.
 _AROUND = 0.01
+#: First candidates of a search for a target with derivatives.
+_STARTS = 200
 #: Penalty of a motion that is not complete, in the least squares of a target.
 _WALL = 1e3
 
@@ -77,6 +80,8 @@ def search(
     share of the usual number of first candidates and of generations.
     """
     begun, aimed = before, problem.fit is not None
+    if begun is None and problem.fit is not None and problem.fit.smooth:
+        return _refined(problem, attempt, random, effort)
     if begun is None:  # many candidates, of which the best are the first population
         width = min(120, 15 * problem.size) if aimed else min(60, 6 * problem.size)
         first = problem.population(max(width, round(effort * (20 if aimed else 4) * width), 1), random)
@@ -106,6 +111,21 @@ def search(
             best, value, population[0] = polished, better, polished
             history.append(HistoryRow(attempt, len(history), problem.evaluations, value))
     return SearchResult(best, value, tuple(history), start, population)
+
+
+def _refined(problem: DimensionProblem, attempt: int, random: np.random.Generator, effort: float) -> SearchResult:
+    """Take many first candidates to their optima at once; the best of these are the population to go on with."""
+    first = problem.population(max(round(effort * _STARTS), 1), random)
+    outcome = problem.evaluate(first)
+    every = len(first), int((outcome.cost < 0.5 * INCOMPLETE).sum()), int((outcome.merit >= 1.0).sum())
+    history = [HistoryRow(attempt, 0, problem.evaluations, float(outcome.cost.min()))]
+    found = refine(problem, first[outcome.cost < 0.5 * INCOMPLETE])
+    problem.evaluations += found.evaluations
+    X = np.concatenate([found.X, first])
+    outcome = problem.evaluate(X)
+    order = np.argsort(outcome.cost, kind="stable")[: max(min(120, 15 * problem.size), 8)]
+    history.append(HistoryRow(attempt, 1, problem.evaluations, float(outcome.cost[order[0]])))
+    return SearchResult(X[order[0]], float(outcome.cost[order[0]]), tuple(history), every, X[order])
 
 
 def _evolve(
@@ -267,7 +287,8 @@ def embody(
     driver : int or (base, link), or one of these for each driver, optional
         A link on the frame, or two jointed links.
     joints : mapping of (a, b) to str, optional
-        Kind by pair of links of the graph given: "R" (default), "P", or "pin-slot" (default for mobility 2).
+        Kind by pair of links of the graph given: "R" (default) or "P"; "gear", "pin-slot" or "cam" for mobility 2, by
+        default a gear where a third link carries both wheels, else a pin in a slot.  Teeth as in "gear 2:1".
     tries : int
         Searches at most; each takes the next frame and driver of the order of
         :func:`graphsynth.kinematics.dimensional.design.choices`, and starts anew from another sketch.
@@ -385,7 +406,7 @@ class _Run:
         for found, problem, attempt in sorted(self.found, key=lambda item: item[0].cost)[: _CONTINUED if aimed else 0]:
             random = np.random.default_rng([self.seed, attempt, 1])
             final = found
-            if perf_counter() < self.deadline and found.cost > EXACT:
+            if perf_counter() < self.deadline and problem.fit is not None and not problem.fit.smooth:
                 final = search(problem, attempt, random, self.deadline, found, self.effort)
                 self.history += final.history
             self.judge(problem, final)
@@ -421,20 +442,10 @@ def _kinds(
     """Kinds of the joints of an inversion, from those of the graph given."""
     if joints is not None and not isinstance(joints, Mapping):
         raise GeometryError(f"joints = {joints!r} is not a mapping of (a, b) to a kind, as in {{(0, 1): 'P'}}")
-    given = {(min(pair), max(pair)): kind for pair, kind in (joints or {}).items()}
-    allowed = {1: ("R", "P"), 2: ("pin-slot",)}
-    kinds = {}
-    for a, b, mobility in graph.joints:
-        kind = given.pop((a, b), allowed.get(mobility, ("",))[0])
-        if kind not in allowed.get(mobility, ()):
-            raise GeometryError(
-                f"joint {a}-{b} has mobility {mobility} and cannot be {kind!r}; use one of {allowed.get(mobility, ())}"
-            )
-        kinds[a, b] = kind
-    if given:
-        raise GeometryError(f"joints names {min(given)}, but the graph has no such joint")
+    given = {pair: str(kind) for pair, kind in (joints or {}).items()}
+    kinds = joint_kinds(graph, given)
     if inversion.frame == graph.frame:
-        return tuple(kinds.values())
+        return kinds
     link = next(link for link in range(graph.links) if graph.with_frame(link) == inversion)
-    first = [link, *(k for k in range(graph.links) if k != link)]  # old number of every link of the inversion
-    return tuple(kinds[min(first[a], first[b]), max(first[a], first[b])] for a, b, _ in inversion.joints)
+    new = {old: k for k, old in enumerate([link, *(k for k in range(graph.links) if k != link)])}
+    return joint_kinds(inversion, {(new[a], new[b]): kind for (a, b), kind in given.items()})

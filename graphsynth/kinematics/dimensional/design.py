@@ -1,35 +1,60 @@
-"""What a search for dimensions varies: places of the joints at the first input, directions of slides and slots.
+"""What a search for dimensions varies: places of the joints at the first input, directions of slides, slots and cams.
 
 Every link's own frame coincides with the fixed one at the first input, so the places are the coordinates of each joint
-on both of its links and the mechanism is assembled there by construction.
+on both of its links and the mechanism is assembled there by construction.  A gear pair has no place of its own: its
+centres are the revolute joints of both wheels with a third link, its carrier.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import cmath
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.errors import GraphError
-from graphsynth.mechanism.joints import COLUMNS, JointGeometry, PinSlot, Prismatic, Revolute
+from graphsynth.core.errors import GeometryError, GraphError
+from graphsynth.mechanism.joints import COLUMNS, Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.assur import decompose, find_fault
 from graphsynth.structure.graph import MechanismGraph
 
 Array = NDArray[np.float64]
+_A, _B = [COLUMNS.index("ax"), COLUMNS.index("ay")], [COLUMNS.index("bx"), COLUMNS.index("by")]
+_ANGLE_A, _ANGLE_B = COLUMNS.index("a_angle"), COLUMNS.index("b_angle")
+_RADIUS_A, _RADIUS_B = COLUMNS.index("radius_a"), COLUMNS.index("radius_b")
+_SIGN, _OFFSET = COLUMNS.index("sign"), COLUMNS.index("offset")
+
+
+#: Kinds by mobility; a gear may name its teeth as in "gear 2:1" and "gear 1:-3" (the second wheel is internal).
+KINDS = {1: ("R", "P"), 2: ("gear", "pin-slot", "cam")}
+_TEETH = re.compile(r"gear(?: ([1-9]\d*):(-?[1-9]\d*))?")
+
+
+def teeth(kind: str) -> tuple[int, int] | None:
+    """Teeth of a gear pair's wheels, the second negative if internal; None for other kinds.
+
+    >>> teeth("gear"), teeth("gear 1:-3"), teeth("pin-slot")
+    ((1, 1), (1, -3), None)
+    """
+    found = _TEETH.fullmatch(kind)
+    if found is None or found[1] == str(found[2])[1:]:  # an internal pair of equal wheels has one centre
+        return None
+    return (int(found[1] or 1), int(found[2] or 1))
 
 
 @dataclass(frozen=True)
 class Design:
     """A mechanism graph with a frame, drivers (base, link) and kinds of joints: all but the numbers.
 
-    A kind is "R", "P" or "pin-slot", in the order of ``graph.joints``.
+    A kind is "R", "P", "pin-slot", "cam" (circular) or "gear", in the order of ``graph.joints``.
     """
 
     graph: MechanismGraph
@@ -37,9 +62,15 @@ class Design:
     kinds: tuple[str, ...]
 
     @cached_property
-    def directed(self) -> tuple[int, ...]:
-        """Joints that have a direction."""
-        return tuple(k for k, kind in enumerate(self.kinds) if kind != "R")
+    def numbers(self) -> tuple[tuple[int, str], ...]:
+        """Joints with numbers besides their place: a direction, "angle"; the logarithm of a cam's radius, "size"."""
+        found = [(k, "angle") for k, kind in enumerate(self.kinds) if kind in ("P", "pin-slot", "cam")]
+        return (*found, *((k, "size") for k, kind in enumerate(self.kinds) if kind == "cam"))
+
+    @cached_property
+    def centres(self) -> dict[int, tuple[int, int]]:
+        """Of every gear pair the joints in which its wheels turn against their carrier."""
+        return {k: _centres(self.graph, self.kinds, k) for k, kind in enumerate(self.kinds) if teeth(kind)}
 
     @cached_property
     def driver_joints(self) -> tuple[int, ...]:
@@ -66,41 +97,169 @@ class Design:
 
     @cached_property
     def cranks(self) -> tuple[tuple[int, list[int]], ...]:
-        """Revolute driven joints on the frame, each with the joints of the link that is driven there."""
-        driven = zip(self.drivers, self.driver_joints)
-        found = [(k, link) for (base, link), k in driven if base == self.graph.frame and self.kinds[k] == "R"]
-        return tuple((k, self.joints_of(link)) for k, link in found)
+        """Revolute joints on the frame of the driven links and of wheels they drive, each with its link's joints."""
+        frame, own = self.graph.frame, {*self.driver_joints}
+        driven = {link for base, link in self.drivers if base == frame}
+        for _ in self.centres:  # as far as gears carry the rotation on
+            for (p, q), k in ((centres, k) for k, centres in self.centres.items()):
+                a, b, _ = self.graph.joints[k]
+                on_frame = frame in self.graph.joints[p][:2] and frame in self.graph.joints[q][:2]
+                if on_frame and driven & {a, b}:
+                    driven, own = driven | {a, b}, own | {p, q}
+        found = []
+        for k in sorted(own):
+            a, b, _ = self.graph.joints[k]
+            if self.kinds[k] == "R" and frame in (a, b):
+                found.append((k, self.joints_of(b if a == frame else a)))
+        return tuple(found)
 
     def joints_of(self, link: int) -> list[int]:
-        """Return the indices of the joints of a link."""
-        return [k for k, joint in enumerate(self.graph.joints) if link in (joint.a, joint.b)]
+        """Return the indices of the joints of a link that have a place: all but gears."""
+        joints = enumerate(self.graph.joints)
+        return [k for k, joint in joints if link in (joint.a, joint.b) and not teeth(self.kinds[k])]
 
-    def dimensions(self, places: Array, angles: Array) -> Array:
-        """Dimension sets, shape (sets, joints, 10), of places (sets, joints, 2) and angles (sets, directed)."""
+    def dimensions(self, places: Array, numbers: Array) -> Array:
+        """Dimension sets, shape (sets, joints, 10), of places (sets, joints, 2) and further numbers (sets, numbers)."""
         table = np.zeros((*places.shape[:2], len(COLUMNS)))
-        table[:, :, 0:2] = table[:, :, 3:5] = places
-        for column, k in enumerate(self.directed):
-            table[:, k, 2] = table[:, k, 5] = angles[:, column]
+        table[:, :, _A] = table[:, :, _B] = places
+        for column, (k, name) in enumerate(self.numbers):
+            if name == "angle":
+                table[:, k, _ANGLE_A] = table[:, k, _ANGLE_B] = numbers[:, column]
+            else:  # a circular cam: its centre lies in the direction of the angle from the roller
+                angle, radius = table[:, k, _ANGLE_A], np.exp(numbers[:, column])
+                table[:, k, _A] += radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+                table[:, k, _RADIUS_A] = radius
+        for k, (p, q) in self.centres.items():
+            table[:, k, _A], table[:, k, _B] = places[:, p], places[:, q]
+            way = places[:, q] - places[:, p]
+            first, second = teeth(self.kinds[k]) or (1, 1)
+            both = np.hypot(way[:, 0], way[:, 1]) / abs(first + second)
+            table[:, k, _RADIUS_A], table[:, k, _RADIUS_B] = first * both, abs(second) * both
+            table[:, k, _SIGN] = math.copysign(1.0, second)
+            table[:, k, _OFFSET] = -(first + second) / second * np.arctan2(way[:, 1], way[:, 0])
         return table
 
-    def mechanism(self, places: Array, angles: Array) -> Mechanism:
-        """Return the mechanism of one set, places (joints, 2) and angles (directed,), posed at the first input."""
-        direction = dict(zip(self.directed, angles.tolist()))
-        joints = [
-            made_joint(kind, a, b, at, at, direction.get(k, 0.0), direction.get(k, 0.0))
-            for k, ((a, b, _), kind, at) in enumerate(zip(self.graph.joints, self.kinds, map(tuple, places.tolist())))
-        ]
+    def pulled(self, by: Array, places: Array, numbers: Array) -> Array:
+        """Return derivatives by places and numbers from those by dimensions: `dimensions` in reverse.
+
+        ``by`` (sets, directions, joints, 10, n), as of `pose_gradients`; result (sets, directions, n, 2 joints +
+        numbers).
+        """
+        by = np.moveaxis(by, -1, 2)  # samples before joints
+        found = by[..., _A] + by[..., _B]
+        more = np.zeros((*by.shape[:3], len(self.numbers)))
+        for column, (k, name) in enumerate(self.numbers):
+            if name == "angle":
+                more[..., column] = by[..., k, _ANGLE_A] + by[..., k, _ANGLE_B]
+            else:
+                angle = next(c for c, own in enumerate(self.numbers) if own == (k, "angle"))
+                radius, turn = np.exp(numbers[:, column]), numbers[:, angle]
+                across = radius[:, None] * np.stack([-np.sin(turn), np.cos(turn)], axis=1)
+                along = radius[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+                at_a = by[..., k, :][..., _A]
+                more[..., angle] += (at_a * across[:, None, None]).sum(axis=-1)
+                more[..., column] = (at_a * along[:, None, None]).sum(axis=-1) + by[..., k, _RADIUS_A] * radius[
+                    :, None, None
+                ]
+        for k, (p, q) in self.centres.items():
+            way = places[:, q] - places[:, p]
+            first, second = teeth(self.kinds[k]) or (1, 1)
+            turn = np.stack([-way[:, 1], way[:, 0]], axis=1) / (way**2).sum(axis=1)[:, None]
+            offset = -(first + second) / second * by[..., k, _OFFSET, None] * turn[:, None, None]
+            found[..., p, :] += by[..., k, :][..., _A] - offset
+            found[..., q, :] += by[..., k, :][..., _B] + offset
+            found[..., k, :] = 0.0
+        return np.concatenate([found.reshape(*found.shape[:3], -1), more], axis=-1)
+
+    def mechanism(self, places: Array, numbers: Array) -> Mechanism:
+        """Return the mechanism of one set, places (joints, 2) and numbers, posed at the first input."""
+        at = [World.read(row) for row in self.dimensions(places[None], numbers[None])[0]]
         drivers = tuple(Driver(*pair) for pair in self.drivers)
-        return Mechanism(self.graph, tuple(joints), drivers, pose=((0.0, 0.0, 0.0),) * self.graph.links)
+        rest = [(0j, 0.0)] * self.graph.links
+        return Mechanism(self.graph, self.joints(at, rest), drivers, pose=((0.0, 0.0, 0.0),) * self.graph.links)
+
+    def joints(self, at: Sequence[World], frames: Sequence[tuple[complex, float]]) -> tuple[JointGeometry, ...]:
+        """Return the joints that lie at some places when the links are posed in ``frames``, origins and angles."""
+        every = zip(self.graph.joints, self.kinds, at, strict=True)
+        return tuple(_made(kind, a, b, own, (frames[a], frames[b])) for (a, b, _), kind, own in every)
 
 
-def made_joint(
-    kind: str, a: int, b: int, at_a: tuple[float, float], at_b: tuple[float, float], angle_a: float, angle_b: float
+class World(NamedTuple):
+    """Where a joint lies: its point on link a and on link b, its direction, radii; one frame for all links."""
+
+    A: complex
+    B: complex
+    direction: float
+    radii: tuple[float, float]
+
+    @classmethod
+    def read(cls, row: Array) -> World:
+        """Of a row of dimensions, with all links' frames in the fixed one."""
+        radii = float(row[_RADIUS_A]), float(row[_RADIUS_B])
+        return cls(complex(*row[_A]), complex(*row[_B]), float(row[_ANGLE_A]), radii)
+
+
+def _made(
+    kind: str, a: int, b: int, at: World, frames: tuple[tuple[complex, float], tuple[complex, float]]
 ) -> JointGeometry:
-    """Return a joint of a kind of `Design`."""
+    (first, turn_a), (second, turn_b) = frames
+    on_a, on_b = (at.A - first) * cmath.exp(-1j * turn_a), (at.B - second) * cmath.exp(-1j * turn_b)
+    places = (a, b, (on_a.real, on_a.imag), (on_b.real, on_b.imag))
+    along = at.direction - turn_a
     if kind == "R":
-        return Revolute(a, b, at_a, at_b)
-    return Prismatic(a, b, at_a, at_b, angle_a, angle_b) if kind == "P" else PinSlot(a, b, at_a, at_b, angle_a)
+        return Revolute(*places)
+    if kind == "P":
+        return Prismatic(*places, along, at.direction - turn_b)
+    if kind == "pin-slot":
+        return PinSlot(*places, along)
+    if kind == "cam":
+        return Cam(*places, along, at.radii[0])
+    phi, (r_a, r_b), internal = cmath.phase(at.B - at.A), at.radii, (teeth(kind) or (1, 1))[1] < 0
+    return Gear(*places, r_a, r_b, internal, turn_b - phi + (turn_a - phi) * r_a / (-r_b if internal else r_b))
+
+
+def _centres(graph: MechanismGraph, kinds: Sequence[str], gear: int) -> tuple[int, int]:
+    """Joints of both wheels of a gear pair with their carrier, the frame if it can be; -1 if they have none."""
+    a, b, _ = graph.joints[gear]
+    turns: tuple[dict[int, int], dict[int, int]] = ({}, {})
+    for k, joint in enumerate(graph.joints):
+        for wheel, own in zip((a, b), turns):
+            if kinds[k] == "R" and wheel in (joint.a, joint.b):
+                own[joint.b if joint.a == wheel else joint.a] = k
+    common = sorted(turns[0].keys() & turns[1].keys(), key=lambda link: (link != graph.frame, link))
+    return (turns[0][common[0]], turns[1][common[0]]) if common else (-1, -1)
+
+
+def joint_kinds(graph: MechanismGraph, given: Mapping[tuple[int, int], str]) -> tuple[str, ...]:
+    """Kinds of all joints: as given, else revolute, gears where both links turn on a third, else pins in slots.
+
+    `GeometryError` for a kind that a joint cannot be, or a joint that the graph has not.
+    """
+    own = {}
+    for (a, b), kind in given.items():
+        wheels = teeth(kind)
+        if a > b and wheels is not None:  # the wheels are named in the other order
+            kind = f"gear {abs(wheels[1])}:{wheels[0] if wheels[1] > 0 else -wheels[0]}"
+        own[min(a, b), max(a, b)] = kind
+    pairs = [(joint.a, joint.b) for joint in graph.joints]
+    if unknown := own.keys() - set(pairs):
+        raise GeometryError(f"joints names {min(unknown)}, but the graph has no such joint")
+    kinds = [own.get(pair, "R" if graph.joints[k].mobility == 1 else "") for k, pair in enumerate(pairs)]
+    for k, (a, b, mobility) in enumerate(graph.joints):
+        allowed = KINDS.get(mobility, ())
+        carried = _centres(graph, kinds, k) != (-1, -1)
+        if not kinds[k] and mobility == 2:
+            kinds[k] = "gear" if carried else "pin-slot"
+        if kinds[k] not in allowed and not (mobility == 2 and teeth(kinds[k])):
+            raise GeometryError(
+                f"joint {a}-{b} has mobility {mobility} and cannot be {kinds[k]!r}; use one of {allowed}"
+                + (", teeth as in 'gear 2:1' or 'gear 1:-3'" if mobility == 2 else "")
+            )
+        if teeth(kinds[k]) and not carried:
+            raise GeometryError(
+                f"joint {a}-{b} cannot be a gear pair: no third link carries both wheels on revolute joints"
+            )
+    return tuple(kinds)
 
 
 # --- which link is fixed and which is driven, when the graph leaves it open

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.checks import finite, point, positive
 from graphsynth.core.errors import GeometryError
+from graphsynth.kinematics.dimensional.matching import Wanted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -95,6 +96,8 @@ class PathGoal:
     ----------
     points : iterable of (x, y)
         At least three, in the order of the motion.
+    closed : bool
+        Without inputs: the last point is followed by the first, and the path is the whole curve.
     inputs : iterable of float, optional
         Inputs at the points relative to the first, increasing, within the turn or range; else only the order counts.
     link : int, optional
@@ -107,6 +110,7 @@ class PathGoal:
     inputs: tuple[float, ...] | None = None
     link: int | None = None
     tolerance: float = 0.01
+    closed: bool = False
 
     def __post_init__(self) -> None:
         places = tuple(point(f"points[{k}]", p) for k, p in enumerate(_listed("points", self.points)))
@@ -120,15 +124,15 @@ class PathGoal:
 class PosesGoal:
     """A link passes given poses in order (motion generation).
 
-    `GeometryError` for fewer than three poses, or inputs missing.
+    `GeometryError` for fewer than three poses.
 
     Parameters
     ----------
     poses : iterable of (x, y, theta)
         At least three; place of one point of the link, the same in all poses, and the link's angle in radians.  The
         angle counts relative to the first: the line on the link from which it is measured is the designer's choice.
-    inputs : iterable of float
-        Inputs at the poses relative to the first, increasing.
+    inputs : iterable of float, optional
+        Inputs at the poses relative to the first, increasing; else only the order counts.
     link : int, optional
         By default the link farthest from the frame.
     tolerance : float
@@ -145,8 +149,6 @@ class PosesGoal:
         if len(rows) < 3 or any(len(row) != 3 for row in rows):
             raise GeometryError("a poses goal needs three or more poses (x, y, theta)")
         object.__setattr__(self, "poses", rows)
-        if self.inputs is None:
-            raise GeometryError("a poses goal needs the inputs at which the poses are passed; give inputs")
         _timed(self, len(rows))
 
 
@@ -253,9 +255,6 @@ class Goals:
 # --- errors of the targets over many candidate motions at once
 
 
-_KNOTS = 10
-
-
 class Sampled(NamedTuple):
     """A link over the inputs of the target, by set: origin, angle factor and continuous angle, each (sets, samples)."""
 
@@ -308,6 +307,14 @@ class TargetFit(ABC):
     def errors(self, sampled: Sampled, extras: Array, crank: Array) -> tuple[Complex, Placed]:
         """Errors (sets, m) whose largest size is in the unit of the tolerance, and the placement."""
 
+    def linear(self, own: Array) -> tuple[Array, Array, Array]:
+        """Errors and their derivatives for least squares, of a smooth target at inputs of its own.
+
+        ``own`` (sets, n, 4) are x, y, cos, sin of the link.  Returns errors (sets, directions, n), their derivatives by
+        (x, y, theta), (sets, directions, 3, n), and what the placement can change, columns (sets, directions n, k).
+        """
+        raise GeometryError("this target has no derivatives")  # never asked: `smooth` and not `warped` come first
+
     def unplaced(self, q: Complex) -> Placed:
         """Return a placement that leaves the whole where it is."""
         one = np.ones(len(q), dtype=np.complex128)
@@ -325,23 +332,10 @@ class PathFit(TargetFit):
         self.turn = rows[:, 2] - rows[0, 2] if isinstance(target, PosesGoal) else None
         self.size = float(np.abs(self.goal - self.goal.mean()).max()) or 1.0
         self.warped = target.inputs is None
-        self.angular = self.warped or self.turn is not None
-        if target.inputs is not None:
-            self.inputs = np.array(target.inputs)
-            return
-        self.inputs = np.zeros(0)
-        knots = min(len(rows), _KNOTS)
-        arc = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self.goal)) + 1e-3 * self.size)])
-        self.share = arc / arc[-1] * (knots - 1)
-        self.ranges = np.array([[0.05, 1.0]] * knots)  # the last is the rest of the turn
-
-    def times(self, extras: Array, span: float) -> Array:
-        """Return the inputs at the points, shape (sets, points): increasing, within the range."""
-        steps = np.cumsum(np.abs(extras) + 1e-6, axis=1)
-        knots = np.concatenate([np.zeros((len(extras), 1)), steps[:, :-1] / steps[:, -1:]], axis=1) * span
-        low = np.minimum(self.share.astype(np.intp), knots.shape[1] - 2)
-        part = self.share - low
-        return np.asarray(knots[:, low] * (1.0 - part) + knots[:, low + 1] * part)
+        self.angular = self.turn is not None
+        self.inputs = np.zeros(0) if target.inputs is None else np.array(target.inputs)
+        closed = isinstance(target, PathGoal) and target.closed
+        self.wanted = Wanted(self.goal, self.turn, self.size, closed)
 
     def errors(self, sampled: Sampled, extras: Array, crank: Array) -> tuple[Complex, Placed]:
         """Distance of every point over the size of the set, and angles."""
@@ -353,9 +347,41 @@ class PathFit(TargetFit):
         c: Complex = np.linalg.solve(N, BH @ np.broadcast_to(self.goal, z.shape)[:, :, None]).astype(np.complex128)
         found = ((B @ c)[:, :, 0] - self.goal) / self.size
         if self.turn is not None:
-            turned = sampled.angle - sampled.angle[:, :1] - self.turn
-            found = np.concatenate([found, turned - turned.mean(axis=1, keepdims=True)], axis=1)
+            found = np.concatenate([found, self._turned(sampled.angle)], axis=1)
         return found, Placed(c[:, 0, 0], c[:, 1, 0], c[:, 2, 0])
+
+    def _turned(self, angle: Array) -> Array:
+        """Errors of the angles but for the line on the link from which they are measured."""
+        assert self.turn is not None
+        if self.warped:  # at times that are found whole rotations mean nothing
+            rest = np.exp(1j * (angle - self.turn))
+            return np.asarray(np.angle(rest * np.conj(rest.sum(axis=1, keepdims=True))))
+        turned = angle - angle[:, :1] - self.turn
+        return np.asarray(turned - turned.mean(axis=1, keepdims=True))
+
+    def linear(self, own: Array) -> tuple[Array, Array, Array]:
+        """Real and imaginary parts of distances over the size, and angles; the placement is three complex numbers."""
+        z, w = own[..., 0] + 1j * own[..., 1], own[..., 2] + 1j * own[..., 3]
+        B = np.stack([z, w, np.ones_like(z)], axis=2)
+        BH = np.conj(B.transpose(0, 2, 1))
+        N = BH @ B
+        N = N + 1e-13 * np.trace(N, axis1=1, axis2=2).real[:, None, None] * np.eye(3)
+        c = np.linalg.solve(N, BH @ np.broadcast_to(self.goal, z.shape)[:, :, None])
+        e = ((B @ c)[:, :, 0] - self.goal) / self.size
+        by = np.stack(
+            [np.broadcast_to(c[:, :1, 0], z.shape), 1j * c[:, :1, 0] + 0.0 * z, 1j * c[:, 1:2, 0] * w], axis=1
+        )
+        by, B = by / self.size, np.concatenate([B, 1j * B], axis=2)
+        errors, slopes = [e.real, e.imag], [by.real, by.imag]
+        basis = np.concatenate([B.real, B.imag], axis=1)
+        if self.turn is not None:
+            angle = np.unwrap(np.arctan2(own[..., 3], own[..., 2]), axis=1)
+            errors.append(self._turned(angle))
+            slopes.append(np.stack([0.0 * angle, 0.0 * angle, 1.0 + 0.0 * angle], axis=1))
+            more = np.zeros((len(z), 3 * z.shape[1], basis.shape[2] + 1))
+            more[:, : basis.shape[1], :-1], more[:, basis.shape[1] :, -1] = basis, 1.0
+            basis = more
+        return np.stack(errors, axis=1), np.stack(slopes, axis=1), basis
 
 
 class FunctionFit(TargetFit):
@@ -369,6 +395,14 @@ class FunctionFit(TargetFit):
         e = sampled.angle - self.outputs
         e = e - 0.5 * (e.max(axis=1, keepdims=True) + e.min(axis=1, keepdims=True))
         return e.astype(np.complex128), self.unplaced(np.zeros(len(e), dtype=np.complex128))
+
+    def linear(self, own: Array) -> tuple[Array, Array, Array]:
+        """Differences of angles but for a constant."""
+        angle = np.unwrap(np.arctan2(own[..., 3], own[..., 2]), axis=1)
+        e = angle - self.outputs
+        ones = np.ones((*angle.shape, 1))
+        slope = np.stack([0.0 * angle, 0.0 * angle, ones[..., 0]], axis=1)
+        return (e - e.mean(axis=1, keepdims=True))[:, None], slope[:, None], ones
 
 
 class LineFit(TargetFit):

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.kinematics.dimensional.design import Design, made_joint
+from graphsynth.kinematics.dimensional.design import Design, World
 from graphsynth.kinematics.dimensional.goals import (
     FunctionFit,
     FunctionGoal,
@@ -22,9 +22,11 @@ from graphsynth.kinematics.dimensional.goals import (
     TargetFit,
     target_link,
 )
+from graphsynth.kinematics.dimensional.matching import MovingLink, at_times, matched
 from graphsynth.kinematics.dimensional.sketch import layout
 from graphsynth.kinematics.dimensional.verify import group_forms, transmission_sines
 from graphsynth.kinematics.engine.batch import simulate_batch
+from graphsynth.kinematics.engine.gradients import revolute_dyads
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.laws import Driver, Linear
 from graphsynth.mechanism.model import Mechanism, TracePoint
@@ -37,6 +39,8 @@ INCOMPLETE = 100.0
 #: Cost from which a bound is violated.
 OUTSIDE = 10.0
 _CLOSED = 1e-6
+#: Logarithm of a cam's radius, in mean lengths of the sketch.
+_SIZES = (math.log(0.2), math.log(5.0))
 #: The sine of the transmission angle is asked for with this factor: its least value lies between samples.
 _SPARE = 1.002
 
@@ -75,13 +79,13 @@ class DimensionProblem:
             self.fit = PathFit(goals.target)
         self.link = target_link(design, goals.target) if goals.target is not None else -1
         self.ends = [(joint.a, joint.b) for joint in design.graph.joints]
-        free = np.setdiff1d(np.arange(len(self.ends)), design.fixed)
-        self.free = free
+        self.free = np.setdiff1d(np.arange(len(self.ends)), [*design.fixed, *design.centres])
         self.extras = 0 if self.fit is None else len(self.fit.ranges)
-        self.size = 2 * len(free) + len(design.directed) + self.extras
+        self.size = 2 * len(self.free) + len(design.numbers) + self.extras
         self.sketch = self._sketch(random)
-        self.angles = random.uniform(0.0, math.pi, len(design.directed))
-        base = design.mechanism(self.sketch, self.angles)
+        angles = random.uniform(0.0, math.pi, len(design.numbers))
+        self.numbers = np.where([name == "angle" for _, name in design.numbers], angles, 0.0)
+        base = design.mechanism(self.sketch, self.numbers)
         self.base = Mechanism(
             base.graph,
             base.joints,
@@ -102,6 +106,7 @@ class DimensionProblem:
             self.modes = {
                 group: -mode if flips >> k & 1 else mode for k, (group, mode) in enumerate(self.modes.items())
             }
+        self.dyads = revolute_dyads(self.base)
         self.evaluations = 0
         # uniform samples over the range, and the inputs of the target among them
         own = np.zeros(0) if self.fit is None else self.fit.inputs
@@ -121,11 +126,11 @@ class DimensionProblem:
     # --- from vectors to motions
 
     def decode(self, X: Array) -> tuple[Array, Array, Array]:
-        """Places (sets, joints, 2), angles and extras of vectors (sets, size)."""
-        count, angles = 2 * len(self.free), len(self.design.directed)
+        """Places (sets, joints, 2), further numbers and extras of vectors (sets, size)."""
+        count, numbers = 2 * len(self.free), len(self.design.numbers)
         places = np.repeat(self.sketch[None], len(X), axis=0)
         places[:, self.free] = X[:, :count].reshape(len(X), -1, 2)
-        return places, X[:, count : count + angles], X[:, count + angles :]
+        return places, X[:, count : count + numbers], X[:, count + numbers :]
 
     def bounds(self) -> Array:
         """Box of the search, shape (size, 2)."""
@@ -134,7 +139,7 @@ class DimensionProblem:
         if self.fit is not None:
             reach = max(reach, self.goals.max_length_ratio)
         box = [(middle[k % 2] - reach, middle[k % 2] + reach) for k in range(2 * len(self.free))]
-        box += [(-math.pi, 2.0 * math.pi)] * len(self.design.directed)
+        box += [(-math.pi, 2.0 * math.pi) if name == "angle" else _SIZES for _, name in self.design.numbers]
         return np.array([*box, *([] if self.fit is None else self.fit.ranges.tolist())]).reshape(-1, 2)
 
     def population(self, count: int, random: np.random.Generator) -> Array:
@@ -147,17 +152,17 @@ class DimensionProblem:
             size = np.exp(random.uniform(math.log(0.15), math.log(2.0), (count, 1)))
             for k in set(own) - {*self.design.fixed}:
                 places[:, k] = places[:, joint] + size * (places[:, k] - places[:, joint])
-        angles = self.angles + random.normal(0.0, 0.5, (count, len(self.angles)))
+        numbers = self.numbers + random.normal(0.0, 0.5, (count, len(self.numbers)))
         box = self.bounds()
         ranges = box[len(box) - self.extras :]
         extras = random.uniform(ranges[:, 0], ranges[:, 1], (count, self.extras))
-        X = np.concatenate([places[:, self.free].reshape(count, -1), angles, extras], axis=1)
+        X = np.concatenate([places[:, self.free].reshape(count, -1), numbers, extras], axis=1)
         return np.asarray(np.clip(X, box[:, 0], box[:, 1]))
 
     def evaluate(self, X: Array) -> Evaluated:
         """Move candidates (sets, size) and judge them."""
-        places, angles, extras = self.decode(X)
-        dimensions = self.design.dimensions(places, angles)
+        places, numbers, extras = self.decode(X)
+        dimensions = self.design.dimensions(places, numbers)
         self.evaluations += len(X)
         rates = self.fit is not None and self.fit.warped
         motion = simulate_batch(self.base, self.inputs, dimensions, modes=self.modes, rates=rates)
@@ -184,10 +189,19 @@ class DimensionProblem:
         cost = np.where(complete, cost, INCOMPLETE - 10.0 * reached)
         return Evaluated(cost, np.where(complete, merit, 0.0), errors, dimensions, motion.frames[:, 0], placed)
 
+    def samples(self, frames: Array, rates: Array, complete: NDArray[np.bool_]) -> MovingLink:
+        """Motion of the target's link in every set; of sets that do not complete the range something harmless."""
+        own = np.where(complete[:, None, None], frames[:, :, self.link], [0.0, 0.0, 1.0, 0.0])
+        moved = np.where(complete[:, None, None], rates[:, :, self.link], [1.0, 0.0, 0.1])
+        return MovingLink(self.inputs, own, moved, self.goals.span if self.goals.full_turn else 0.0)
+
     def crank(self, places: Array) -> Array:
         """Length of the first driven link: from its driven joint to its first other joint."""
         joint = self.design.driver_joints[0]
-        other = next(k for k in self.design.joints_of(self.design.drivers[0][1]) if k != joint)
+        others = [k for k in self.design.joints_of(self.design.drivers[0][1]) if k != joint]
+        if not others:  # a wheel: all it carries are teeth
+            return np.ones(len(places))
+        other = others[0]
         d = places[:, joint] - places[:, other]
         return np.asarray(np.hypot(d[:, 0], d[:, 1]))
 
@@ -208,19 +222,10 @@ class DimensionProblem:
         z, w = own[..., 0] + 1j * own[..., 1] + w * origin[:, None], w * along[:, None]
         angle = np.unwrap(np.nan_to_num(np.angle(w)), axis=1) if self.fit.angular else np.zeros(w.shape)
         if isinstance(self.fit, PathFit) and self.fit.warped:
-            times = self.fit.times(extras, self.goals.span)
-            v = velocities[:, :, self.link]
-            turn = own[..., 2] + 1j * own[..., 3]
-            dz = v[..., 0] + 1j * v[..., 1] + 1j * v[..., 2] * turn * origin[:, None]
-            # cubic interpolation at inputs that differ by set
-            k = np.clip(np.searchsorted(self.inputs, times, side="right") - 1, 0, len(self.inputs) - 2)
-            row, h = np.arange(len(z))[:, None], self.inputs[k + 1] - self.inputs[k]
-            x = (times - self.inputs[k]) / h
-            a, b, c, d = (1 + 2 * x) * (1 - x) ** 2, x * (1 - x) ** 2 * h, x * x * (3 - 2 * x), x * x * (x - 1) * h
-            at = a * z[row, k] + b * dz[row, k] + c * z[row, k + 1] + d * dz[row, k + 1]
-            rate = v[..., 2]
-            theta = a * angle[row, k] + b * rate[row, k] + c * angle[row, k + 1] + d * rate[row, k + 1]
-            sampled = Sampled(at, np.exp(1j * theta), theta)
+            seen = self.samples(frames, velocities, complete)
+            at, _ = at_times(seen, matched(seen, self.fit.wanted))
+            w = at[..., 2] + 1j * at[..., 3]
+            sampled = Sampled(at[..., 0] + 1j * at[..., 1] + w * origin[:, None], w * along[:, None], np.angle(w))
         else:
             sampled = Sampled(z[:, self.at_target], w[:, self.at_target], angle[:, self.at_target])
         filler = np.exp(0.1j * np.arange(sampled.z.shape[1]))
@@ -273,22 +278,30 @@ def dimensioned(problem: DimensionProblem, x: Array) -> Mechanism | None:
     point_at += q / s * (frames[problem.link, 2] + 1j * frames[problem.link, 3])
     if problem.fit is None or not problem.fit.placed:
         s, t = _placement(problem, frames, table)
-    world = [s * _world(frames, joint.a, table[k, 0:2]) + t for k, joint in enumerate(design.graph.joints)]
-    own = {link: _frame(problem, link, world) for link in range(design.graph.links)}
-    joints = []
-    for k, (a, b, _) in enumerate(design.graph.joints):
-        direction = float(table[k, 2]) + float(np.arctan2(frames[a, 3], frames[a, 2])) + cmath.phase(s)
-        on_a, on_b = _local(own[a], world[k]), _local(own[b], world[k])
-        joints.append(made_joint(design.kinds[k], a, b, on_a, on_b, direction - own[a][1], direction - own[b][1]))
+    world = [
+        _carried(World.read(row), frames[joint.a], frames[joint.b], (s, t))
+        for joint, row in zip(design.graph.joints, table)
+    ]
+    own = [_frame(problem, link, world) for link in range(design.graph.links)]
+    joints = design.joints(world, own)
     points: dict[str, TracePoint] = {}
     if problem.fit is not None:
-        points["P"] = TracePoint(problem.link, _local(own[problem.link], s * point_at + t))
-    pose = [(z.real, z.imag, angle) for z, angle in (own[link] for link in range(design.graph.links))]
+        origin, angle = own[problem.link]
+        local = (s * point_at + t - origin) * cmath.exp(-1j * angle)
+        points["P"] = TracePoint(problem.link, (local.real, local.imag))
+    pose = [(z.real, z.imag, angle) for z, angle in own]
     drivers = tuple(
         Driver(b, k, Linear(float(problem.sense), own[k][1] - own[b][1] if design.kinds[j] == "R" else 0.0))
         for (b, k), j in zip(design.drivers, design.driver_joints)
     )
-    return Mechanism(design.graph, tuple(joints), drivers, points, tuple(pose))
+    return Mechanism(design.graph, joints, drivers, points, tuple(pose))
+
+
+def _carried(at: World, frame_a: Array, frame_b: Array, by: tuple[complex, complex]) -> World:
+    """Return where a joint lies at the first input, multiplied and moved: frames are x, y, cos, sin of its links."""
+    (s, t), turn = by, cmath.phase(complex(frame_a[2], frame_a[3]) * by[0])
+    A, B = (s * (complex(x, y) + complex(c, z) * p) + t for (x, y, c, z), p in ((frame_a, at.A), (frame_b, at.B)))
+    return World(A, B, at.direction + turn, (abs(s) * at.radii[0], abs(s) * at.radii[1]))
 
 
 def _world(frames: Array, link: int, local: Array) -> complex:
@@ -311,18 +324,13 @@ def _placement(problem: DimensionProblem, frames: Array, table: Array) -> tuple[
     return s, -s * z[0]
 
 
-def _frame(problem: DimensionProblem, link: int, world: list[complex]) -> tuple[complex, float]:
+def _frame(problem: DimensionProblem, link: int, world: list[World]) -> tuple[complex, float]:
     """Origin and angle of a link's own frame at the first input."""
     if link == problem.design.graph.frame:
         return 0j, 0.0
     joints = problem.design.joints_of(link)
     driven = [k for k in joints if k in problem.design.driver_joints]
     joints = sorted(joints, key=lambda k: (k not in driven, problem.design.kinds[k] != "R", k))
-    z = [world[k] for k in joints]
+    z = [world[k].A for k in joints]
     far = [p for p in z[1:] if abs(p - z[0]) > 0.0]
     return z[0], cmath.phase(far[0] - z[0]) if far else 0.0
-
-
-def _local(frame: tuple[complex, float], at: complex) -> tuple[float, float]:
-    p = (at - frame[0]) * cmath.exp(-1j * frame[1])
-    return p.real, p.imag

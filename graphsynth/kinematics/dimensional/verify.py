@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.kinematics.dimensional.goals import FunctionGoal, Goals, LineGoal, PosesGoal
+from graphsynth.kinematics.dimensional.goals import FunctionGoal, Goals, LineGoal, PathGoal, PosesGoal
+from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, matched
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.joints import Revolute
 
@@ -143,18 +144,32 @@ def _goal_error(motion: Motion, goals: Goals, inputs: Array, at: NDArray[np.intp
     if isinstance(target, FunctionGoal):
         e = angle[at] - np.array(target.outputs)
         return float(0.5 * np.ptp(e))
-    if isinstance(target, PosesGoal):
-        rows = np.array(target.poses)
-        goal = rows[:, 0] + 1j * rows[:, 1]
-        size = np.abs(goal - goal.mean()).max() or 1.0
-        turned = angle[at] - angle[at[0]] - (rows[:, 2] - rows[0, 2])
-        return float(max((np.abs(z[at] - goal) / size).max(), np.abs(turned - turned.mean()).max()))
-    points = np.array(target.points)
-    goal = points[:, 0] + 1j * points[:, 1]
-    size = np.abs(goal - goal.mean()).max()
-    if target.inputs is not None:
-        return float(np.abs(z[at] - goal).max() / size)
-    return in_order(z, goal) / float(size)
+    rows = np.array(target.poses if isinstance(target, PosesGoal) else target.points)
+    goal = rows[:, 0] + 1j * rows[:, 1]
+    size = float(np.abs(goal - goal.mean()).max()) or 1.0
+    turn = rows[:, 2] - rows[0, 2] if isinstance(target, PosesGoal) else None
+    if target.inputs is None:
+        rates = motion.velocities[:, link]
+        frames = np.stack([z.real, z.imag, np.cos(angle), np.sin(angle)], axis=-1)
+        arm = z - (motion.poses[:, link, 0] + 1j * motion.poses[:, link, 1])
+        moved = rates[:, 0] + 1j * rates[:, 1] + 1j * rates[:, 2] * arm
+        own = MovingLink(
+            inputs,
+            frames[None],
+            np.stack([moved.real, moved.imag, rates[:, 2]], axis=-1)[None],
+            goals.span if goals.full_turn else 0.0,
+        )
+        closed = isinstance(target, PathGoal) and target.closed
+        found, _ = at_times(own, matched(own, Wanted(goal, turn, size, closed, free=False)))
+        z, w = found[0, :, 0] + 1j * found[0, :, 1], found[0, :, 2] + 1j * found[0, :, 3]
+        rest = w if turn is None else w * np.exp(-1j * turn)
+        turned = 0.0 * goal.real if turn is None else np.angle(rest * np.conj(rest.sum()))
+        return float(max((np.abs(z - goal) / size).max(), np.abs(turned).max()))
+    worst = (np.abs(z[at] - goal) / size).max()
+    if turn is None:
+        return float(worst)
+    turned = angle[at] - angle[at[0]] - turn
+    return float(max(worst, np.abs(turned - turned.mean()).max()))
 
 
 def strip_width(z: NDArray[np.complex128]) -> float:
@@ -173,24 +188,6 @@ def strip_width(z: NDArray[np.complex128]) -> float:
     sides = np.roll(corners, -1) - corners
     across = (np.conj(sides / np.abs(sides))[:, None] * (corners[None] - corners[:, None])).imag
     return float(np.ptp(across, axis=1).min())
-
-
-def in_order(z: NDArray[np.complex128], goal: NDArray[np.complex128]) -> float:
-    """Smallest bound e such that the curve passes the goals in order, each within e.
-
-    The curve is the polyline through the samples; like the discrete Frechet distance [Eiter & Mannila 1994].
-
-    >>> in_order(np.array([0j, 1, 2, 3]), np.array([0j, 2.25 + 0.25j, 3]))
-    0.25
-    """
-    sides = np.diff(z)
-    size = np.maximum(np.abs(sides) ** 2, 1e-300)
-    part = np.clip(((goal[:, None] - z[None, :-1]) * np.conj(sides)).real / size, 0.0, 1.0)
-    apart = np.abs(z[None, :-1] + part * sides - goal[:, None])
-    best = np.minimum.accumulate(apart[0])
-    for row in apart[1:]:
-        best = np.minimum.accumulate(np.maximum(best, row))
-    return float(best[-1])
 
 
 # --- transmission angles of groups of any class, over many poses at once

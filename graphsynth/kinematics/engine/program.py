@@ -18,6 +18,7 @@ from graphsynth.core.errors import GeometryError, GraphError
 from graphsynth.kinematics.engine import codes
 from graphsynth.mechanism.constraints import characteristic_length
 from graphsynth.mechanism.joints import COLUMNS, Cam, Gear, JointGeometry, Prismatic, Revolute
+from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.assur import Decomposition, decompose
 
@@ -183,7 +184,12 @@ class _Compiler:
             if (joint.a in inside or joint.b in inside) and {joint.a, joint.b} <= inside | placed
         ]
         gone = self._choose(links, own)
-        rows = [row for joint in own if not gone & {joint.a, joint.b} for row in self._rows(joint)]
+        rows = [
+            row
+            for joint in own
+            if not gone & {joint.a, joint.b}
+            for row in joint_rows(joint, self.sizes[joint.pair], self.driven.get(joint.pair))
+        ]
         first_eliminated = len(self.eliminated)
         for link in sorted(gone):
             ends = [joint for joint in own if link in (joint.a, joint.b)]
@@ -213,25 +219,6 @@ class _Compiler:
             if len(ends) == 2 and plain and not near & gone and len(near) == 2 and len(gone) < len(links) - 1:
                 gone.add(link)
         return gone
-
-    def _rows(self, joint: JointGeometry) -> list[KernelRow]:
-        """Return the equations of a joint, the driven coordinate included."""
-        a, b = joint.a, joint.b
-        size = self.sizes[joint.pair].T
-        base: list[Number] = [size[0], size[1], size[3], size[4], 1.0, 0.0, *[0.0] * 6]
-        found = []
-        for code, own in ROWS[joint.kind](size):
-            parameters = list(base)
-            for column, value in own.items():
-                parameters[column] = value
-            harmonics = joint.harmonics if isinstance(joint, Cam) else ()
-            found.append(KernelRow(code, a, b, [*parameters, *(part for pair in harmonics for part in pair)]))
-        if joint.pair in self.driven:
-            index, driver = self.driven[joint.pair]
-            base[codes.TX], base[codes.TY] = np.cos(size[2]), np.sin(size[2])
-            base[codes.SIGN], base[codes.SLOT] = (1.0 if driver.base == a else -1.0), float(index)
-            found.append(KernelRow(codes.DRIVE_ANGLE if isinstance(joint, Revolute) else codes.DRIVE_SLIDE, a, b, base))
-        return found
 
     def _eliminate(self, link: int, first: JointGeometry, second: JointGeometry) -> KernelRow:
         """Record an eliminated link and return the equation that replaces it."""
@@ -274,6 +261,26 @@ class _Compiler:
             for column, value in enumerate(parameters):
                 table[:, k, column] = value
         return np.array([own for own, _ in rows], dtype=np.int64).reshape(-1, count), table
+
+
+def joint_rows(joint: JointGeometry, sizes: Array, driven: tuple[int, Driver] | None) -> list[KernelRow]:
+    """Return the equations of a joint of dimensions (sets, 10), the driven coordinate included."""
+    size = sizes.T
+    base: list[Number] = [size[0], size[1], size[3], size[4], 1.0, 0.0, *[0.0] * 6]
+    found = []
+    for code, own in ROWS[joint.kind](size):
+        parameters = list(base)
+        for column, value in own.items():
+            parameters[column] = value
+        harmonics = joint.harmonics if isinstance(joint, Cam) else ()
+        found.append(KernelRow(code, joint.a, joint.b, [*parameters, *(part for pair in harmonics for part in pair)]))
+    if driven is not None:
+        index, driver = driven
+        base[codes.TX], base[codes.TY] = np.cos(size[2]), np.sin(size[2])
+        base[codes.SIGN], base[codes.SLOT] = (1.0 if driver.base == joint.a else -1.0), float(index)
+        code = codes.DRIVE_ANGLE if isinstance(joint, Revolute) else codes.DRIVE_SLIDE
+        found.append(KernelRow(code, joint.a, joint.b, base))
+    return found
 
 
 def _parts(*points: Complex) -> list[Number]:

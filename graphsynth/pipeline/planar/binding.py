@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
-from graphsynth.pipeline.planar.stages import Moved, Part
-from graphsynth.pipeline.planar.tables import BearingsTable, BindingTable, PlanarTable
-from graphsynth.pipeline.products import Outcome, Picture, Quantity
+from graphsynth.pipeline.display import table
+from graphsynth.pipeline.planar.stages import Moved, Part, bearings_of
+from graphsynth.pipeline.products import Finding, Outcome, Picture, Quantity, Table
 from graphsynth.pipeline.stages import Context
 
 if TYPE_CHECKING:
     from graphsynth.jamming.binding.report import BindingReport
     from graphsynth.kinematics.engine.result import Motion
+    from graphsynth.mechanism.model import Mechanism
     from graphsynth.pipeline.planar.stages_pictures import Best
 
+_COLUMNS = (
+    "joint",
+    "moment [N m] | .4g",
+    "axial force [N] | .4g",
+    "force at an end [N] | .4g",
+    "sliding [m] | .4g",
+    "wear [N/m] | .4g",
+    "lost [J] | .4g",
+)
+_NOTE = (
+    "Largest values over the range, those that wear most first; estimated, with small tilts. Friction takes a moment "
+    "as two opposite forces at the ends of the bearing and the axial force on its face; a load in the plane may share "
+    "their contacts. Wear is pressure times sliding distance, lost is the work of friction."
+)
 
-def binding(context: Context, moved: Moved) -> Part:
+
+def binding(context: Context, moved: Moved) -> tuple[Part, dict[str, Any]]:
     """Find the drive torque, the energy and the loads of a candidate; it is no good if that blocks the motor."""
     report = _report(context, moved.motion)
     margins = (
@@ -24,43 +41,76 @@ def binding(context: Context, moved: Moved) -> Part:
         Quantity("largest tilting moment", max((row.moment for row in report.wear), default=0.0), "N m"),
     )
     good, reason = report.answer != "blocks", report.statement if report.answer == "blocks" else ""
-    return Part(f"drive: {report.answer} (estimated)", good, margins, reason)
+    values = {
+        "name": moved.name,
+        "told": report.statement,
+        "notes": "".join(f" {note[:1].upper()}{note[1:]}." for note in report.notes),
+        "good": good,
+        "share": report.share,
+        "rows": [(f"{row.joint[0]}-{row.joint[1]}", *row[1:]) for row in report.wear],
+    }
+    return Part(f"drive: {report.answer} (estimated)", good, margins, reason), values
 
 
 def _report(context: Context, motion: Motion) -> BindingReport:
-    from graphsynth.jamming.bearing.bearing import Bearing
     from graphsynth.jamming.binding import ContactFriction, LinkSection, binding_torque
-    from graphsynth.jamming.joints import Misalignment, bearing_limits
 
-    given: PlanarTable = context.scene.mechanism
-    bearings, table = given.bearings, given.binding
-    assert isinstance(bearings, BearingsTable)
-    assert isinstance(table, BindingTable)
-    links = None
-    if table.young is not None and table.width is not None and table.height is not None:
-        links = LinkSection.rectangular(table.young, table.width, table.height)
-    driver = motion.mechanism.drivers[0]
+    bearings, table = context.scene.mechanism.bearings, context.scene.mechanism.binding
     return binding_torque(
         motion,
-        tilt=Misalignment(driver.base, driver.link, bearings.alpha, bearings.direction),
-        joints=bearing_limits(
-            Bearing(bearings.radius_mm, bearings.height_mm, bearings.clearance_mm), bearings.condition
-        ),
-        stiffness=table.stiffness,
-        links=links,
+        **given_bearings(context, motion.mechanism),
+        links=None if table.young is None else LinkSection.rectangular(table.young, table.width, table.height),
         friction=ContactFriction(table.friction, 1e-3 * bearings.radius_mm, 1e-3 * bearings.height_mm),
         motor_torque=table.motor,
     )
 
 
-def curves(context: Context, written: tuple[Outcome, ...], best: Best) -> tuple[Picture, ...]:
-    """Plot the torque that binding costs the best candidates, and name the joint that wears first."""
+def given_bearings(context: Context, mechanism: Mechanism) -> dict[str, Any]:
+    """Return tilt, joints and stiffness for `binding_torque`, with the middles of the tolerances of the drawing."""
+    from graphsynth.jamming.joints.drawing import drawn
+
+    limits, tilt, parts = bearings_of(context.scene.mechanism.bearings, mechanism)
+    found = drawn(mechanism, limits, tilt, parts or 0.0)
+    return {"tilt": found.tilts, "joints": found.bearings, "stiffness": context.scene.mechanism.binding.stiffness}
+
+
+def tables(context: Context, loaded: tuple[Outcome, ...], best: Best) -> tuple[Table, ...]:
+    """Lay out loads and wear of the joints of the best candidates; the first screen says what they come to."""
+    from graphsynth.pipeline.planar.stages_pictures import best_numbers
+
+    values = _values(loaded)
+    found = []
+    for _, number in best_numbers(context, best):
+        own = values[number]
+        whose, name = (f"{own['name']}: ", f", {own['name']}") if len(values) > 1 else ("", "")
+        told = Finding(whose + _told(own), own["good"])
+        found.append(table(f"What binding costs{name}", _COLUMNS, own["rows"], _NOTE + own["notes"], told))
+    return tuple(found)
+
+
+def _values(loaded: tuple[Outcome, ...]) -> dict[int, Mapping[str, Any]]:
+    return {outcome.number: outcome.products["loaded"] for outcome in loaded if outcome.status == "assessed"}
+
+
+def _told(own: Mapping[str, Any]) -> str:
+    """Return the answer, where it binds, and which joints come first."""
+    if not own["share"]:
+        return str(own["told"])
+    most, worn = max(own["rows"], key=lambda row: row[1]), own["rows"][0]
+    over = f"It binds over {100.0 * own['share']:.3g} % of the range"
+    first = f"joint {most[0]} bears the largest moment, {most[1]:.4g} N m"
+    wears = "" if not worn[5] > 0.0 else ", and wears first" if worn == most else f"; joint {worn[0]} wears first"
+    return f"{own['told']} {over}; {first}{wears}."
+
+
+def curves(
+    context: Context, loaded: tuple[Outcome, ...], written: tuple[Outcome, ...], best: Best
+) -> tuple[Picture, ...]:
+    """Plot the torque that binding costs the best candidates."""
     from graphsynth.pipeline.planar.stages_pictures import best_motions
 
-    pictures = []
-    for title, _, motion in best_motions(context, written, best):
-        report = _report(context, motion)
-        worn = [row for row in report.wear if row.wear > 0.0]
-        first = f" Joint {worn[0].joint[0]}-{worn[0].joint[1]} wears first." if worn else ""
-        pictures.append(Picture(title, report.plot().svg(), report.statement + first))
-    return tuple(pictures)
+    values = _values(loaded)
+    return tuple(
+        Picture(title, _report(context, motion).plot().svg(), _told(values[number]))
+        for title, number, motion in best_motions(context, written, best)
+    )

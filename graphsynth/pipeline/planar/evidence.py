@@ -62,6 +62,17 @@ def binding(context: Any, effort: Effort) -> Problem:
     return replace(problem, note=f"Not a mechanism of the scene, but one with a closed form. {problem.note}")
 
 
+def binding_in_space(context: Any, effort: Effort) -> Problem:
+    """Measure the elastic torque of a mechanism of the scene, links rigid."""
+    from graphsynth.evidence.binding import small_tilts_problem
+    from graphsynth.pipeline.planar.binding import given_bearings
+
+    if getattr(context.scene.mechanism, "binding", None) is None:
+        raise GeometryError("the scene has no table [mechanism.binding]")
+    mechanism, name, span = _own(context)
+    return small_tilts_problem(mechanism, given_bearings(context, mechanism), name, span, effort)
+
+
 def linkage_dynamics(context: Any, effort: Effort) -> Problem:
     """Measure a mechanism of the scene with its loads, free to move from the speed of the scene."""
     from graphsynth.dynamics.start import consistent_start

@@ -32,7 +32,7 @@ def risk(context: Context, moved: Moved) -> tuple[Part, dict[str, Any]]:
 
     own: RiskTable = context.scene.mechanism.risk
     bearings: BearingsTable = context.scene.mechanism.bearings
-    limits, tilt, parts = bearings_of(bearings, moved)
+    limits, tilt, parts = bearings_of(bearings, moved.motion.mechanism)
     margin = joints_margin(moved.motion, limits, tilt, parts, condition=bearings.condition)
     given = {name: _distribution(own.distribution, value) for name, value in margin.ranges.items()}
     grades = _grades(context, margin, own)
@@ -40,7 +40,7 @@ def risk(context: Context, moved: Moved) -> tuple[Part, dict[str, Any]]:
     changes = found.sensitivities(width=own.width, seconds=_NEVER).rows if own.sensitivities else ()
     curve = pareto_curve(margin, grades, own.allowed, given, seconds=_NEVER, trials=own.trials) if grades else None
     bought = curve.points if curve is not None else ()
-    proved = {one.cost: min(own.upper for own in bought if own.choice == one.choice) for one in bought}
+    proved = [min(own.upper for own in bought if own.choice == one.choice) for one in bought]
     drawn = found.samples
     values = {
         "model": found.model,
@@ -53,11 +53,11 @@ def risk(context: Context, moved: Moved) -> tuple[Part, dict[str, Any]]:
             (
                 one.allowed,
                 one.cost,
-                proved[one.cost],
+                upper,
                 one.cheapest,
                 {name: grade.name for name, grade in one.choice.items()},
             )
-            for one in bought
+            for one, upper in zip(bought, proved)
         ],
     }
     upper = Quantity("probability of binding, at most", found.upper, "", "certified", found.upper - found.lower)
@@ -118,8 +118,7 @@ def _percent(value: float, side: int) -> str:
 
 
 def _row(name: str, value: Range, given: Distribution) -> tuple[str, str, str]:
-    kind = repr(given).split(".")[1].split("(")[0]
-    return name, f"{float(value.lower):.6g} to {float(value.upper):.6g}", kind
+    return name, f"{float(value.lower):.6g} to {float(value.upper):.6g}", given.kind
 
 
 def _between(low: float, high: float) -> str:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from graphsynth.jamming.joints.limits import JointLimits, Misalignment
     from graphsynth.kinematics.dimensional.goals import Goals, Target
     from graphsynth.kinematics.engine.result import Motion
+    from graphsynth.mechanism.joints import JointGeometry
     from graphsynth.mechanism.laws import Driver
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.tolerances.parts import PartTolerance
@@ -113,7 +114,9 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
         causes = [why.removeprefix("result: ") for why in found.reasons if why.startswith("result: ")]
         error = found.figures.goal_error if found.figures is not None else math.nan
         best = f"; error {error:.3g}" if math.isfinite(error) else ""
-        raise Rejected(f"no dimensions were found: {causes[0] if causes else 'nothing moves'}", found.statement + best)
+        moves = found.motion is not None and found.motion.completed
+        cause = causes[0] if causes else "nothing moves"
+        raise Rejected(f"moves, but {cause}" if moves else f"no dimensions were found: {cause}", found.statement + best)
     margins = [Quantity("length ratio", found.figures.length_ratio)]
     if math.isfinite(found.figures.goal_error):
         margins.insert(0, Quantity("deviation", found.figures.goal_error))
@@ -149,7 +152,7 @@ def _crank(mechanism: Mechanism) -> float:
 
 
 def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
-    """Return the mechanism with all lengths multiplied (revolute and prismatic joints, pins in slots).
+    """Return the mechanism with all lengths multiplied (all joints but cams with harmonics).
 
     >>> from graphsynth.mechanism.model import Mechanism
     >>> scaled(Mechanism.four_bar(2.0, 1.0, 2.5, 2.5), 0.5).joint(2, 3).at_a
@@ -160,7 +163,11 @@ def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
     def times(point: tuple[float, float]) -> tuple[float, float]:
         return point[0] * factor, point[1] * factor
 
-    joints = tuple(replace(j, at_a=times(j.at_a), at_b=times(j.at_b)) for j in mechanism.joints)
+    def larger(joint: JointGeometry) -> JointGeometry:
+        radii = {name: factor * value for name, value in vars(joint).items() if name.startswith("radius")}
+        return replace(joint, at_a=times(joint.at_a), at_b=times(joint.at_b), **radii)
+
+    joints = tuple(map(larger, mechanism.joints))
     points = {name: (point.link, times(point.at)) for name, point in mechanism.points.items()}
     pose = mechanism.pose and tuple((x * factor, y * factor, angle) for x, y, angle in mechanism.pose)
     return Mechanism(mechanism.graph, joints, mechanism.drivers, points, pose)  # type: ignore[arg-type]
@@ -199,7 +206,7 @@ def assess(context: Context, moved: Moved, *parts: Part) -> Record:
     """Give the record of a candidate: what its motion, its bearings and its loads say."""
     words = ["moves over the whole range (estimated)", *(part.words for part in parts if part.words)]
     verdicts = [part.good for part in parts if part.words]
-    margins = (*moved.margins, *(margin for part in parts for margin in part.margins))
+    margins = (*(margin for part in parts for margin in part.margins), *moved.margins)
     reason = "; ".join(part.reason for part in parts if part.reason)
     good = False if False in verdicts else None if None in verdicts else True
     return Record(verdict=", ".join(words), good=good, margins=margins, reason=reason)
@@ -250,7 +257,7 @@ def jamming(context: Context, moved: Moved) -> Part:
     from graphsynth.jamming.verdict import Verdict
 
     table: BearingsTable = context.scene.mechanism.bearings
-    limits, tilt, parts = bearings_of(table, moved)
+    limits, tilt, parts = bearings_of(table, moved.motion.mechanism)
     given: Any = {"condition": table.condition, "tolerances": parts or table.length_tolerance}
     report = assess_coupled(moved.motion, limits, tilt, **given)
     verdict, reason = report.verdict, report.reason
@@ -262,22 +269,25 @@ def jamming(context: Context, moved: Moved) -> Part:
     good = True if verdict.is_free else False if verdict.is_jammed else None
     if table.must_be_free and not good:
         raise Rejected("the bearings jam" if good is False else "the bearings are not proved free", reason)
+    if verdict.is_jammed and context.scene.mechanism.binding is not None:
+        good = True  # it may, at the price that the stage `binding` judges
     margins = (
         Quantity("use of the clearances", report.worst_factor),
         Quantity.of_si("tilt allowed", table.alpha * report.smallest_scale, "deg"),
         Quantity.of_si("worst input", report.worst_input, "deg"),
     )
-    return Part(f"bearings: {verdict.value}", good, margins, reason if verdict is Verdict.UNDECIDED else "")
+    told = verdict in (Verdict.UNDECIDED, Verdict.CERTIFIED_JAMMED_FOR_SOME)  # why, or which member
+    return Part(f"bearings: {verdict.value}", good, margins, reason if told else "")
 
 
-def bearings_of(table: BearingsTable, moved: Moved) -> tuple[JointLimits, Misalignment, list[PartTolerance]]:
+def bearings_of(table: BearingsTable, mechanism: Mechanism) -> tuple[JointLimits, Misalignment, list[PartTolerance]]:
     """Return the limits of all bearings, the tilt of the driven axis, and the tolerances of the parts."""
     from graphsynth.jamming.bearing.bearing import Bearing
     from graphsynth.jamming.joints.limits import Misalignment, bearing_limits
 
     bearing = Bearing(table.radius_mm, table.height_mm, table.clearance_mm)
     limits = bearing_limits(bearing, table.condition, clearance_tolerance=table.clearance_tolerance_mm)
-    driver, alpha, spread = moved.motion.mechanism.drivers[0], table.alpha, table.alpha_tolerance
+    driver, alpha, spread = mechanism.drivers[0], table.alpha, table.alpha_tolerance
     tilt = Misalignment(
         driver.base,
         driver.link,

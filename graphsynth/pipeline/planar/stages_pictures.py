@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from graphsynth.pipeline.planar.stages import restored
-from graphsynth.pipeline.planar.tables import PlanarTable
 from graphsynth.pipeline.products import Outcome, Picture, Ranking, Record
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.units import behind
@@ -20,20 +19,24 @@ _FRAMES = 72
 Best = Ranking | tuple[Record, ...]
 
 
-def best_motions(context: Context, written: tuple[Outcome, ...], best: Best) -> list[tuple[str, int, Motion]]:
-    """Return title, number and motion of the best candidates, the best first; without a ranking of the first ones."""
-    import numpy as np
-
-    from graphsynth.kinematics.simulation import simulate
-
-    table: PlanarTable = context.scene.mechanism
-    outcomes = {outcome.number: outcome for outcome in written}
-    inputs = np.linspace(0.0, table.motion.span, 181)
+def best_numbers(context: Context, best: Best) -> list[tuple[str, int]]:
+    """Return title and number of the best candidates, the best first; without a ranking of the first ones."""
     if isinstance(best, Ranking):
         named = [(f"Place {place}: candidate {n}", n) for place, n in enumerate(best.numbers, 1)]
     else:
         named = [(f"Candidate {record.number}", record.number) for record in best if record.status == "assessed"]
-    return [(title, n, simulate(restored(outcomes[n]), inputs)) for title, n in named[: table.pictures]]
+    return named[: context.scene.mechanism.pictures]
+
+
+def best_motions(context: Context, written: tuple[Outcome, ...], best: Best) -> list[tuple[str, int, Motion]]:
+    """Return title, number and motion of each of `best_numbers`."""
+    import numpy as np
+
+    from graphsynth.kinematics.simulation import simulate
+
+    outcomes = {outcome.number: outcome for outcome in written}
+    inputs = np.linspace(0.0, context.scene.mechanism.motion.span, 181)
+    return [(title, n, simulate(restored(outcomes[n]), inputs)) for title, n in best_numbers(context, best)]
 
 
 def sketches(
@@ -49,7 +52,8 @@ def sketches(
     for title, number, motion in best_motions(context, written, best):
         # the sample in which the nearest two joints are far apart, and all of them from one line
         joints = np.stack([motion.point(j.a, j.at_a).position for j in motion.mechanism.joints], axis=1)
-        apart = np.linalg.norm(joints[:, :, None] - joints[:, None], axis=-1) + 1e9 * np.eye(joints.shape[1])
+        apart = np.linalg.norm(joints[:, :, None] - joints[:, None], axis=-1)
+        apart[:, apart.max(axis=0) < 1e-9 * apart.max()] = np.inf  # a pin on a slider is always at its guide
         flat = np.linalg.svd(joints - joints.mean(axis=1, keepdims=True), compute_uv=False)[:, 1]
         clear = int(np.fmin(apart.min(axis=(1, 2)), flat).argmax())
         record = by_number[number]

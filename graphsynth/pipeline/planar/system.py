@@ -26,7 +26,7 @@ def _more(scene: Any) -> tuple[Stage, ...]:
         stages.append(Stage("jamming", f"{_HERE}.stages:jamming", ("moved",), ("jammed",), each=True, cost=2.0))
         parts.append("jammed")
     if table.binding is not None:
-        stages.append(Stage("binding", f"{_HERE}.binding:binding", ("moved",), ("bound",), each=True))
+        stages.append(Stage("binding", f"{_HERE}.binding:binding", ("moved",), ("bound", "loaded"), each=True))
         parts.append("bound")
     if table.risk is not None:
         stages += [
@@ -39,6 +39,8 @@ def _more(scene: Any) -> tuple[Stage, ...]:
         stages.append(Stage("dynamics", f"{_HERE}.stages:dynamics", ("moved",), ("driven",), each=True, cost=3.0))
         parts.append("driven")
     stages.append(Stage("assess", f"{_HERE}.stages:assess", tuple(parts), ("record",), each=True))
+    if scene.structure is not None and scene.structure.generate.sample is not None:
+        stages.append(Stage("shares", f"{_HERE}.shares:shares", ("records",), ("shares",)))
     best = ("written", "records" if scene.ranking is None else "ranking")
     stages += [
         Stage("sketch best", f"{_HERE}.stages_pictures:sketches", (*best, "records"), ("mechanism_pictures",)),
@@ -46,7 +48,10 @@ def _more(scene: Any) -> tuple[Stage, ...]:
         Stage("plot best", f"{_HERE}.stages_pictures:plots", best, ("plots",)),
     ]
     if table.binding is not None:
-        stages.append(Stage("plot binding", f"{_HERE}.binding:curves", best, ("binding_curves",)))
+        stages += [
+            Stage("tables of binding", f"{_HERE}.binding:tables", ("loaded", best[1]), ("binding_tables",)),
+            Stage("plot binding", f"{_HERE}.binding:curves", ("loaded", *best), ("binding_curves",)),
+        ]
     return tuple(stages)
 
 
@@ -61,13 +66,9 @@ SYSTEM = System(
         COLLECT,
     ),
     more=_more,
-    evidence=plans(
-        f"{_HERE}.evidence",
-        "positions",
-        "coupled-joints",
-        "binding",
-        "linkage-dynamics",
-        "dimensions",
-        "path-dimensions",
+    evidence=(
+        *plans(f"{_HERE}.evidence", "positions", "coupled-joints", "binding", "binding-in-space", "linkage-dynamics"),
+        *plans("graphsynth.evidence.chance", "joints-probability", "allocation"),
+        *plans(f"{_HERE}.evidence", "dimensions", "path-dimensions"),
     ),
 )

@@ -244,6 +244,17 @@ class LoadsTable:
 
 
 @dataclass(frozen=True, slots=True)
+class CandidatesTable:
+    """How the candidates of another kind of scene become planar mechanisms: dimensions, motion, bearings."""
+
+    crank: Annotated[float | None, In("mm", above=0)] = None
+    embody: EmbodyTable = field(default_factory=EmbodyTable)
+    motion: MotionTable = field(default_factory=MotionTable)
+    bearings: BearingsTable | None = None
+    pictures: Annotated[int, In(least=1)] = 10
+
+
+@dataclass(frozen=True, slots=True)
 class PlanarTable:
     """``[mechanism]`` with ``module = "planar"``: candidates come from ``[structure]`` or from `files`."""
 

@@ -96,15 +96,15 @@ class _Space:
         disc = np.einsum("nij,pj->npi", R, self.rim)
         drawing.path(self.page(disc), f"{painted('fill', 'ink', 1.6, opacity=0.72)} {_ROUND}", closed=True)
         centre = np.zeros((len(R), 3))
-        for k in (0, 1):
-            self._lines(drawing, centre, self.cardan[k], "ink", 1.2)
         self._lines(drawing, centre, l1 * R[..., :, 2], "c", 2.4)
         for k, colour in enumerate("ab"):
+            self._lines(drawing, centre, self.cardan[k], "ink", 1.2)
             x, y = map(float, self.page(self.pivot[k]))
             drawing.fixed(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6" {painted(colour)}/>')
             drawing.circle(self.page(self.ball[k]), 5.0, painted("paper", colour, 2.0))
             drawing.circle(self.page(self.cardan[k]), 4.0, painted("paper", colour, 2.0))
-            drawing.fixed(words(("leg Y", "leg X")[k], x + 10.0, y + 16.0, size=13.0, colour=colour, halo=3.0))
+            x, y = self.page(self.circles[k]).mean(0)[0], self.page(self.circles[k]).max(0)[1] + 16.0
+            drawing.fixed(words(("leg Y", "leg X")[k], x, y, size=13.0, colour=colour, anchor="middle", halo=3.0))
 
     def _lines(self, drawing: Moving, start: Array, end: Array, colour: str, width: float) -> None:
         drawing.path(self.page(np.stack([start, end], 1)), f"{painted(stroke=colour, width=width)} {_ROUND}")

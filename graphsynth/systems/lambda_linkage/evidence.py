@@ -76,10 +76,3 @@ def dimensions(context: Any, effort: Effort) -> Problem:
     from graphsynth.evidence.embodiment import line_problem
 
     return line_problem(effort)
-
-
-def probability(context: Any, effort: Effort) -> Problem:
-    """Measure the probability of binding, for tolerances with a quadrature as reference."""
-    from graphsynth.evidence.chance import chance_problem
-
-    return chance_problem(effort)

@@ -52,15 +52,11 @@ SYSTEM = System(
         Stage("animate", f"{_HERE}.pictures:animations", ("motions", "assessments"), ("animations",)),
         Stage("plot", f"{_HERE}.pictures:plots", ("motions", "assessments"), ("plots",)),
     ),
-    evidence=plans(
-        f"{_HERE}.evidence",
-        "crossing",
-        "areas",
-        "arc-ends",
-        "coupled-joints",
-        "probability",
-        "exact-closure",
-        "positions",
-        "dimensions",
+    evidence=(
+        *plans(f"{_HERE}.evidence", "crossing", "areas", "arc-ends", "coupled-joints", "exact-closure"),
+        *plans("graphsynth.evidence.space", "exact-turn", "exact-scale", "length-tolerances"),
+        *plans("graphsynth.evidence.chance", "probability", "joints-probability", "allocation"),
+        *plans("graphsynth.evidence.functions", "interval-functions"),
+        *plans(f"{_HERE}.evidence", "positions", "dimensions"),
     ),
 )

@@ -115,13 +115,15 @@ def _move(context: Context) -> PlatformMotion:
     return PlatformMotion(mechanism, motion, O, D, O + crank, D + arm, A, F, float(abs(O[0])) * share)
 
 
-def assess(
-    context: Context, recognised: tuple[Recognised, ...], motions: tuple[Attempt, ...]
-) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
-    """Give one record per candidate and the tables of the first one moved."""
-    records = records_of(recognised, motions, _verdict)
+def assess(context: Context, recognised: tuple[Recognised, ...], motions: tuple[Attempt, ...]) -> tuple[Record, ...]:
+    """Give one record per candidate."""
+    return records_of(recognised, motions, _verdict)
+
+
+def tables(context: Context, motions: tuple[Attempt, ...]) -> tuple[Table, ...]:
+    """Lay out the rotation of the first one moved."""
     moved = _first(motions)
-    return records, () if moved is None else _tables(moved)
+    return () if moved is None else _tables(moved)
 
 
 def _verdict(moved: PlatformMotion) -> tuple[str, bool, tuple[Quantity, ...]]:

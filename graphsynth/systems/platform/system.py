@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from graphsynth.evidence.rows import plans
-from graphsynth.pipeline.system import Stage, System
+from graphsynth.pipeline.planar.tables import CandidatesTable
+from graphsynth.pipeline.system import COLLECT, Stage, System
 from graphsynth.pipeline.tables import In, Positions
 from graphsynth.systems.platform.motor_system import MachineDriveTable
 
@@ -40,9 +41,32 @@ class PlatformTable:
     working_mode: tuple[Literal[1, -1], Literal[1, -1], Literal[1, -1]] = (-1, -1, -1)
     positions: Positions = 360
     drive: MachineDriveTable | None = None
+    others: CandidatesTable | None = None
 
 
 _HERE = "graphsynth.systems.platform"
+#: Records of the platform alone; and of every candidate, each through the stages of any planar mechanism.
+_ALONE = (Stage("assess", f"{_HERE}.stages:assess", ("recognised", "motions"), ("records",)),)
+_EVERY = (
+    Stage("embody", f"{_HERE}.others:embody", ("candidates",), ("built",), each=True),
+    Stage("move", f"{_HERE}.others:move", ("built",), ("moved",), each=True),
+    Stage("write", "graphsynth.pipeline.planar.stages:write", ("moved",), ("written",), each=True, cost=9.0),
+    Stage("sketch best", f"{_HERE}.others:sketches", ("written", "ranking", "records"), ("best_pictures",)),
+    COLLECT,
+)
+
+
+def _records(scene: Any) -> tuple[Stage, ...]:
+    """Return the stages that lead to the records of a scene."""
+    others: CandidatesTable | None = scene.mechanism.others
+    if others is None:
+        return _ALONE
+    parts = ("moved",) if others.bearings is None else ("moved", "jammed")
+    record = Stage("record", "graphsynth.pipeline.planar.stages:assess", parts, ("record",), each=True)
+    jamming = Stage("jamming", f"{_HERE}.others:jamming", ("moved",), ("jammed",), each=True, cost=2.0)
+    return (*_EVERY, record, jamming)
+
+
 SYSTEM = System(
     table=PlatformTable,
     cases=("platform",),
@@ -51,7 +75,7 @@ SYSTEM = System(
     stages=(
         Stage("recognise", f"{_HERE}.stages:recognise", ("candidates",), ("recognised",)),
         Stage("kinematics", f"{_HERE}.stages:kinematics", ("recognised",), ("motions",)),
-        Stage("assess", f"{_HERE}.stages:assess", ("recognised", "motions"), ("records", "tables")),
+        Stage("tables of the rotation", f"{_HERE}.stages:tables", ("motions",), ("tables",)),
         Stage("sketch mechanism", f"{_HERE}.stages:sketches", ("motions",), ("mechanism_pictures",)),
         Stage("animate", f"{_HERE}.stages:animations", ("motions",), ("animations",)),
         Stage("plot", f"{_HERE}.stages:plots", ("motions",), ("plots",)),
@@ -59,5 +83,6 @@ SYSTEM = System(
         Stage("report the drive", f"{_HERE}.motor_stages:tables", ("drive",), ("drive_tables",)),
         Stage("plot the drive", f"{_HERE}.motor_stages_pictures:curves", ("drive",), ("drive_curves",)),
     ),
+    more=_records,
     evidence=plans(f"{_HERE}.evidence", "assembly-modes", "double-root", "turn", "drive"),
 )

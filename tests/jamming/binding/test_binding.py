@@ -337,6 +337,8 @@ def test_a_driven_guide_that_goes_back() -> None:
     np.testing.assert_allclose(report.elastic_torque[1:-1], slope, atol=1e-4 * np.abs(slope).max())
     np.testing.assert_allclose(report.torque, report.friction_torque - report.elastic_torque, rtol=1e-12)
     assert 0.0 <= report.work_error < 1e-5
+    guide = next(row for row in report.wear if row.joint == (0, 3))
+    assert guide.sliding == pytest.approx(0.03, rel=1e-9) and guide.wear > 0.0
     assert "N, at input" in report.statement
     assert report.exact([0]).torque[0] == pytest.approx(report.elastic_torque[0], rel=3e-3)
 
@@ -433,7 +435,8 @@ def test_the_report_shows_itself() -> None:
     assert "<svg" in report._repr_html_()
     assert set(report.summary()) >= {"answer", "peak_torque", "wear"}
     assert len(report.to_pandas()) == len(U)
-    assert "sampling" in report.details()
+    assert "sampling" in report.details() and "both ends of its bearing" in report.details()
+    assert report.share == np.mean(report.energy > 0.0)
     open_joints = {joint.pair: FREE for joint in LAMBDA.mechanism.joints} | {(0, 1): RIGID}
     free = LAMBDA.binding(tilt=0.03, joints=open_joints, stiffness=1.0)
     assert repr(free).startswith("Estimated: free")

@@ -1,8 +1,9 @@
 """Drive torque and moments against exudyn: finite rotations, pins that touch the holes at both ends with clearance.
 
 The engine gets bodies in space, for every joint two forces at the ends of a pin (a spring beyond the radial clearance)
-and an axial one, and for the driven joint a constraint on its tilted axis, whose reaction about that axis is the
-torque.  A weak spring (1e-5 of the contacts') keeps the pins that touch nothing in place.
+and an axial one, for a guide along x torques beyond its roll and its pitch, and for the driven joint a constraint on
+its tilted axis, whose reaction about that axis is the torque.  A weak spring (1e-5 of the contacts') keeps the pins
+that touch nothing in place.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import graphsynth as gs
-from graphsynth.jamming.joints import RIGID, JointLimits
+from graphsynth.jamming.joints import RIGID, JointLimits, SlideLimits
+from graphsynth.mechanism.joints import Prismatic
 
 exu = pytest.importorskip("exudyn")
 Array = NDArray[np.float64]
@@ -54,7 +56,22 @@ class Pin:
         return [*force, *torque]
 
 
-def engine(motion: gs.Motion, k: int, alpha: float, pins: dict[tuple[int, int], Pin]) -> tuple[float, dict[Any, float]]:
+class Guide:
+    """A block on a guide along x: free within roll and pitch, held across it and against yaw (SI)."""
+
+    def __init__(self, roll: float, pitch: float, stiffness: float) -> None:
+        self.limits, self.spring = SlideLimits(roll, pitch), gs.JointStiffness(1e-3 * stiffness, stiffness)
+        self.roll, self.pitch, self.stiffness = roll, pitch, stiffness
+
+    def loads(self, _mbs: Any, _t: float, _item: int, place: Any, angles: Any, *_rest: Any) -> list[float]:
+        """Force and torque on the block; the turn as a vector."""
+        turn = Rotation.from_euler("XYZ", angles).as_rotvec()
+        beyond = [math.copysign(max(abs(x) - t, 0.0), x) for x, t in zip(turn, (self.roll, self.pitch, 0.0))]
+        force = self.stiffness * np.array([0.0, place[1], place[2]])
+        return [*force, *(self.spring.tilt * np.array(beyond))]
+
+
+def engine(motion: gs.Motion, k: int, alpha: float, pins: dict[tuple[int, int], Any]) -> tuple[float, dict[Any, float]]:
     """Torque about the tilted axis and tilting moments of the joints of a pose."""
     import exudyn.itemInterface as items
     import exudyn.utilities as utilities
@@ -111,10 +128,12 @@ def engine(motion: gs.Motion, k: int, alpha: float, pins: dict[tuple[int, int], 
     return -float(system.GetSensorStoredData(held)[-1][3]), moments
 
 
-def pins_of(mechanism: gs.Mechanism, seed: int, axial: float, size: float) -> dict[tuple[int, int], Pin]:
+def pins_of(mechanism: gs.Mechanism, seed: int, axial: float, size: float) -> dict[tuple[int, int], Any]:
     random = np.random.default_rng(seed)
     return {
-        joint.pair: Pin(0.1 * size, random.uniform(1e-4, 4e-4) * size, axial, random.uniform(1e6, 3e6))
+        joint.pair: Guide(2e-3, 1e-3, 2e6)
+        if isinstance(joint, Prismatic)
+        else Pin(0.1 * size, random.uniform(1e-4, 4e-4) * size, axial, random.uniform(1e6, 3e6))
         for joint in mechanism.joints
         if joint.pair != mechanism.drivers[0].pair
     }
@@ -122,13 +141,14 @@ def pins_of(mechanism: gs.Mechanism, seed: int, axial: float, size: float) -> di
 
 @pytest.mark.parametrize(
     ("name", "alpha", "axial", "size"),
-    [("lambda", 0.02, 0.0, 0.2), ("four-bar", 0.05, 3e-4, 0.2), ("six-bar", 0.03, 0.0, 1.0)],
+    [("lambda", 0.02, 0.0, 0.2), ("four-bar", 0.05, 3e-4, 0.2), ("six-bar", 0.03, 0.0, 1.0), ("press", 0.02, 0.0, 0.1)],
 )
 def test_against_a_general_engine(name: str, alpha: float, axial: float, size: float) -> None:
     mechanism = {
         "lambda": gs.Mechanism.four_bar(0.2, 0.1, 0.25, 0.25),
         "four-bar": gs.Mechanism.four_bar(0.3, 0.1, 0.32, 0.25),
         "six-bar": gs.gallery.watt_six_bar(),
+        "press": gs.Mechanism.slider_crank(0.04, 0.08),
     }[name]
     motion = mechanism.simulate(np.radians(np.arange(10.0, 370.0, 40.0)))
     assert motion.completed

@@ -1,9 +1,11 @@
 """Allocation of tolerances: each result proved, and never dearer than the best of an exhaustive search."""
 
+from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
 from itertools import product
 
+import machines
 import pytest
 
 from graphsynth.core.errors import GeometryError
@@ -16,8 +18,10 @@ from graphsynth.jamming import (
     pareto_curve,
     probability_of_jamming,
 )
+from graphsynth.jamming.chance import allocation
+from graphsynth.jamming.chance.allocation import curve as curve_of
 from graphsynth.jamming.chance.paving import Paver
-from graphsynth.jamming.chance.probability import ChanceProblem
+from graphsynth.jamming.chance.probability import sample_probability
 
 BOX = ToleranceBox(alpha="0.0160 +- 0.0001", Rb="17.5 +- 0.005")
 GRADES = {
@@ -51,59 +55,49 @@ def exhaustive(allowed: float) -> float:
 
 
 @pytest.mark.parametrize("allowed", [0.05, 1e-3, 0.0])
-@pytest.mark.parametrize("trials", [300, 11])
-def test_no_dearer_than_an_exhaustive_search(allowed: float, trials: int) -> None:
-    """With few trials there are more choices than that, and the integer program has to find them."""
-    found = allocate_tolerances(BOX, GRADES, allowed, trials=trials)
+@pytest.mark.parametrize("listed", [200_000, 1])
+def test_no_dearer_than_an_exhaustive_search(allowed: float, listed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where there are too many choices to list them, the integer program has to find them."""
+    monkeypatch.setattr(allocation, "_LISTED", listed)
+    found = allocate_tolerances(BOX, GRADES, allowed)
     assert found.choice and found.upper <= allowed
     assert found.cost <= exhaustive(allowed) + 1e-12
-    assert found.cheapest is (trials == 300)
+    assert found.cheapest is (listed > 1)
     chosen = {name: grade.distribution for name, grade in found.choice.items()}
     again = probability_of_jamming(BOX, chosen)
     assert again.upper <= max(2.0 * allowed, found.upper) and again.lower <= found.upper
     assert len(repr(found).splitlines()) <= 10
 
 
-SMALL = ToleranceBox(l1=20, l2=8, l3=25, l4=25, alpha="0.020 +- 0.0002", Rb=4, Hb=6, clearance="0.02 +- 0.002")
-LARGE = ToleranceBox(
-    l1=2000, l2=900, l3=2500, l4=2500, alpha="0.0041 +- 0.0001", Rb="60 +- 0.01", Hb=80, clearance="0.07 +- 0.01"
-)
-
-
-def grades_of(box: ToleranceBox, quantities: tuple[str, ...]) -> dict[str, list[Grade]]:
-    """Three grades for each quantity, each finer one twice as dear."""
-    found = {}
-    for k, name in enumerate(quantities):
-        nominal = (box[name].lower + box[name].upper) / 2
-        wide = nominal / (10 if name == "clearance" else 50)
-        steps = [(nominal - wide / 3**step, nominal + wide / 3**step) for step in range(3)]
-        found[name] = [Grade(f"grade {step}", ends, (k + 2) * 2.0**step) for step, ends in enumerate(steps)]
-    return found
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("box", "quantities"),
+    ("machine", "allowed", "members"),
     [
-        (SMALL, ("clearance", "l2")),
-        (BOX.replace(clearance="0.034 +- 0.003"), ("clearance", "l2", "l3", "Hb")),
-        (LARGE, ("clearance", "l2", "l3", "Hb", "Rb")),
+        (machines.small, 0.1, 20_000),
+        (machines.small, 0.001, 20_000),
+        pytest.param(machines.middle, 0.1, 4000, marks=pytest.mark.slow),
+        pytest.param(machines.middle, 0.02, 4000, marks=pytest.mark.slow),
+        pytest.param(machines.large, 0.01, 2000, marks=pytest.mark.slow),
+        pytest.param(machines.large, 0.001, 10_000, marks=pytest.mark.slow),
     ],
 )
-@pytest.mark.parametrize("allowed", [0.3, 1e-2, 1e-5])
-def test_three_machines_of_different_size(box: ToleranceBox, quantities: tuple[str, ...], allowed: float) -> None:
-    """Against every choice, each enclosed just as far as it takes to know whether it is allowed."""
-    grades = grades_of(box, quantities)
-    found = allocate_tolerances(box, grades, allowed, trials=60 if len(quantities) > 4 else 300)
-    good = []
-    for picked in product(*grades.values()):
-        chosen = {name: grade.distribution for name, grade in zip(grades, picked)}
-        bounds = Paver(*ChanceProblem(box, chosen).model(), 1e-3, 1.01, allowed=allowed).run()
-        if bounds.upper <= allowed:
-            good.append(sum(grade.cost for grade in picked))
-    assert bool(found.choice) is bool(good)
-    if good:
-        assert found.upper <= allowed and found.cost <= min(good) + 1e-9
+def test_three_machines_of_different_size(
+    machine: Callable[[], machines.Machine], allowed: float, members: int
+) -> None:
+    """Every cheaper choice binds too often: by random members (one error in a million), near by, by full enclosure."""
+    own = machine()
+    found = allocate_tolerances(own.subject, own.grades, allowed, own.distributions, seconds=600.0)
+    assert found.cheapest and found.upper <= allowed and found.undecided == 0
+    chosen = own.distributions | {name: grade.distribution for name, grade in found.choice.items()}
+    assert sample_probability(own.question(chosen), members, 0, 1.0 - 1e-6).lower <= found.upper
+    cheaper = [given for cost, given in own.choices() if cost < found.cost - 1e-9]
+    assert len(cheaper) == found.rejected
+    drawn = [sample_probability(own.question(given), members, k, 1.0 - 1e-6) for k, given in enumerate(cheaper)]
+    assert all(one.upper > allowed for one in drawn)
+    unclear = [given for given, one in zip(cheaper, drawn) if one.lower <= allowed]
+    assert len(unclear) < max(2, len(cheaper))
+    for given in unclear:
+        bounds = probability_of_jamming(own.subject, given, width=allowed / 5, ratio=1.2, seconds=10.0)
+        assert bounds.upper > allowed
 
 
 def test_worst_case_agrees_with_the_certificate() -> None:
@@ -128,6 +122,23 @@ def test_pareto_curve_falls_and_draws_itself() -> None:
     assert costs == sorted(costs) and all(point.upper <= point.allowed for point in curve.points)
     assert len(curve.to_pandas()) == 3 and "cost" in repr(curve)
     assert curve.chart().svg().startswith("<svg")
+
+
+def test_picture_is_a_staircase_of_what_is_worth_its_cost() -> None:
+    found = curve_of([(0.02, 5.0), (0.3, 1.0), (0.0, 9.0), (0.05, 6.0), (0.02, 5.0)])
+    steps, marks = found.lines
+    assert list(zip(marks.x, marks.y)) == [(0.02, 5.0), (0.3, 1.0)]  # (0.05, 6) binds more often and costs more
+    assert list(zip(steps.x, steps.y)) == [(0.01, 9), (0.02, 9), (0.02, 5), (0.3, 5), (0.3, 1), (1, 1)]
+    assert found.decades and [level.label for level in found.levels] == ["none binds: 9"]
+    assert curve_of([(0.0, 9.0)]) is None
+
+
+def test_a_choice_proved_good_for_less_risk_is_kept_for_more_and_the_other_way_round() -> None:
+    """Points of a curve in any order: none dearer than alone."""
+    allowed = [0.3, 0.02, 1e-3, 1e-4, 1e-7, 0.1]
+    together = pareto_curve(BOX, GRADES, allowed).points
+    assert [own.cost for own in together] == [allocate_tolerances(BOX, GRADES, p).cost for p in allowed]
+    assert all(own.cheapest for own in together)
 
 
 def test_points_of_a_curve_share_enclosures_and_are_those_found_alone(monkeypatch: pytest.MonkeyPatch) -> None:

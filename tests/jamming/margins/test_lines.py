@@ -33,7 +33,7 @@ def check(margin: JointsMargin, sides: tuple[float, ...], members: int, seed: in
     return proved[0], proved[1]
 
 
-@pytest.mark.parametrize("name", ["crank_slider", "fitted", "spherical"])
+@pytest.mark.parametrize("name", [pytest.param("crank_slider", marks=pytest.mark.slow), "fitted", "spherical"])
 def test_what_the_lines_prove_holds_for_members(name: str) -> None:
     binds, free = check(CASES[name](), (0.3, 0.01), 2, seed=5)
     assert binds + free > 0

@@ -71,7 +71,9 @@ def test_bounds_hold_the_interval_of_random_members(name: str) -> None:
     assert drawn.lower <= found.upper and found.lower <= drawn.upper
 
 
-@pytest.mark.parametrize("name", ["crank_slider", "fitted", "spherical"])
+@pytest.mark.parametrize(
+    "name", [*(pytest.param(own, marks=pytest.mark.slow) for own in ("crank_slider", "fitted")), "spherical"]
+)
 def test_sampled_margins_are_those_of_members(name: str) -> None:
     """Signs of sampled margins near binding, against members with their own dimensions."""
     margin, rng = CASES[name](), np.random.default_rng(3)
@@ -86,13 +88,25 @@ def test_sampled_margins_are_those_of_members(name: str) -> None:
 
 
 def test_a_point_is_a_plain_verdict() -> None:
-    margin = four_bar(tolerances=())
+    margin = four_bar("85..95 deg", tolerances=())
     given = {name: Distribution("uniform", Range(own.lower, own.lower)) for name, own in margin.ranges.items()}
     found = probability(margin, given)
     assert (found.lower, found.upper) in ((0.0, 0.0), (1.0, 1.0))
     assert (found.lower == 1.0) == (true_margin(margin, np.array([float(o.lower) for o in margin.ranges.values()])) < 0)
 
 
+@pytest.mark.slow
+def test_the_verge_is_undecided_with_a_reason() -> None:
+    """Three equal bearings bind if and only if alpha > 2 t, at 90 degrees: a point there, and a range that touches."""
+    margin = joints_margin(FOUR.simulate("85..95 deg"), JointLimits(0.006), ALPHA)
+    point = probability(margin, {"alpha 0-1": fixed("0.012")})
+    assert (point.lower, point.upper) == (0.0, 1.0) and "one member lies so close" in point.reason
+    below = probability(margin, {"alpha 0-1": Distribution.uniform("[0.011, 0.012]")})
+    assert below.lower == 0.0 < below.upper < 1e-3 and "touch the limit" in below.reason
+    assert below.boxes < 100
+
+
+@pytest.mark.slow
 def test_allocation_takes_the_margin_of_all_joints() -> None:
     margin = joints_margin(FOUR.simulate("30..120 deg"), PLAIN, ALPHA)
     grades = {

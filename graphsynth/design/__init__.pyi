@@ -1,0 +1,16 @@
+from .nine_points.linkages import PathLinkage as PathLinkage
+from .nine_points.proof import ProvedRoots as ProvedRoots
+from .nine_points.solutions import NinePointSolutions as NinePointSolutions, four_bars_through as four_bars_through
+from .poses.cognates import cognates as cognates, stretched as stretched
+from .poses.curves import (
+    BurmesterCurve as BurmesterCurve,
+    BurmesterCurves as BurmesterCurves,
+    burmester_curves as burmester_curves,
+)
+from .poses.dyads import PoseDyad as PoseDyad, PoseDyads as PoseDyads, dyads as dyads
+from .poses.functions import function_generators as function_generators, timed_paths as timed_paths
+from .poses.linkages import (
+    PoseLinkage as PoseLinkage,
+    PoseLinkages as PoseLinkages,
+    four_bars_for_poses as four_bars_for_poses,
+)

@@ -1,0 +1,106 @@
+"""From the roots of a generic start to those of a task, by compiled paths; lost paths are found again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.compilation import named
+from graphsynth.design.nine_points.equations import cognates
+from graphsynth.design.nine_points.proof import Mask, ProvedRoots, marks, overlaps, prove
+from graphsynth.design.nine_points.task import POINTS, Complex, Task, free_unknowns
+from graphsynth.intervals.balls import Balls
+
+#: Where the shipped starts are; made by ``python -m graphsynth.design.nine_points.monodromy``.
+FILE = Path(__file__).with_name("starts.npz")
+#: Largest first correction, tolerance of the corrector, first and least step; looser to stricter.
+SETTINGS = ((1e-4, 1e-7, 1e-2, 1e-10), (1e-6, 1e-7, 1e-3, 1e-13))
+#: Relative distance of marks below which two roots count as one.
+SAME = 1e-8
+#: How often other paths are tried for roots that are missing.
+_ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Generic points and given pivots with their conjugates, unrelated, and one root of each triple."""
+
+    end: Complex  # points and given unknowns, as `Task.end`
+    z: Complex
+
+    @property
+    def pivots(self) -> int:
+        """How many pivots are given."""
+        return POINTS.index(len(self.end) - 4)
+
+    def turned(self, factors: Complex) -> Start:
+        """Coordinates and their conjugates times factors of their own: roots stay roots."""
+        return Start(self.end * factors, self.z * np.tile(factors, 4))
+
+
+@cache
+def shipped(pivots: int) -> Start:
+    """Return the start system of the package."""
+    with np.load(FILE) as data:
+        return Start(data[f"end_{pivots}"], data[f"z_{pivots}"])
+
+
+def follow(start: Start, end: Complex, settings: tuple[float, ...] = SETTINGS[0]) -> Complex:
+    """Follow every root from one end of a straight path to the other; NaN where that failed."""
+    (follow_all,) = named("graphsynth.design.nine_points.kernels.paths", "follow_all")
+    z = start.z.copy()
+    free = np.array(free_unknowns(start.pivots), dtype=np.int64)
+    given = np.setdiff1d(np.arange(8), free)
+    ends = np.zeros((len(z), 3), dtype=np.int64)
+    follow_all(z, start.end, end - start.end, free, given, np.array(settings), ends)
+    z[ends[:, 0] != 0] = np.nan
+    return z
+
+
+def repeated(z: Complex, pivots: int) -> NDArray[np.int64]:
+    """Pairs of roots, in floating point, that belong to the same triple."""
+    found = np.flatnonzero(np.isfinite(z).all(axis=1))
+    sums = marks(Balls(z[found], np.zeros((len(found), 8))), pivots)
+    return found[overlaps([Balls(mark.mid, SAME * (1e-3 + np.abs(mark.mid))) for mark in sums])]
+
+
+def candidates(task: Task, begin: Start) -> tuple[Complex, int]:
+    """Follow one path to a task; return approximate roots, some perhaps twice, and how many paths were followed.
+
+    Where a path is lost, or two have become one, those of the cognates are tried, which pass elsewhere through large
+    numbers, and small steps.
+    """
+    z = follow(begin, task.end)
+    paths = len(z)
+    lost: Mask = np.asarray(~np.isfinite(z).all(axis=1))
+    lost[repeated(z, begin.pivots)] = True
+    for k, settings in ((1, SETTINGS[0]), (2, SETTINGS[0]), (0, SETTINGS[1])):
+        left = np.flatnonzero(lost)
+        if left.size and k < 3 - begin.pivots:
+            other = np.stack(cognates(begin.z[left].T)[k], axis=1)
+            z[left] = follow(Start(begin.end, other), task.end, settings)
+            paths += left.size
+            lost[left] = ~np.isfinite(z[left]).all(axis=1)
+            lost[repeated(z, begin.pivots)] = True
+    return z[np.isfinite(z).all(axis=1)], paths
+
+
+def solve(task: Task, seed: int = 0) -> tuple[ProvedRoots, int]:
+    """Return one root of each triple, proved, and how many paths were followed."""
+    rng = np.random.default_rng(seed)
+    start = shipped(len(task.pivots))
+    scale = np.abs(start.end[: len(task.p) - 1]).mean()
+    z, paths = np.empty((0, 8), dtype=np.complex128), 0
+    for _ in range(_ROUNDS):
+        found, followed = candidates(task, start.turned(np.exp(2j * np.pi * rng.uniform(size=2)) / scale))
+        z, paths = np.concatenate([z, found]), paths + followed
+        z = np.delete(z, repeated(z, start.pivots)[:, 1], axis=0)
+        roots = prove(z, task)
+        if roots.distinct.sum() >= len(start.z):
+            break
+        z = z[roots.distinct]
+    return roots, paths

@@ -1,0 +1,1 @@
+"""Compiled kernels of the nine-point problem: equations with their slopes, paths of roots."""

@@ -1,0 +1,53 @@
+"""What became of candidates drawn at random, and what that says of all mechanisms of the question."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from graphsynth.pipeline.display import table
+from graphsynth.pipeline.products import Finding
+from graphsynth.pipeline.units import grouped
+
+if TYPE_CHECKING:
+    from graphsynth.pipeline.products import Record, Table
+    from graphsynth.pipeline.stages import Context
+
+_CONFIDENCE = 0.95
+
+
+def shares(context: Context, records: tuple[Record, ...]) -> tuple[Table, ...]:
+    """Count verdicts and reasons of a sample, each share with its interval of Clopper and Pearson [1934].
+
+    The number of all mechanisms is exact, the sample uniform among them.
+    """
+    from scipy.stats import binomtest
+
+    from graphsynth.pipeline.steps import spec_of
+    from graphsynth.synthesis import count_mechanisms
+
+    every, drawn = count_mechanisms(spec_of(context)), len(records)
+    rows, moving = [], sum(record.status == "assessed" for record in records)
+    told = Counter(_told(record) for record in records)
+    for name, count in [("moves", moving), *told.most_common()]:
+        low, high = binomtest(count, drawn).proportion_ci(_CONFIDENCE, "exact")
+        rows.append(
+            (name, count, f"{100.0 * low:.1f} to {100.0 * high:.1f} %", f"{low * every:.3g} to {high * every:.3g}")
+        )
+    low, high = (100.0 * end for end in binomtest(moving, drawn).proportion_ci(_CONFIDENCE, "exact"))
+    said = Finding(
+        f"Of {grouped(every)} mechanisms, {drawn} were drawn at random; {moving} move as asked. So {low:.1f} to "
+        f"{high:.1f} % of all do with dimensions that this search finds ({_CONFIDENCE:.0%} confidence)."
+    )
+    note = (
+        "Intervals of Clopper and Pearson, 95 % each. A mechanism that does not move is one for which the search found "
+        "no dimensions within its effort, which is no proof that there are none."
+    )
+    columns = ("what became of it", "of the sample", "share of all", "mechanisms")
+    return (table(f"Shares of {grouped(every)} mechanisms", columns, rows, note, said),)
+
+
+def _told(record: Record) -> str:
+    if record.status == "assessed":
+        return record.verdict
+    return record.cause.removeprefix("embody: ") if record.status == "rejected" else "failed"

@@ -1,0 +1,91 @@
+"""No candidate is left out: each gets dimensions, a motion and a verdict, or a reason; a sample speaks for all."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from graphsynth.pipeline.runner import execute, run
+from graphsynth.pipeline.scene import Scene, find_scene
+from graphsynth.systems.platform.others import as_mechanism
+from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
+
+#: A mechanism of the scene that is not the platform: three pins in slots.
+OTHER = "NsaCC@oE@OH?@C?a?G_ f0 2:1-8,2-8,3-8"
+
+
+def tables(name: str) -> dict[str, Any]:
+    return copy.deepcopy(tomllib.loads(find_scene(name).read_text(encoding="utf-8")))
+
+
+def test_the_platform_as_joints_moves_as_the_platform() -> None:
+    """Two programs that share no equation: legs in closed form with given wheels, joints solved with the teeth."""
+    platform = SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1))
+    turn = platform.full_turn(91)
+    motion = as_mechanism(platform).simulate(np.linspace(0.0, 2.0 * np.pi, 91))
+    assert motion.completed and motion.closure.closed
+    moved = motion.poses[:, 14] - motion.poses[0, 14]
+    at = turn.pose[:, 0] + 1j * turn.pose[:, 1]
+    spin = turn.pose[:, 2] - turn.pose[0, 2]
+    carried = at - np.exp(1j * spin) * at[0]  # frames of link 14 coincide with the fixed one at the start
+    assert np.abs(moved[:, 0] + 1j * moved[:, 1] - carried).max() < 1e-12 * 105.0
+    assert np.abs(moved[:, 2] - spin).max() < 1e-13
+
+
+@pytest.fixture(scope="module")
+def both() -> Any:
+    scene = tables("didenko")
+    scene["structure"] = {"graphs": [SingleMotorPlatform().graph().to_text(), OTHER]}
+    scene["outputs"]["products"] = ["records", "ranking", "best_pictures"]
+    return execute(Scene.from_mapping(scene))
+
+
+def test_both_are_assessed_and_ranked(both: Any) -> None:
+    records = both["records"]
+    assert [record.status for record in records] == ["assessed", "assessed"]
+    names = [{margin.name for margin in record.margins} for record in records]
+    assert {"transmission angle", "tilt allowed", "distance to singularity"} <= names[0] & names[1]
+    assert sorted(both["ranking"].numbers) == [1, 2] and len(both["best_pictures"]) == 2
+
+
+def test_the_platform_keeps_its_own_dimensions(both: Any) -> None:
+    """They are not searched: a length ratio, which a search would give, is none of its margins."""
+    assert "length ratio" not in {margin.name for margin in both["records"][0].margins}
+    assert "length ratio" in {margin.name for margin in both["records"][1].margins}
+
+
+def test_a_mechanism_that_moves_badly_is_told_apart_from_one_that_does_not() -> None:
+    scene = tables("didenko")
+    scene["structure"] = {"graphs": [OTHER]}
+    scene["mechanism"]["others"]["embody"] |= {"min_transmission_deg": 89, "tries": 1, "effort": 0.1}
+    scene["outputs"]["products"] = ["records"]
+    (record,) = execute(Scene.from_mapping(scene))["records"]
+    assert record.status == "rejected" and record.cause == "embody: moves, but the transmission angle is too small"
+
+
+def test_a_sample_speaks_for_all(tmp_path: Path) -> None:
+    scene = tables("worked_example")
+    scene["structure"]["generate"] = {"sample": 6, "limit": 6}
+    scene["mechanism"]["embody"] |= {"tries": 1, "effort": 0.1}
+    scene["outputs"]["products"] = ["records", "shares"]
+    report = run(Scene.from_mapping(scene), out=tmp_path)
+    (shares,) = report["shares"]
+    assert "187\u202f985\u202f407" in shares.title and "6 were drawn" in shares.findings[0].text
+    moving = sum(record.status == "assessed" for record in report["records"])
+    assert shares.rows[0][:2] == ("moves", str(moving))
+    rest = Counter(record.status for record in report["records"])
+    assert sum(int(row[1]) for row in shares.rows[1:]) == 6 == sum(rest.values())
+    low, high = (float(text) for text in shares.rows[0][2].removesuffix(" %").split(" to "))
+    # Clopper and Pearson: with k of n, the chance of k or more at the lower end is 2.5 %, of k or fewer at the upper;
+    # one digit behind the point is shown
+    from scipy.stats import binom
+
+    assert 0 < moving < 6
+    assert binom.sf(moving - 1, 6, (low - 0.05) / 100) <= 0.025 <= binom.sf(moving - 1, 6, (low + 0.05) / 100)
+    assert binom.cdf(moving, 6, (high + 0.05) / 100) <= 0.025 <= binom.cdf(moving, 6, (high - 0.05) / 100)
