@@ -27,7 +27,7 @@ def _option(names: str, meaning: str, kind: Callable[[str], Any] | None = None, 
     return flags or [more.pop("dest")], {"help": meaning, "metavar": last} | ({"type": kind} if kind else {}) | more
 
 
-_SCENE = _option("SCENE", "name of a shipped scene, or a TOML file", dest="scene")
+_SCENE = _option("SCENE", "name of a shipped scene, or a TOML file of a scene or a question", dest="scene")
 _SHARD = _option("--shard I/M", "do only shard I of M (1 <= I <= M)", shard)
 _WORKERS = _option("--workers K", "worker processes (default: one; all for big work)", workers)
 _WORK = (

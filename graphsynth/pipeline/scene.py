@@ -21,6 +21,8 @@ _PACKAGE = Path(__file__).resolve().parent
 _FOLDERS = (_PACKAGE / "shipped", _PACKAGE.parent.parent / "catalog" / "scenes")
 
 _LONGEST_NAME = 100
+#: The shipped scene whose mechanism, ranking and products serve any structural question, and how many it draws.
+_FOR_QUESTIONS, _SAMPLE = "worked_example", 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +53,7 @@ class GenerateTable:
     symmetry: int | None = None  # keep mechanisms with an automorphism of this order that fixes the frame
     fixed_moving_links: int | None = None  # of such an automorphism, the number of moving links that stay in place
     planar: bool = False  # leave out graphs that cannot be drawn without crossings
-    sample: int | None = None  # draw so many uniformly, with the seed of the scene, not all; repeats are dropped
+    sample: int | None = None  # of more mechanisms draw so many uniformly, with the scene's seed; repeats are dropped
     limit: int = 10_000  # stop with an error when there are more candidates than this
 
     def __post_init__(self) -> None:
@@ -255,7 +257,7 @@ def find_scene(name_or_path: str | Path) -> Path:
 
 
 def load_scene(name_or_path: str | Path) -> Scene:
-    """Read a scene by name or path.
+    """Read a scene by name or path; the file of a structural question asks what becomes of its mechanisms.
 
     A `SceneError` tells of a missing scene, an unknown key, a wrong type or a missing table, a `FormatError` with line
     and column of a file that is not TOML.
@@ -267,5 +269,16 @@ def load_scene(name_or_path: str | Path) -> Scene:
     data = read_bytes(path, what="a scene", place=path.name)
     text = text_of(data, path.name, "the scene")
     tables = toml_tables(text, path.name)
+    if tables and not tables.keys() & {*TABLES, "mechanism", "format"}:
+        tables = _of_question(tables, path)
     scene = Scene.from_mapping(tables, path.name, hashlib.sha256(data).hexdigest(), text)
     return replace(scene, folder=path.parent)
+
+
+def _of_question(question: Mapping[str, object], path: Path) -> dict[str, Any]:
+    """Tables of a scene that gives the mechanisms of a question, or a sample of them, dimensions and verdicts."""
+    tables = toml_tables(find_scene(_FOR_QUESTIONS).read_text(encoding="utf-8"), path.name)
+    told = f"Every mechanism of {path.name}, {_SAMPLE} drawn at random where there are more: which move, which bind?"
+    tables["scene"] = {"name": path.stem, "title": f"Mechanisms of the question {path.stem}", "description": told}
+    tables["structure"] = {"question": question, "generate": {"sample": _SAMPLE, "limit": _SAMPLE}}
+    return tables

@@ -106,13 +106,13 @@ def mechanisms(context: Context, solutions: tuple[LinkAssortment, ...]) -> Itera
 
 def _filtered(context: Context) -> Iterator[MechanismGraph]:
     """Yield of the graphs that are given, or drawn, or answer the question those that pass the filters."""
-    from graphsynth.synthesis import enumerate_mechanisms, sample_mechanisms
+    from graphsynth.synthesis import count_mechanisms, enumerate_mechanisms, sample_mechanisms
 
     table, options = _structure(context), _structure(context).generate
     found: Iterable[MechanismGraph]
     if table.graphs:
         found = (_read(context, i, text) for i, text in enumerate(table.graphs))
-    elif options.sample is not None:
+    elif options.sample is not None and count_mechanisms(spec_of(context)) > options.sample:
         drawn = sample_mechanisms(spec_of(context), options.sample, context.scene.scene.seed)
         found = {graph.key: graph for graph in drawn}.values()
     else:

@@ -5,14 +5,18 @@ from __future__ import annotations
 import copy
 import tomllib
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from graphsynth.core.errors import SceneError
 from graphsynth.pipeline.runner import execute, run
-from graphsynth.pipeline.scene import Scene, find_scene
+from graphsynth.pipeline.scene import OutputsTable, Scene, find_scene, load_scene
+from graphsynth.structure.system.spec import StructuralSpec
+from graphsynth.synthesis import count_mechanisms
 from graphsynth.systems.platform.others import as_mechanism
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
@@ -89,3 +93,37 @@ def test_a_sample_speaks_for_all(tmp_path: Path) -> None:
     assert 0 < moving < 6
     assert binom.sf(moving - 1, 6, (low - 0.05) / 100) <= 0.025 <= binom.sf(moving - 1, 6, (low + 0.05) / 100)
     assert binom.cdf(moving, 6, (high + 0.05) / 100) <= 0.025 <= binom.cdf(moving, 6, (high - 0.05) / 100)
+
+
+@pytest.mark.parametrize("name", ["four-link", "geared-five-link", "two-dof-seven-link"])
+def test_a_question_is_run_to_verdicts(name: str, tmp_path: Path) -> None:
+    """A file of a structural question is enough: all its mechanisms have a verdict, and shares are exact."""
+    question = find_scene("lambda").parents[1] / "specs" / f"{name}.toml"
+    scene = load_scene(question)
+    every = count_mechanisms(StructuralSpec.from_toml(question))
+    tables = copy.deepcopy(dict(scene.raw))
+    tables["mechanism"]["embody"] |= {"tries": 1, "effort": 0.05}
+    tables["mechanism"].pop("bearings")
+    tables["ranking"]["objectives"].pop()
+    tables["outputs"]["products"] = ["records", "shares"]
+    report = run(Scene.from_mapping(tables), out=tmp_path)
+    told = Counter(record.status for record in report["records"])
+    assert every == sum(told.values()) == told["assessed"] + told["rejected"]
+    (shares,) = report["shares"]
+    assert sum(int(row[1]) for row in shares.rows) == every and f"All {every} " in shares.findings[0].text
+    assert told["assessed"] > every / 2 and f"{told['assessed']} move" in shares.findings[0].text
+
+
+def test_a_question_with_more_mechanisms_is_sampled(tmp_path: Path) -> None:
+    (tmp_path / "ten.toml").write_text("W = 1\nlinks = 10\n", encoding="utf-8")
+    scene = load_scene(tmp_path / "ten.toml")
+    assert scene.name == "ten" and scene.structure is not None
+    candidates = execute(replace(scene, outputs=OutputsTable(("candidates",))))["candidates"]
+    assert 150 < len(candidates) <= 200 < 1834
+
+
+@pytest.mark.parametrize("text", ["W = 1\nlnks = 10\n", "W = 1.5\n", "x = 1\n"])
+def test_a_wrong_question_is_told(text: str, tmp_path: Path) -> None:
+    (tmp_path / "ten.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError, match=r"ten\.toml.*structure.*question"):
+        execute(load_scene(tmp_path / "ten.toml"))

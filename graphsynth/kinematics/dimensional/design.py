@@ -272,8 +272,9 @@ Drivers = int | tuple[int, int] | Iterable[int | tuple[int, int]]
 def choices(graph: MechanismGraph, driver: Drivers | None) -> list[tuple[MechanismGraph, tuple[tuple[int, int], ...]]]:
     """Frames and drivers to try, best first.
 
-    The order: smallest largest group first (dyads before larger groups), then the lowest class, then driven links with
-    the fewest joints, then inversions in their canonical order and links by number.
+    Driven are joints of mobility 1 on the frame; others only where these do not move the mechanism.  The order:
+    smallest largest group first (dyads before larger groups), then the lowest class, then driven links with the fewest
+    joints, then inversions in their canonical order and links by number.
 
     `GraphError` for a driver of a chain without a frame, drivers that do not fit, a graph that no choice can drive.
 
@@ -285,26 +286,29 @@ def choices(graph: MechanismGraph, driver: Drivers | None) -> list[tuple[Mechani
         raise GraphError(f"mobility {graph.mobility}: nothing moves; embodiment needs mobility 1 or more")
     if driver is not None:
         return [_given(graph, driver)]
-    found = []
     frames = [graph] if graph.frame is not None else graph.inversions()
+    found = _driven(frames, on_frame=True) or _driven(frames, on_frame=False)
+    if not found:
+        raise GraphError(f"no {graph.mobility} joints of mobility 1 move this mechanism when they are driven")
+    return [(inversion, pairs) for _, inversion, pairs in sorted(found, key=lambda item: item[0])]
+
+
+def _driven(frames: Iterable[MechanismGraph], on_frame: bool) -> list[tuple[Any, MechanismGraph, Any]]:
+    """List the sets of drivers that move a mechanism, each after what orders it."""
+    found = []
     for rank, inversion in enumerate(frames):
         frame = inversion.frame
-        assert frame is not None
-        near = [link for link in range(inversion.links) if inversion.neighbours[frame] >> link & 1]
-        pins = {pair for a, b, mobility in inversion.joints for pair in ((a, b), (b, a)) if mobility == 1}
-        near = [link for link in near if (frame, link) in pins]
-        for links in combinations(near, inversion.mobility):
-            pairs = tuple((frame, link) for link in links)
+        pins = [(b, a) if b == frame else (a, b) for a, b, mobility in inversion.joints if mobility == 1]
+        if on_frame:
+            pins = [pair for pair in pins if pair[0] == frame]
+        for pairs in combinations(pins, inversion.mobility):
             if find_fault(inversion, pairs) is None:
                 groups = decompose(inversion, pairs).groups
                 size = max((len(group.links) for group in groups), default=0)
                 order = max((group.group_class for group in groups), default=1)
-                found.append(((size, order, sum(inversion.degrees[k] for k in links), rank, links), inversion, pairs))
-    if not found:
-        raise GraphError(
-            f"no choice of {graph.mobility} drivers on the frame moves this mechanism; name the driven joints as (a, b)"
-        )
-    return [(inversion, pairs) for _, inversion, pairs in sorted(found, key=lambda item: item[0])]
+                joints = sum(inversion.degrees[link] for _, link in pairs)
+                found.append(((size, order, joints, rank, pairs), inversion, pairs))
+    return found
 
 
 def _is_link(value: Any) -> bool:

@@ -14,12 +14,16 @@ if TYPE_CHECKING:
     from graphsynth.pipeline.stages import Context
 
 _CONFIDENCE = 0.95
+_SEARCHED = (
+    "A mechanism that does not move is one for which the search found no dimensions within its effort, which is no "
+    "proof that there are none."
+)
 
 
 def shares(context: Context, records: tuple[Record, ...]) -> tuple[Table, ...]:
     """Count verdicts and reasons of a sample, each share with its interval of Clopper and Pearson [1934].
 
-    The number of all mechanisms is exact, the sample uniform among them.
+    The number of all mechanisms is exact, the sample uniform among them; without a sample shares are exact.
     """
     from scipy.stats import binomtest
 
@@ -29,6 +33,11 @@ def shares(context: Context, records: tuple[Record, ...]) -> tuple[Table, ...]:
     every, drawn = count_mechanisms(spec_of(context)), len(records)
     rows, moving = [], sum(record.status == "assessed" for record in records)
     told = Counter(_told(record) for record in records)
+    if drawn == every:
+        rows = [(name, count, f"{100.0 * count / every:.1f} %") for name, count in told.most_common()]
+        said = Finding(f"All {every} mechanisms were examined; {moving} move as asked.")
+        columns = ("what became of it", "mechanisms", "share")
+        return (table("What became of the mechanisms", columns, rows, _SEARCHED, said),)
     for name, count in [("moves", moving), *told.most_common()]:
         low, high = binomtest(count, drawn).proportion_ci(_CONFIDENCE, "exact")
         rows.append(
@@ -39,10 +48,7 @@ def shares(context: Context, records: tuple[Record, ...]) -> tuple[Table, ...]:
         f"Of {grouped(every)} mechanisms, {drawn} were drawn at random; {moving} move as asked. So {low:.1f} to "
         f"{high:.1f} % of all do with dimensions that this search finds ({_CONFIDENCE:.0%} confidence)."
     )
-    note = (
-        "Intervals of Clopper and Pearson, 95 % each. A mechanism that does not move is one for which the search found "
-        "no dimensions within its effort, which is no proof that there are none."
-    )
+    note = f"Intervals of Clopper and Pearson, 95 % each. {_SEARCHED}"
     columns = ("what became of it", "of the sample", "share of all", "mechanisms")
     return (table(f"Shares of {grouped(every)} mechanisms", columns, rows, note, said),)
 
