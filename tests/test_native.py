@@ -72,6 +72,13 @@ def test_calls_that_differ_in_what_may_be_written_are_one() -> None:
 
 # -- used, or not ----------------------------------------------------------------------------------------------------
 
+GEARS = """
+import sys
+from graphsynth.kinematics.dimensional import embody
+from graphsynth.structure.graph import MechanismGraph
+found = embody(MechanismGraph.from_text("ExSW f0 2:1-2,4-5"), tries=1, effort=0.02)
+print(found.motion.completed, "numba" in sys.modules)
+"""
 ADD = """
 import sys, numpy as np
 from graphsynth.intervals.kernels import loops
@@ -86,6 +93,12 @@ COUNT = "import sys, graphsynth as gs; print(gs.count_chains(12), 'numba' in sys
 def test_counting_does_not_load_numba() -> None:
     assert python(COUNT).split() == ["6856", "False"]
     assert python(ADD, GRAPHSYNTH_NATIVE="0").split() == ["-3.0", "4.0", "True"]
+
+
+@needs_library
+def test_dimensions_of_gear_trains_do_not_load_numba() -> None:
+    """Arrays come to the kernels in the order of memory for which they are compiled, with two gear pairs too."""
+    assert python(GEARS).split() == ["True", "False"]
 
 
 @pytest.mark.slow  # numba compiles the kernels of counting

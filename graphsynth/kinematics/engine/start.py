@@ -93,7 +93,7 @@ def lines_of_centres(program: Program, poses: Array) -> Array:
     on_b = place[:, b] + turn[:, b] * (p[..., codes.PBX] + 1j * p[..., codes.PBY])
     phi, ra, rb = np.angle(on_b - on_a), p[..., codes.RA], p[..., codes.SIGN] * p[..., codes.RB]
     open_by = ra * (theta[:, a] - phi) + rb * (theta[:, b] - phi - p[..., codes.H])
-    return np.asarray(phi + math.tau * np.round(open_by / (math.tau * (ra + rb))))
+    return np.ascontiguousarray(phi + math.tau * np.round(open_by / (math.tau * (ra + rb))))
 
 
 def with_turns(program: Program, poses: Array, q: Array) -> Program:
