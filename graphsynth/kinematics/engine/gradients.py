@@ -21,6 +21,9 @@ from graphsynth.structure.assur import decompose
 
 Array = NDArray[np.float64]
 _CRANK, _DYAD, _GENERAL = 0, 1, 2
+#: Places and weights of a difference of order six, and its step in radians of the fastest link.
+_STENCIL = ((-3, -1 / 60), (-2, 3 / 20), (-1, -3 / 4), (1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
+_STEP = 5e-3
 
 
 class PoseGradients(NamedTuple):
@@ -114,6 +117,55 @@ def pose_gradients(mechanism: Mechanism, dimensions: ArrayLike, frames: ArrayLik
     state = np.ascontiguousarray(at.transpose(0, 2, 3, 1))
     pull(program, sizes, state, given, out, moments, _room(program, links, drivers))
     return PoseGradients(out, moments)
+
+
+def rate_gradients(
+    mechanism: Mechanism, dimensions: ArrayLike, frames: ArrayLike, velocities: ArrayLike, loads: ArrayLike
+) -> PoseGradients:
+    """Differentiate functions of the velocities, as `pose_gradients` does those of the poses.
+
+    Parameters
+    ----------
+    mechanism, dimensions, frames
+        As of `pose_gradients`.
+    velocities : array_like, shape (sets, n, links, 3)
+        Of all links, by (x, y, theta), as of `BatchMotion.velocities`.
+    loads : array_like, shape (sets, directions, links, 3, n)
+        Derivatives of the functions by these velocities.
+
+    Returns
+    -------
+    PoseGradients
+        The rates of the motion laws stay as they are. About 1e-10 of the largest (estimated).
+
+    Raises
+    ------
+    GeometryError
+        As of `pose_gradients`.
+
+    Notes
+    -----
+    The derivative of a velocity by a dimension is the rate of that of the pose: gradients with the same loads at poses
+    moved along the velocities, by a difference of order six; docs/explanation/planar-engine.md, "Gradients".
+    """
+    at, moved = np.asarray(frames, dtype=np.float64), np.asarray(velocities, dtype=np.float64)
+    if moved.shape != (*at.shape[:-1], 3):
+        raise GeometryError(f"velocities have shape {moved.shape}; give {(*at.shape[:-1], 3)}, as frames say")
+    size = np.abs(at[..., :2]).max(initial=1e-300)
+    fastest = np.maximum(np.abs(moved[..., 2]), np.abs(moved[..., :2]).max(axis=-1) / size).max(axis=2)
+    step = _STEP / np.where(fastest > 0.0, fastest, 1.0)
+    by_dimensions, by_drivers = np.zeros(()), np.zeros(())
+    for k, weight in _STENCIL:
+        there = at.copy()
+        there[..., :2] += k * step[..., None, None] * moved[..., :2]
+        turn = k * step[..., None] * moved[..., 2]
+        c, s = np.cos(turn), np.sin(turn)
+        there[..., 2], there[..., 3] = c * at[..., 2] - s * at[..., 3], s * at[..., 2] + c * at[..., 3]
+        found = pose_gradients(mechanism, dimensions, there, loads)
+        share = weight / step[:, None, None]
+        by_dimensions = by_dimensions + share[..., None, :] * found.dimensions
+        by_drivers = by_drivers + share * found.drivers
+    return PoseGradients(by_dimensions, by_drivers)
 
 
 def revolute_dyads(mechanism: Mechanism) -> list[tuple[int, int, int, int, int]]:
