@@ -1,0 +1,1 @@
+"""An index of the curves that mechanisms draw: made, stored, searched."""
