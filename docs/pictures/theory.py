@@ -8,11 +8,15 @@ from __future__ import annotations
 import cmath
 import math
 import sys
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+
 import graphsynth as gs
-from graphsynth.design import burmester_curves, four_bars_for_poses
+from graphsynth.design import CurveIndex, burmester_curves, four_bars_for_poses
+from graphsynth.design.curves.fourier import coefficients, orders, unit
 from graphsynth.drawing.svg import number, painted, picture, words
 from graphsynth.jamming import Bearing
 from graphsynth.mechanism.four_bar import TiltedFourBar
@@ -856,12 +860,37 @@ def four_poses() -> str:
     return board.svg("Centre points and circle points of four poses, their asymptotes, and a four-bar on them")
 
 
+def curve_index() -> str:
+    """Draw a wanted curve and the nearest of a small index, the same elsewhere, and the sizes of its coefficients."""
+    turns = [math.tau * k / 180 for k in range(180)]
+    wanted = [complex(1.6 * math.cos(t), 0.9 * math.sin(t) + 0.5 * math.cos(2 * t)) for t in turns]
+    moved = [0.7 * cmath.exp(2.2j) * z.conjugate() for z in wanted[60:] + wanted[:60]]
+    board = Board(680, 250, 130 + 125j, 62.0)
+    with tempfile.TemporaryDirectory() as folder:
+        index = CurveIndex.build(folder, 2000, links=[4], sliders=0)
+        for curve, shift in ((wanted, 0j), (moved, 3.4 + 0j)):
+            board.curve([shift + z for z in [*curve, curve[0]]], colour="b", width=5)
+            for match in index.find([(z.real, z.imag) for z in curve], 3, closed=True):
+                x, y = match.mechanism.simulate(match.inputs, events=False).point("P").position.T
+                board.curve([shift + complex(*p) for p in zip(x.tolist(), y.tolist())], width=1.2)
+            start = shift + curve[0]
+            board.joint(start)
+    c = coefficients(np.array([[*wanted, wanted[0]]]), np.array([True]), 5)
+    for k, size in zip(orders(5).tolist(), np.abs(unit(c))[0].tolist()):
+        foot = 6.9 + 0.32 * k - 0.9j
+        board.line(foot, foot + 2.0j * size, colour="b", width=9)
+        board.text(foot - 0.25j, f"{k}", colour="note", size=12)
+    board.text(6.9 + 1.5j, "sizes of coefficients; reflection exchanges k and −k", colour="note", size=12)
+    return board.svg("A wanted curve, thick, and the nearest three of 2000: the same wherever it lies")
+
+
 DRAWINGS = {
     "theory-arcs": jam_arcs,
     "theory-bearing": tilted_bearing,
     "theory-binding": binding,
     "theory-body": body,
     "theory-conventions": conventions,
+    "theory-curve-index": curve_index,
     "theory-cuts": cuts,
     "theory-drawing-tolerances": drawn_link,
     "theory-drive": drive,

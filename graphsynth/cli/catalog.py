@@ -6,7 +6,6 @@ import argparse
 import json
 import math
 import time
-from contextlib import AbstractContextManager
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +16,6 @@ from graphsynth.core import ordered, wording
 from graphsynth.core.errors import SpecError
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
     import pandas as pd
 
     from graphsynth.atlas.building import BuildStep
@@ -36,15 +33,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _build(options: argparse.Namespace) -> int:
+    from graphsynth.atlas import making
     from graphsynth.synthesis.writing import Step
 
-    if (options.executor == "dask") != (options.scheduler is not None):
-        raise SpecError("--executor dask and --scheduler ADDRESS go together; give both, or neither")
-    if options.scheduler and options.workers:
-        raise SpecError("--workers is for processes of this machine; a dask cluster has its own")
+    big = max(options.links) > 10 + min(options.mobility)  # more than a second of work
     begin = time.perf_counter()
     try:
-        with _executor(options) as executor, console.progress("building") as bar:
+        with console.executor(options, making.processes, big) as executor, console.progress("building") as bar:
 
             def watch(step: BuildStep) -> None:
                 if bar:
@@ -64,17 +59,6 @@ def _build(options: argparse.Namespace) -> int:
         console.note(f"{options.output} keeps what is written: give the same command to go on")
         raise
     return _summary(options, begin)
-
-
-def _executor(options: argparse.Namespace) -> AbstractContextManager[Executor | None]:
-    """Worker processes; all cores when there is more than a second of work."""
-    if options.executor == "dask":
-        from graphsynth.atlas.cluster import dask_executor
-
-        return dask_executor(options.scheduler)
-    from graphsynth.atlas.making import processes
-
-    return processes(console.workers_for(options.workers, max(options.links) > 10 + min(options.mobility)))
 
 
 def _summary(options: argparse.Namespace, begin: float) -> int:

@@ -8,11 +8,16 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+from graphsynth.core.errors import SpecError
+
 if TYPE_CHECKING:
+    from argparse import Namespace
+    from concurrent.futures import Executor
+
     from rich.console import Console
     from rich.progress import Progress, ProgressColumn
 
@@ -94,6 +99,21 @@ def workers_for(asked: int | None, big: bool) -> int:
     if asked is not None:
         return asked
     return (os.cpu_count() or 1) if big else 1
+
+
+def executor(
+    options: Namespace, processes: Callable[[int], AbstractContextManager[Executor | None]], big: bool
+) -> AbstractContextManager[Executor | None]:
+    """Give the workers of a dask cluster or processes of this machine, as the options say; all cores for big work."""
+    if (options.executor == "dask") != (options.scheduler is not None):
+        raise SpecError("--executor dask and --scheduler ADDRESS go together; give both, or neither")
+    if options.scheduler and options.workers:
+        raise SpecError("--workers is for processes of this machine; a dask cluster has its own")
+    if options.executor == "dask":
+        from graphsynth.atlas.cluster import dask_executor
+
+        return dask_executor(options.scheduler)
+    return processes(workers_for(options.workers, big))
 
 
 @contextmanager

@@ -131,6 +131,10 @@ _ASKING = ("solve", "count", "enumerate")
 #: Modules of verbs that have not one of their own name.
 _MODULES = {"enumerate": "enumerate_", "schema": "doctor"}
 
+_EXECUTOR = (
+    _option("--executor", "who computes (default processes)", choices=("processes", "dask"), default="processes"),
+    _option("--scheduler ADDRESS", "dask scheduler, for example tcp://node1:8786"),
+)
 _FILE = _option("FILE", "the catalogue", Path, dest="file")
 _CATALOG = "Build, evaluate, ask, check, export and merge catalogues of chains and mechanisms."
 _ACTIONS: dict[str, tuple[str, *tuple[Option, ...]]] = {
@@ -142,8 +146,7 @@ _ACTIONS: dict[str, tuple[str, *tuple[Option, ...]]] = {
         _option("-o --output FILE", "the catalogue (default catalogue.sqlite)", Path, default=Path("catalogue.sqlite")),
         _SHARD,
         _option("--workers K", "worker processes (default: all cores)", workers),
-        _option("--executor", "who computes (default processes)", choices=("processes", "dask"), default="processes"),
-        _option("--scheduler ADDRESS", "dask scheduler, for example tcp://node1:8786"),
+        *_EXECUTOR,
     ),
     "query": (
         "Ask a catalogue.",
@@ -204,6 +207,31 @@ _ACTIONS: dict[str, tuple[str, *tuple[Option, ...]]] = {
     ),
 }
 
+_INDEX = _option("FOLDER", "the index", Path, dest="folder")
+_CURVES = "Build, ask and check indices of the curves that mechanisms draw."
+_CURVES_ACTIONS: dict[str, tuple[str, *tuple[Option, ...]]] = {
+    "build": (
+        "Make an index of curves, or go on with one.",
+        _INDEX,
+        _option("--curves N", "curves of all shards together (default 1000000)", int, default=1_000_000),
+        _option("--links N", "numbers of links (default 4 6 8)", int, nargs="+", default=[4, 6, 8]),
+        _option("--sliders N", "most sliding joints of four-bars and six-bars (default 2)", int, default=2),
+        _option("--seed S", "of the draws (default 0)", int, default=0),
+        _SHARD,
+        _option("--workers K", "worker processes (default: all cores)", workers),
+        *_EXECUTOR,
+    ),
+    "find": (
+        "Find mechanisms whose curves are nearest to a wanted one.",
+        _INDEX,
+        _option("CURVE", "file of points, x and y on every line", Path, dest="curve"),
+        _option("--count N", "mechanisms to find (default 10)", int, default=10),
+        _option("--closed", "join the last point to the first"),
+        _option("-o --output FILE", "keep the best mechanism: FILE.toml, .json; or draw it: .svg, .png", Path),
+    ),
+    "verify": ("Compare the files of an index with their checksums.", _INDEX),
+}
+
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
@@ -220,10 +248,11 @@ def command_line() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
     for name in _VERBS:
         _add(verbs, name, _VERBS[name], _MODULES.get(name, name))
-    catalog = verbs.add_parser("catalog", help=_CATALOG, description=_CATALOG, allow_abbrev=False)
-    actions = catalog.add_subparsers(dest="action", required=True, metavar="ACTION")
-    for name in _ACTIONS:
-        _add(actions, name, _ACTIONS[name], "catalog")
+    for verb, summary, every in (("catalog", _CATALOG, _ACTIONS), ("curves", _CURVES, _CURVES_ACTIONS)):
+        own = verbs.add_parser(verb, help=summary, description=summary, allow_abbrev=False)
+        actions = own.add_subparsers(dest="action", required=True, metavar="ACTION")
+        for name in every:
+            _add(actions, name, every[name], verb)
     return parser
 
 

@@ -1,3 +1,5 @@
+from .curves.index import CurveIndex as CurveIndex
+from .curves.matches import CurveMatch as CurveMatch, CurveStart as CurveStart
 from .nine_points.linkages import PathLinkage as PathLinkage
 from .nine_points.proof import ProvedRoots as ProvedRoots
 from .nine_points.solutions import NinePointSolutions as NinePointSolutions, four_bars_through as four_bars_through

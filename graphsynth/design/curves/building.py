@@ -20,8 +20,8 @@ from graphsynth.design.curves.families import Family, families
 from graphsynth.design.curves.sampling import draw
 from graphsynth.design.curves.stored import MANIFEST, ColumnFile, columns, rows_of, seal
 
-#: Curves of a piece; mechanisms drawn at once; draws without a single curve after which a family is left.
-_PIECE, _BATCH, _VAIN = 2000, 128, 8
+#: Curves of a piece; fewest and most mechanisms drawn at once; draws without a curve after which a family is left.
+_PIECE, _LEAST, _BATCH, _VAIN = 2000, 8, 128, 8
 #: Share of the mechanisms with sliding joints among those of a number of links.
 _SLIDING = 1.0 / 3.0
 _JOURNAL = "building.jsonl"
@@ -47,7 +47,7 @@ def make_piece(piece: Piece) -> dict[str, NDArray[Any]]:
     found: list[dict[str, NDArray[Any]]] = []
     have, vain = 0, 0
     while have < piece.count and vain < _VAIN:
-        drawn = draw(piece.family, _BATCH, random)
+        drawn = draw(piece.family, min(_BATCH, max(_LEAST, piece.count - have)), random)
         vain = 0 if len(drawn.link) else vain + 1
         found.append(rows_of(drawn, piece.number, kinds))
         have += len(drawn.link)

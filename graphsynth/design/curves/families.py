@@ -61,7 +61,7 @@ class Family:
 
 
 def families(links: Sequence[int], sliders: int) -> list[Family]:
-    """Return all families of chains with these numbers of links, with up to so many sliding joints (none in eight-bars).
+    """Return all families with these numbers of links, with up to so many sliding joints (none in eight-bars).
 
     Examples
     --------

@@ -17,6 +17,8 @@ Complex = NDArray[np.complex128]
 
 #: Steps of Newton's method for the shift between two curves.
 _STEPS = 6
+#: Peaks of the correlation on the grid that may be the highest, over the highest there.
+_RIVAL = 0.9
 
 
 def orders(harmonics: int) -> NDArray[np.int64]:
@@ -39,16 +41,36 @@ def coefficients(points: Complex, closed: NDArray[np.bool_], harmonics: int) -> 
     period = np.where(closed[:, None], total, 2.0 * total)
     turn = np.exp(-2j * math.pi * at / period)
     ways = np.where(lengths > 0.0, sides / np.where(lengths > 0.0, lengths, 1.0), 0.0)
+    # the coefficient is a sum over the corners: the change of direction there, times a power of the corner's phase
+    none = np.zeros((len(points), 1))
+    bends = -np.diff(ways, axis=1, prepend=none, append=none)
     found = np.empty((len(points), 2 * harmonics), dtype=np.complex128)
     power = np.ones_like(turn)
     for k in range(1, harmonics + 1):
-        power = power * turn if k > 1 else turn
+        power = power * turn
         size = period[:, 0] / (2.0 * math.pi * k) ** 2
-        step = np.diff(power, axis=1)
-        forth, back = (ways * step).sum(axis=1), (ways * np.conj(step)).sum(axis=1)
+        forth, back = np.einsum("sn,sn->s", bends, power), np.einsum("sn,sn->s", bends, power.conj())
         both = forth + back
         found[:, harmonics + k - 1] = size * np.where(closed, forth, both)
         found[:, harmonics - k] = size * np.where(closed, back, both)
+    return found
+
+
+def halved(values: Complex, closed: NDArray[np.bool_], count: NDArray[np.int64]) -> Complex:
+    """Samples of curves (sets, n) with those half way between them, by cubics; what is behind ``count`` repeats.
+
+    Closed rows are periodic, open ones go on by the cubic through their last four samples.
+    """
+    row = np.arange(len(values))
+    z = np.concatenate([values[:, :1], values, values[:, -1:]], axis=1)
+    ends = (values[:, :4], np.stack([values[row, count - 1 - k] for k in range(4)], axis=1))
+    beyond = [part @ [4.0, -6.0, 4.0, -1.0] for part in ends]
+    z[:, 0] = np.where(closed, values[row, count - 2], beyond[0])
+    z[row, count + 1] = np.where(closed, values[:, 1], beyond[1])
+    found = np.repeat(values, 2, axis=1)[:, :-1]
+    middle = (9.0 * (z[:, 1:-2] + z[:, 2:-1]) - z[:, :-3] - z[:, 3:]) / 16.0
+    inside = np.arange(values.shape[1] - 1) < (count - 1)[:, None]
+    found[:, 1::2] = np.where(inside, middle, values[row, count - 1][:, None])
     return found
 
 
@@ -112,43 +134,58 @@ def variant(found: Complex, reflected: bool, backwards: bool) -> Complex:
 def aligned(wanted: Complex, found: Complex, closed: bool, fine: bool = False) -> Aligned:
     """Fit unit curves (sets, 2 harmonics) on a wanted unit curve by rotation, size, beginning, sense and reflection.
 
-    The distance is ``sqrt(1 - rho^2)`` with rho the largest size of the correlation; ``fine`` improves the shift by
-    Newton's method.
+    The distance is ``sqrt(1 - rho^2)`` with rho the largest size of the correlation.  ``fine``: every peak of the
+    correlation that may be the highest is climbed by Newton's method, and the distance is that of the curves.
     """
     half = wanted.shape[-1] // 2
     k = orders(half)
-    grid = 4 * 2 ** math.ceil(math.log2(half + 1)) if closed else 2
     best: Aligned | None = None
     for reflected in (False, True):
         for backwards in (False, True):
             if backwards and not closed:  # an open curve backwards begins at its other end: a shift by half a period
                 continue
-            products = np.conj(variant(found, reflected, backwards)) * wanted
-            if closed:
-                spread = np.zeros((len(products), grid), dtype=products.dtype)
-                spread[:, k % grid] = products
-                rho = np.abs(np.fft.fft(spread, axis=1)) ** 2
-            else:
-                rho = np.abs(np.stack([products.sum(axis=1), products @ (-1.0) ** k], axis=1)) ** 2
-            peak = rho.argmax(axis=1)
-            row = np.arange(len(rho))
-            tau = peak / grid
-            if closed:
-                before, at, after = rho[row, peak - 1], rho[row, peak], rho[row, (peak + 1) % grid]
-                bend = np.minimum(before - 2.0 * at + after, -1e-300)
-                tau = tau + 0.5 * (before - after) / bend / grid
-                if fine:
-                    tau = _summit(products, k, tau)
-            total = (products * np.exp(-2j * math.pi * k * tau[:, None])).sum(axis=1)
+            own = variant(found, reflected, backwards)
+            products = np.conj(own) * wanted
+            shift = _shifts(products, k, fine) if closed else _ends(products, k)
+            turned = np.exp(-2j * math.pi * k * shift[:, None])
+            total = (products * turned).sum(axis=1)
             error = np.sqrt(np.maximum(1.0 - np.abs(total) ** 2, 0.0))
-            own = Aligned(error, total, tau, np.full(len(rho), reflected), np.full(len(rho), backwards))
-            if best is None:
-                best = own
-            else:
-                better = own.error < best.error
-                best = Aligned(*(np.where(better, new, old) for new, old in zip(own, best)))
+            if fine:  # without the loss of digits where the curves are nearly the same
+                error = np.linalg.norm(wanted - total[:, None] * own * np.conj(turned), axis=1)
+            fit = Aligned(error, total, shift, np.full(len(error), reflected), np.full(len(error), backwards))
+            if best is not None:
+                better = fit.error < best.error
+                fit = Aligned(*(np.where(better, new, old) for new, old in zip(fit, best)))
+            best = fit
     assert best is not None
     return best
+
+
+def _ends(products: Complex, k: NDArray[np.int64]) -> Array:
+    """Shift of an open curve: 0, or 1/2, which begins at its other end."""
+    return np.where(np.abs(products @ (-1.0) ** k) > np.abs(products.sum(axis=1)), 0.5, 0.0)
+
+
+def _shifts(products: Complex, k: NDArray[np.int64], fine: bool) -> Array:
+    """Shifts at which the sums of products are largest, from a grid and the parabola through its highest peak."""
+    grid = 4 * 2 ** math.ceil(math.log2(len(k) // 2 + 1))
+    spread = np.zeros((len(products), grid), dtype=products.dtype)
+    spread[:, k % grid] = products
+    rho = np.abs(np.fft.fft(spread, axis=1)) ** 2
+    high = rho.max(axis=1, keepdims=True)
+    if fine:
+        peak = (rho >= np.roll(rho, 1, axis=1)) & (rho >= np.roll(rho, -1, axis=1)) & (rho >= _RIVAL * high)
+        row, at = np.nonzero(peak)
+    else:
+        row, at = np.arange(len(rho)), rho.argmax(axis=1)
+    before, here, after = rho[row, at - 1], rho[row, at], rho[row, (at + 1) % grid]
+    shift = (at + 0.5 * (before - after) / np.minimum(before - 2.0 * here + after, -1e-300)) / grid
+    if not fine:
+        return np.asarray(shift)
+    shift = _summit(products[row], k, shift)
+    height = np.abs((products[row] * np.exp(-2j * math.pi * k * shift[:, None])).sum(axis=1))
+    order = np.lexsort((-height, row))
+    return np.asarray(shift[order][np.searchsorted(row, np.arange(len(rho)))])
 
 
 def _summit(products: Complex, k: NDArray[np.int64], tau: Array) -> Array:

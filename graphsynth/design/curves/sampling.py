@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -95,17 +94,13 @@ def start_modes(family: Family, places: Array, numbers: Array) -> NDArray[np.int
     return found
 
 
-def move(
-    family: Family, bits: int, inputs: Array, places: Array, numbers: Array
-) -> tuple[Array, NDArray[np.int64]]:
+def move(family: Family, bits: int, inputs: Array, places: Array, numbers: Array) -> tuple[Array, NDArray[np.int64]]:
     """Poses x, y, cos, sin of all links (sets, n, links, 4) over inputs from 0, and how many inputs were reached."""
     design = family.design
     mechanism = design.mechanism(places[0], numbers[0])
     modes = {group: -1 if bits >> k & 1 else 1 for k, group in enumerate(_dyads(family))}
     rest = np.zeros((design.graph.links, 3))
-    motion = simulate_batch(
-        mechanism, inputs, design.dimensions(places, numbers), modes=modes, start=rest, rates=False
-    )
+    motion = simulate_batch(mechanism, inputs, design.dimensions(places, numbers), modes=modes, start=rest, rates=False)
     return motion.frames, motion.reached
 
 

@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import graphsynth
-from graphsynth.core.errors import FormatError
+from graphsynth.core.errors import FormatError, GraphError
 from graphsynth.core.wholefiles import replacing
 from graphsynth.design.curves.families import Family
-from graphsynth.design.curves.fourier import coefficients, uniform, unit
+from graphsynth.design.curves.fourier import coefficients, halved, uniform, unit
 from graphsynth.design.curves.sampling import Drawn
+from graphsynth.structure.graph import MechanismGraph
 
 FORMAT = "graphsynth-curves-1"
 MANIFEST = "manifest.json"
@@ -70,7 +71,7 @@ def rows_of(drawn: Drawn, family: int, kinds: dict[str, np.dtype[Any]]) -> dict[
     own["places"][:, : drawn.places.shape[1]] = drawn.places
     own["numbers"][:, : drawn.numbers.shape[1]] = drawn.numbers
     return {
-        "arc": packed(unit(coefficients(drawn.curves, drawn.closed, ARC))),
+        "arc": packed(unit(coefficients(halved(drawn.curves, drawn.closed, drawn.count), drawn.closed, ARC))),
         "timed": packed(unit(np.delete(timed, TIMED, axis=1))),
         "turn": packed(turn),
         "mechanism": own,
@@ -134,7 +135,9 @@ def seal(folder: Path, asked: dict[str, Any], own: list[Family], files: dict[str
         **asked,
         "rows": next(iter(files.values())).rows,
         "families": [[family.key, family.driven, list(family.sliders)] for family in own],
-        "columns": {name: {"sha256": digest(file.path), "bytes": file.path.stat().st_size} for name, file in files.items()},
+        "columns": {
+            name: {"sha256": digest(file.path), "bytes": file.path.stat().st_size} for name, file in files.items()
+        },
     }
     with replacing(folder / MANIFEST) as fresh:
         fresh.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
@@ -153,20 +156,33 @@ class Shard:
         return len(self.columns["mechanism"])
 
 
+def _family(key: str, driven: int, sliders: list[int]) -> Family:
+    """Read a family; ValueError for one that is none."""
+    own = Family(key, driven, tuple(sliders))
+    graph = MechanismGraph.from_key(key)
+    if graph.frame != 0 or not graph.neighbours[0] >> driven & 1 or not {*sliders} <= {*range(len(graph.joints))}:
+        raise ValueError
+    return own
+
+
 def opened(folder: Path) -> Shard:
     """Open a finished shard; `FormatError` for anything else."""
     path = folder / MANIFEST
     try:
         manifest = json.loads(path.read_bytes())
-        known, rows = manifest["format"] == FORMAT, int(manifest["rows"])
-        own = tuple(Family(str(key), int(driven), tuple(map(int, slid))) for key, driven, slid in manifest["families"])
+        if manifest["format"] != FORMAT:
+            raise FormatError(f"is of the format {manifest['format']!r}, not {FORMAT}; build the index anew", str(path))
+        rows, (i, m) = int(manifest["rows"]), map(int, manifest["shard"])
+        own = tuple(_family(*about) for about in manifest["families"])
         sizes = {name: int(about["bytes"]) for name, about in manifest["columns"].items()}
-        asked = manifest["asked"] if known else {}
-    except (ValueError, LookupError, TypeError, RecursionError) as error:
+        sums = [str(about["sha256"]) for about in manifest["columns"].values()]
+        kinds = columns(int(manifest["asked"]["joints"]), int(manifest["asked"]["numbers"]))
+        if not (own and len(sums) == len(kinds) and 1 <= i <= m):
+            raise ValueError
+    except (ValueError, LookupError, TypeError, RecursionError, GraphError, AttributeError) as error:
+        if isinstance(error, FormatError) and error.place == str(path):
+            raise
         raise FormatError("is not the manifest of an index of curves; build the index anew", str(path)) from error
-    if not known:
-        raise FormatError(f"is of the format {manifest['format']!r}, not {FORMAT}; build the index anew", str(path))
-    kinds = columns(int(asked["joints"]), int(asked["numbers"]))
     found = {}
     for name, kind in kinds.items():
         file = folder / f"{name}.npy"

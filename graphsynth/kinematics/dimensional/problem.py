@@ -64,10 +64,18 @@ class DimensionProblem:
 
     ``random`` shifts the sketch, so that repeated problems start from different ones.  Variant 0 has the assembly modes
     of the sketch, and drivers turn left.  With a target other curves matter too: bit 0 turns the drivers the other way,
-    bit k the mode of dyad k - 1 (only of mechanisms of dyads, which need no start pose).
+    bit k the mode of dyad k - 1 (only of mechanisms of dyads, which need no start pose).  ``begin``, places and further
+    numbers, takes the place of the sketch.
     """
 
-    def __init__(self, design: Design, goals: Goals, random: np.random.Generator, variant: int = 0) -> None:
+    def __init__(
+        self,
+        design: Design,
+        goals: Goals,
+        random: np.random.Generator,
+        variant: int = 0,
+        begin: tuple[Array, Array] | None = None,
+    ) -> None:
         self.design, self.goals, self.sense = design, goals, -1 if variant & 1 else 1
         sense = self.sense
         self.fit: TargetFit | None = None
@@ -82,9 +90,12 @@ class DimensionProblem:
         self.free = np.setdiff1d(np.arange(len(self.ends)), [*design.fixed, *design.centres])
         self.extras = 0 if self.fit is None else len(self.fit.ranges)
         self.size = 2 * len(self.free) + len(design.numbers) + self.extras
-        self.sketch = self._sketch(random)
-        angles = random.uniform(0.0, math.pi, len(design.numbers))
-        self.numbers = np.where([name == "angle" for _, name in design.numbers], angles, 0.0)
+        if begin is None:
+            self.sketch = self._sketch(random)
+            angles = random.uniform(0.0, math.pi, len(design.numbers))
+            self.numbers = np.where([name == "angle" for _, name in design.numbers], angles, 0.0)
+        else:
+            self.sketch, self.numbers = begin
         base = design.mechanism(self.sketch, self.numbers)
         self.base = Mechanism(
             base.graph,

@@ -1,0 +1,134 @@
+"""Curves of the index are found whatever is done to them; what is found draws what it says."""
+
+import math
+
+import numpy as np
+import pytest
+
+from graphsynth import simulate
+from graphsynth.core.errors import FormatError, GeometryError, SpecError
+from graphsynth.design import CurveIndex
+from graphsynth.design.curves.families import families
+from graphsynth.design.curves.matches import Entry
+from graphsynth.kinematics.dimensional.goals import Goals, PathGoal
+from graphsynth.kinematics.dimensional.problem import DimensionProblem
+from graphsynth.kinematics.dimensional.refine import refine
+from graphsynth.structure.assur import decompose
+
+
+def disturbed(entry: Entry, random: np.random.Generator) -> np.ndarray:
+    """The curve of an entry elsewhere, turned, reflected, larger or smaller, begun and run in another way."""
+    z = entry.traced().curve
+    if entry.closed:
+        z = np.roll(z[:-1], int(random.integers(len(z) - 1)))
+    z = z[::-1] if random.random() < 0.5 else z
+    z = np.conj(z) if random.random() < 0.5 else z
+    z = np.exp(random.normal() + 1j * random.uniform(0.0, 7.0)) * z + complex(*random.normal(size=2))
+    return np.column_stack([z.real, z.imag])
+
+
+def rows(index: CurveIndex, count: int, seed: int) -> list[int]:
+    return np.random.default_rng(seed).choice(len(index), count, replace=False).tolist()
+
+
+def test_curves_of_the_index_are_found(index: CurveIndex) -> None:
+    random = np.random.default_rng(1)
+    for number in rows(index, 40, 1):
+        entry = index.entry(number)
+        best = index.find(disturbed(entry, random), 1, closed=entry.closed)[0]
+        # it is the first unless another one is as near
+        assert best.number == number or best.error < 2e-3
+        assert best.error < 2e-3
+
+
+def test_what_is_found_draws_the_wanted_curve(index: CurveIndex) -> None:
+    random = np.random.default_rng(2)
+    seen = set()
+    for number in rows(index, 40, 2):
+        entry = index.entry(number)
+        wanted = disturbed(entry, random)
+        match = index.find(wanted, 1, closed=entry.closed)[0]
+        if match.number != number:
+            continue
+        seen.add((entry.closed, entry.family.turns, bool(entry.family.sliders)))
+        assert match.error < 1e-6
+        motion = simulate(match.mechanism, match.inputs, events=False)
+        assert motion.completed
+        drawn = motion.point("P").position @ [1.0, 1.0j]
+        z = wanted @ [1.0, 1.0j]
+        size = float(np.abs(z - z.mean()).max())
+        # begins where the wanted curve begins, runs as it runs, and never leaves it
+        assert abs(drawn[0] - z[0]) < 1e-5 * size
+        near = np.abs(drawn[:, None] - z).argmin(axis=1)
+        assert np.abs(drawn - z[near]).max() < 0.05 * size
+        quarter = len(drawn) // 8
+        along = np.abs(np.diff(drawn[: quarter + 1])).sum() / np.abs(np.diff(drawn)).sum()
+        own = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(z)))])
+        there = np.interp(along * (own[-1] + abs(z[-1] - z[0]) * entry.closed), own, z)
+        assert abs(there - drawn[quarter]) < 0.02 * size
+    assert len(seen) >= 4
+
+
+def test_the_nearest_are_those_of_brute_force(index: CurveIndex) -> None:
+    angles = np.linspace(0.0, math.tau, 200)
+    for curve in (
+        np.column_stack([2.0 * np.cos(angles), np.sin(angles) + 0.4 * np.cos(2.0 * angles)]),
+        np.column_stack([angles, 0.4 * np.sin(angles) ** 2]),
+    ):
+        some, every = (index.find(curve, 5, candidates=count) for count in (400, len(index)))
+        assert [match.number for match in some] == [match.number for match in every]
+        assert [match.error for match in every] == sorted(match.error for match in every)
+        assert len({match.number for match in every}) == 5
+
+
+def test_starts_begin_a_search(index: CurveIndex) -> None:
+    random = np.random.default_rng(5)
+    found = 0
+    for number in rows(index, 60, 5):
+        entry = index.entry(number)
+        if not entry.closed or entry.family.sliders:
+            continue
+        wanted = disturbed(entry, random)
+        start = index.starts(wanted, 1, closed=True)[0]
+        goals = Goals(math.tau, 0.0, 1e6, PathGoal(tuple(map(tuple, wanted[::16])), closed=True, link=start.link))
+        problem, x = start.problem(goals)
+        assert isinstance(problem, DimensionProblem)
+        refined = refine(problem, x[None], 3)
+        assert refined.error[0] < 1e-4
+        found += 1
+        if found == 5:
+            break
+    assert found == 5
+
+
+def test_every_family_is_there_once_and_larger_groups_too() -> None:
+    own = families([4, 6, 8], 2)
+    assert len(own) == len(set(own))
+    # published: 153 driven eight-bars, of which 84 hold a group larger than a dyad
+    eight = [family for family in own if family.design.graph.links == 8]
+    assert (len(eight), sum(not family.dyadic for family in eight)) == (153, 84)
+    for family in eight:
+        sizes = [len(group.links) for group in decompose(family.design.graph, family.design.drivers).groups]
+        assert family.dyadic == (max(sizes) == 2)
+    assert {family.turns for family in own if family.sliders} == {True, False}
+
+
+def test_bad_questions_are_answered_in_a_sentence(index: CurveIndex) -> None:
+    with pytest.raises(GeometryError, match="three or more points"):
+        index.find([(0.0, 0.0), (1.0, 0.0)])
+    with pytest.raises(GeometryError, match="the same"):
+        index.find([(1.0, 2.0)] * 4)
+    with pytest.raises(GeometryError, match="finite"):
+        index.find([(0.0, 0.0), (1.0, math.nan), (2.0, 0.0)])
+    with pytest.raises(GeometryError, match="count = 0"):
+        index.find([(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)], 0)
+    with pytest.raises(GeometryError, match="number = 3000"):
+        index.entry(3000)
+    with pytest.raises(SpecError, match="curves = 10"):
+        CurveIndex.build(index.folder, 10)
+    with pytest.raises(SpecError, match="links"):
+        CurveIndex.build(index.folder, 1000, links=[5])
+    with pytest.raises(SpecError, match="sliders 1"):
+        CurveIndex.build(index.folder, 3000, links=[4, 6], sliders=2)
+    with pytest.raises(FormatError, match="no finished index"):
+        CurveIndex(index.folder.parent)
