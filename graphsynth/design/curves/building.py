@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -113,22 +113,18 @@ def build(
     GraphsynthError
         A place that cannot be written; the same call goes on.
     """
-    curves, seed = whole(curves, "curves", 1000, 10**10), whole(seed, "seed", 0, 2**63)
-    sliders = whole(sliders, "sliders", 0, 2)
+    asked = _asked(curves, links, sliders, seed)
     i, m = (whole(number, "shard", 1, 10**6) for number in shard)
-    wanted = tuple(sorted({whole(count, "links", 4, 10) for count in links}))
-    if i > m or not wanted or any(count % 2 for count in wanted):
-        raise SpecError(f"shard {i}/{m} of links {wanted}: give shard i of m, i <= m, and links of 4, 6, 8 and 10")
+    if i > m:
+        raise SpecError(f"shard {i}/{m} is behind the last; give shard i of m with i <= m")
     check_executor(executor)
-    own = families(wanted, sliders)
-    every = pieces_of(own, curves, seed)
-    mine = every[i - 1 :: m]
-    asked = {"curves": curves, "links": list(wanted), "sliders": sliders, "seed": seed}
-    shape = {"joints": every[0].joints, "numbers": every[0].numbers}
+    own = families(asked["links"], asked["sliders"])
+    every = pieces_of(own, asked["curves"], asked["seed"])
+    asked |= {"joints": every[0].joints, "numbers": every[0].numbers}
     place = Path(folder) / f"shard-{i:06d}-of-{m:06d}"
     work = Work(
         "curves",
-        f"{curves} curves, links {', '.join(map(str, wanted))}, seed {seed}",
+        f"{curves} curves, links {', '.join(map(str, asked['links']))}, seed {seed}",
         digest_of(asked, i, m),
         remedy="give the same options, or name another folder",
         place="name another folder",
@@ -138,27 +134,53 @@ def build(
     with writing(place, work.place):
         place.mkdir(parents=True, exist_ok=True)
     if (place / MANIFEST).exists():
-        return _finished(place, {**asked, **shape})
+        return _finished(place, asked)
+    kinds = columns(asked["joints"], asked["numbers"])
     with Journal(place / _JOURNAL, work) as journal:
-        done, rows = len(journal.entries), sum(map(int, journal.entries))
+        _write(place, kinds, journal, every[i - 1 :: m], executor, watch)
         with writing(place, work.place):
-            kinds = columns(**shape)
-            files = {name: ColumnFile(place / f"{name}.npy", kind, rows) for name, kind in kinds.items()}
-        try:
-            for number, found in enumerate(in_order(executor, make_piece, mine[done:]), done + 1):
-                with writing(place, work.place):
-                    for name, file in files.items():
-                        file.append(found[name])
-                journal.append(str(len(found["mechanism"])))
-                if watch:
-                    watch(number, len(mine))
-            with writing(place, work.place):
-                seal(place, {"asked": {**asked, **shape}, "shard": [i, m]}, own, files)
-        finally:
-            for file in files.values():
-                file.close(False)
+            seal(place, {"asked": asked, "shard": [i, m]}, own, kinds)
         journal.remove()
     return place
+
+
+def _asked(curves: int, links: Sequence[int], sliders: int, seed: int) -> dict[str, Any]:
+    """Check what an index is asked to be."""
+    wanted = sorted({whole(count, "links", 4, 10) for count in links})
+    if not wanted or any(count % 2 for count in wanted):
+        raise SpecError(f"links = {wanted} must be some of 4, 6, 8 and 10")
+    return {
+        "curves": whole(curves, "curves", 1000, 10**10),
+        "links": wanted,
+        "sliders": whole(sliders, "sliders", 0, 2),
+        "seed": whole(seed, "seed", 0, 2**63),
+    }
+
+
+def _write(
+    place: Path,
+    kinds: dict[str, np.dtype[Any]],
+    journal: Journal,
+    mine: Sequence[Piece],
+    executor: Executor | None,
+    watch: Callable[[int, int], None] | None,
+) -> None:
+    """Draw the pieces that are not there yet, and write them behind the others."""
+    done, rows = len(journal.entries), sum(map(int, journal.entries))
+    with ExitStack() as stack:
+        with journal.writing(place):
+            files = {
+                name: stack.enter_context(ColumnFile(place / f"{name}.npy", kind, rows)) for name, kind in kinds.items()
+            }
+        for number, found in enumerate(in_order(executor, make_piece, mine[done:]), done + 1):
+            with journal.writing(place):
+                for name, file in files.items():
+                    file.append(found[name])
+            journal.append(str(len(found["mechanism"])))
+            if watch:
+                watch(number, len(mine))
+        for file in files.values():
+            file.finish()
 
 
 def _finished(place: Path, asked: dict[str, Any]) -> Path:

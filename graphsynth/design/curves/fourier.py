@@ -57,7 +57,7 @@ def coefficients(points: Complex, closed: NDArray[np.bool_], harmonics: int) -> 
 
 
 def halved(values: Complex, closed: NDArray[np.bool_], count: NDArray[np.int64]) -> Complex:
-    """Samples of curves (sets, n) with those half way between them, by cubics; what is behind ``count`` repeats.
+    """Return samples of curves (sets, n) with those half way between, by cubics; what is behind ``count`` repeats.
 
     Closed rows are periodic, open ones go on by the cubic through their last four samples.
     """

@@ -111,7 +111,10 @@ class CurveIndex:
                     )
 
     def entry(self, number: int) -> Entry:
-        """Return a row: a mechanism with its tracing point, as it was drawn."""
+        """Return a row: a mechanism with its tracing point, as it was drawn.
+
+        `GeometryError` for a row that does not exist, `FormatError` for one that is damaged.
+        """
         number = whole("number", number, 0, len(self) - 1)
         at = int(np.searchsorted(self._ends, number, side="right"))
         row = self.shards[at].columns["mechanism"][number - (self._ends[at] - len(self.shards[at]))]

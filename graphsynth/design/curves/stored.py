@@ -9,7 +9,7 @@ import json
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,11 +107,16 @@ class ColumnFile:
         self._stream.flush()
         self.rows += len(values)
 
-    def close(self, whole: bool) -> None:
-        """Let the file go; ``whole``: its head says how many rows there are."""
-        if whole:
-            self._stream.seek(0)
-            self._stream.write(self._header(self.rows))
+    def finish(self) -> None:
+        """Write into the head how many rows there are."""
+        self._stream.seek(0)
+        self._stream.write(self._header(self.rows))
+        self._stream.flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
         self._stream.close()
 
 
@@ -124,20 +129,17 @@ def digest(path: Path) -> str:
     return found.hexdigest()
 
 
-def seal(folder: Path, asked: dict[str, Any], own: list[Family], files: dict[str, ColumnFile]) -> None:
+def seal(folder: Path, about: dict[str, Any], own: list[Family], kinds: dict[str, np.dtype[Any]]) -> None:
     """Write the manifest of a finished shard."""
-    for file in files.values():
-        file.close(True)
+    files = {name: folder / f"{name}.npy" for name in kinds}
     document = {
         "format": FORMAT,
         "graphsynth": graphsynth.__version__,
         "licence": _LICENCE,
-        **asked,
-        "rows": next(iter(files.values())).rows,
+        **about,
+        "rows": len(np.load(files["mechanism"], mmap_mode="r", allow_pickle=False)),
         "families": [[family.key, family.driven, list(family.sliders)] for family in own],
-        "columns": {
-            name: {"sha256": digest(file.path), "bytes": file.path.stat().st_size} for name, file in files.items()
-        },
+        "columns": {name: {"sha256": digest(path), "bytes": path.stat().st_size} for name, path in files.items()},
     }
     with replacing(folder / MANIFEST) as fresh:
         fresh.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
