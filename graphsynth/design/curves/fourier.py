@@ -7,13 +7,15 @@ are a finite sum [Kuhl & Giardina 1982]; an open curve is run through there and 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+#: Of single or double precision.
+AnyComplex = NDArray[np.complexfloating[Any, Any]]
 
 #: Steps of Newton's method for the shift between two curves.
 _STEPS = 6
@@ -100,7 +102,7 @@ def unit(found: Complex) -> Complex:
     return np.asarray(found / np.where(norm > 0.0, norm, 1.0))
 
 
-def magnitudes(found: Complex, harmonics: int) -> Array:
+def magnitudes(found: AnyComplex, harmonics: int) -> Array:
     """Sizes of the coefficients of the first harmonics, of unit curves: no motion of a curve changes them.
 
     Running the curve backwards, or reflecting it, exchanges the sizes of k and -k.  The Euclidean distance of two
@@ -124,14 +126,14 @@ class Aligned(NamedTuple):
     backwards: NDArray[np.bool_]
 
 
-def variant(found: Complex, reflected: bool, backwards: bool) -> Complex:
+def variant(found: AnyComplex, reflected: bool, backwards: bool) -> AnyComplex:
     """Coefficients of the curve reflected in the x axis, and run backwards."""
     if reflected != backwards:
         found = found[..., ::-1]
     return np.conj(found) if reflected else found
 
 
-def aligned(wanted: Complex, found: Complex, closed: bool, fine: bool = False) -> Aligned:
+def aligned(wanted: AnyComplex, found: AnyComplex, closed: bool, fine: bool = False) -> Aligned:
     """Fit unit curves (sets, 2 harmonics) on a wanted unit curve by rotation, size, beginning, sense and reflection.
 
     The distance is ``sqrt(1 - rho^2)`` with rho the largest size of the correlation.  ``fine``: every peak of the
@@ -161,12 +163,12 @@ def aligned(wanted: Complex, found: Complex, closed: bool, fine: bool = False) -
     return best
 
 
-def _ends(products: Complex, k: NDArray[np.int64]) -> Array:
+def _ends(products: AnyComplex, k: NDArray[np.int64]) -> Array:
     """Shift of an open curve: 0, or 1/2, which begins at its other end."""
     return np.where(np.abs(products @ (-1.0) ** k) > np.abs(products.sum(axis=1)), 0.5, 0.0)
 
 
-def _shifts(products: Complex, k: NDArray[np.int64], fine: bool) -> Array:
+def _shifts(products: AnyComplex, k: NDArray[np.int64], fine: bool) -> Array:
     """Shifts at which the sums of products are largest, from a grid and the parabola through its highest peak."""
     grid = 4 * 2 ** math.ceil(math.log2(len(k) // 2 + 1))
     spread = np.zeros((len(products), grid), dtype=products.dtype)
@@ -188,7 +190,7 @@ def _shifts(products: Complex, k: NDArray[np.int64], fine: bool) -> Array:
     return np.asarray(shift[order][np.searchsorted(row, np.arange(len(rho)))])
 
 
-def _summit(products: Complex, k: NDArray[np.int64], tau: Array) -> Array:
+def _summit(products: AnyComplex, k: NDArray[np.int64], tau: Array) -> Array:
     """Improve the shifts at which the sum of products has its largest size, by Newton's method."""
     w = -2j * math.pi * k
     for _ in range(_STEPS):

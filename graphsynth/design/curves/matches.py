@@ -64,7 +64,7 @@ class Entry(NamedTuple):
     def frames(self, inputs: Array) -> Array:
         """Poses of all links over inputs from 0."""
         given = self.places[None], self.numbers[None]
-        return move(self.family, int(self.row["modes"]), inputs, *given)[0][0]
+        return np.asarray(move(self.family, int(self.row["modes"]), inputs, *given)[0][0])
 
     def traced(self) -> Traced:
         """Move the mechanism over its range, four times as fine as for the index."""

@@ -32,7 +32,7 @@ class Drawn(NamedTuple):
 
     ``places`` (curves, joints, 2) and ``numbers`` are those of a `Design`; ``point`` is the tracing point, where it is
     at the first input 0; the curve is drawn over the inputs from ``first`` to ``last``, with ``modes`` of the dyads as
-    bits.  A curve of fewer points repeats its last one; ``count`` tells how many it has; ``turns`` are
+    bits.  A curve of fewer points repeats its last one; ``samples`` tells how many it has; ``turns`` are
     the directions of the link there.
     """
 
@@ -44,7 +44,7 @@ class Drawn(NamedTuple):
     last: NDArray[np.float32]
     modes: NDArray[np.uint8]
     closed: NDArray[np.bool_]
-    count: NDArray[np.int64]
+    samples: NDArray[np.int64]
     curves: Complex
     turns: Complex
 
@@ -71,7 +71,7 @@ def _dimensions(family: Family, count: int, random: np.random.Generator) -> tupl
     sketch = layout(design.graph).positions
     places = sketch + random.normal(0.0, 1.0, (count, *sketch.shape)) * random.uniform(*_SHAKEN, (count, 1, 1))
     for joint, own in design.cranks:
-        size = np.exp(random.uniform(*np.log(_CRANKS), (count, 1)))
+        size = np.exp(random.uniform(math.log(_CRANKS[0]), math.log(_CRANKS[1]), (count, 1)))
         for k in own:
             if k != joint:
                 places[:, k] = places[:, joint] + size * (places[:, k] - places[:, joint])

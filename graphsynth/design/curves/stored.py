@@ -63,15 +63,15 @@ def unpacked(stored: NDArray[np.int16]) -> NDArray[np.complex64]:
 
 def rows_of(drawn: Drawn, family: int, kinds: dict[str, np.dtype[Any]]) -> dict[str, NDArray[Any]]:
     """Columns of drawn curves."""
-    timed = uniform(drawn.curves, drawn.closed, drawn.count, TIMED)
-    turn = uniform(drawn.turns, drawn.closed, drawn.count, TIMED)
+    timed = uniform(drawn.curves, drawn.closed, drawn.samples, TIMED)
+    turn = uniform(drawn.turns, drawn.closed, drawn.samples, TIMED)
     own = np.zeros(len(drawn.link), dtype=kinds["mechanism"])
     own["family"], own["link"], own["modes"], own["closed"] = family, drawn.link, drawn.modes, drawn.closed
     own["inputs"], own["point"] = np.stack([drawn.first, drawn.last], axis=1), drawn.point
     own["places"][:, : drawn.places.shape[1]] = drawn.places
     own["numbers"][:, : drawn.numbers.shape[1]] = drawn.numbers
     return {
-        "arc": packed(unit(coefficients(halved(drawn.curves, drawn.closed, drawn.count), drawn.closed, ARC))),
+        "arc": packed(unit(coefficients(halved(drawn.curves, drawn.closed, drawn.samples), drawn.closed, ARC))),
         "timed": packed(unit(np.delete(timed, TIMED, axis=1))),
         "turn": packed(turn),
         "mechanism": own,
