@@ -31,12 +31,15 @@ _GRID = 2.0**32
 _BATCH = 256
 #: A box of less probability is left as it is.
 _NOTHING = 1e-18
-#: A bound that falls no further than by this share, for so many rounds, is not worth more of them.
-_SAME, _STILL_ROUNDS = 0.98, 4
+#: A bound that falls no further than by this share, for so many rounds, while every box left has such a small side:
+#: what is left is as good as a surface.
+_SAME, _STILL_ROUNDS, _THIN = 0.98, 4, 2.0**-20
 _UNDECIDED = (
     " and no part was decided: the tolerances are too wide for it, or positions follow the lengths too fast (near a "
     "toggle); narrow them or the range of the input, or allow more seconds"
 )
+_NONE_PROVED = " and no member is proved to bind: allow more seconds, or narrow the widest tolerances"
+_TOUCHING = "the tolerances touch the limit of binding: members there are proved neither to bind nor to be free"
 _PIECE = Trapezoids(np.zeros(1), np.ones(1), np.ones(1), np.ones(1))
 #: Stands for a quantity that does not matter.
 _STILL = Bracket.of(_PIECE, _PIECE)
@@ -234,14 +237,12 @@ class Paver:
                 break
             if self.boxes >= self.max_boxes or process_time() - begin > self.seconds or len(boxes.lo) == 0:
                 reason = f"the limit of work was reached after {self.boxes} boxes"
-                reason += _UNDECIDED if (lower, upper) == (0.0, 1.0) else ""
+                reason += "" if lower > 0.0 else _UNDECIDED if upper == 1.0 else _NONE_PROVED
                 break
             still = still + 1 if lower == 0.0 and upper > _SAME * before and upper <= self.width else 0
             before = upper
-            if still >= _STILL_ROUNDS:
-                reason = (
-                    "the tolerances touch the limit of binding: members there are proved neither to bind nor to be free"
-                )
+            if still >= _STILL_ROUNDS and bool(((boxes.hi - boxes.lo).min(axis=1) < _THIN).all()):
+                reason = _TOUCHING
                 break
             boxes = self.refined(boxes)
         return Bounds(lower, upper, self.boxes, reason)

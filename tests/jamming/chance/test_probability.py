@@ -268,6 +268,33 @@ def test_any_margin_can_be_asked() -> None:
     assert found.lower <= np.pi / 4 <= found.upper and found.upper - found.lower <= 0.02
 
 
+class _Band(_Disc):
+    """A band of 2e-4 around a plane, known by its values alone: boxes must be smaller than that to lie inside."""
+
+    names = ("x", "y", "z")
+
+    def enclosed(self, x):  # type: ignore[no-untyped-def]
+        x, y, z = (part.value if isinstance(part, Dual) else part for part in x)
+        return abs(x + y + z - Interval("1.5")) - Interval("0.0001")
+
+
+class _Edge(_Disc):
+    """Distance from the lower edge of the square, to seven digits: it touches along all of the edge."""
+
+    def enclosed(self, x):  # type: ignore[no-untyped-def]
+        return x[1] + Interval.from_bounds(-1e-7, 1e-7)
+
+
+def test_a_search_that_is_too_short_does_not_say_that_tolerances_touch() -> None:
+    """The density of a sum of three uniform quantities is 3/4 in its middle: the band has a probability of 1.5e-4."""
+    cube = {name: D.uniform("[0, 1]") for name in _Band.names}
+    short = probability_of_jamming(_Band(), cube, width=1.0)
+    assert short.lower == 0.0 and 1.5e-4 < short.upper < 0.1
+    assert "limit of work" in short.reason and "no member is proved to bind" in short.reason
+    edge = probability_of_jamming(_Edge(), {"x": D.uniform("[0, 1]"), "y": D.uniform("[0, 1]")})
+    assert (edge.lower, edge.boxes < 200) == (0.0, True) and "touch the limit" in edge.reason
+
+
 class _Several(_Disc):
     """The least of three margins: a union of events, whose edges cross."""
 
