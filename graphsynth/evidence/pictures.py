@@ -14,6 +14,7 @@ from graphsynth.evidence.rows import FLOOR, Problem, Row, RowStatus
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
 #: Okabe and Ito's colours, told apart by colour-blind readers, and markers.
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa4499", "#56b4e9", "#b8860b", "#1b2733", "#7f7f7f", "#e66fb0")
@@ -140,25 +141,35 @@ _SPOTS = tuple(
 
 
 def _part(figure: Any, axes: Any, names: list[Any]) -> None:
-    """Move names of settings that overlap each other, a line or the edge to a free spot; drop those without one."""
+    """Move names of settings that overlap each other, a marker, a line or the edge to a free spot, or drop them."""
     from matplotlib.transforms import Bbox
 
     figure.draw_without_rendering()
     inside = axes.get_window_extent()
-    lines = [axes.transData.transform(line.get_xydata()) for line in axes.lines]
-    points = [at for own in lines for k in range(len(own)) for at in np.linspace(own[max(k - 1, 0)], own[k], 32)]
+    taken = np.concatenate([_taken(line, figure.dpi / 72.0) for line in axes.lines])
     kept: list[Any] = []
     for text in names:
         for offset, side in _SPOTS:
             text.set(ha=side, position=offset)
             box = text.get_window_extent()
             within = inside.x0 <= box.x0 and box.x1 <= figure.bbox.x1 and inside.y0 <= box.y0 and box.y1 <= inside.y1
-            free = not any(box.overlaps(other) for other in kept) and not any(box.contains(*at) for at in points)
+            gap = np.maximum(np.maximum(box.min - taken[:, :2], taken[:, :2] - box.max), 0.0)
+            free = not any(box.overlaps(other) for other in kept) and bool((np.hypot(*gap.T) > taken[:, 2]).all())
             if within and free:
                 kept.append(Bbox(box.padded(1.0)))
                 break
         else:
             text.set_visible(False)
+
+
+def _taken(line: Any, scale: float) -> NDArray[np.float64]:
+    """Return discs (N, 3) of places and radii, in pixels, that cover a line and its markers."""
+    at = line.get_transform().transform(line.get_xydata()).reshape(-1, 2)
+    marked = line.get_marker() not in ("", "None", None)
+    size = 0.5 * (line.get_markersize() + line.get_markeredgewidth()) if marked else 0.0
+    along = [point for k in range(1, len(at)) for point in np.linspace(at[k - 1], at[k], 32)]
+    places = np.concatenate([at, np.reshape(along, (-1, 2))])
+    return np.column_stack([places, np.where(np.arange(len(places)) < len(at), size * scale, 0.0)])
 
 
 def _dress(axes: Any, problem: Problem, top: float) -> None:

@@ -192,6 +192,23 @@ def test_failures_are_drawn_above_everything_that_has_an_error():
     assert np.asarray(lines[0].get_ydata()).min() > 0.0  # an error of zero is drawn at rounding size
 
 
+def test_names_of_settings_keep_off_markers():
+    """The end of one line lies among the markers of another, an eighth of an inch apart."""
+    ends = [("a", 6.6e-4, 2.9e-4), ("a", 0.0109, 2.9e-5), ("a", 0.149, 2.9e-6)]
+    ends += [("b", 0.131, 7.2e-3), ("b", 0.216, 1.3e-4), ("b", 0.175, 1.6e-5), ("b", 0.16, 2e-6)]
+    rows = [Row(name, f"step {error:.0e} s", error, time, 3, "distance", "") for name, time, error in ends]
+    rows.append(Row("b", "", 1.4e-5, 0.158, 3, "distance", "", RowStatus.UNRELIABLE, "a lie"))
+    figure = work_precision_picture(Problem("near", "Names beside markers", "mm", tuple(rows)))
+    (axes,) = figure.axes
+    figure.draw_without_rendering()
+    names = [text.get_window_extent() for text in axes.texts if text.get_visible()]
+    assert len(names) == 4
+    for line in axes.lines:
+        for at in axes.transData.transform(line.get_xydata()).reshape(-1, 2):
+            gaps = [np.hypot(*np.maximum(np.maximum(box.min - at, at - box.max), 0.0)) for box in names]
+            assert min(gaps) > 0.5 * line.get_markersize() * figure.dpi / 72.0
+
+
 def test_nothing_to_draw():
     with pytest.raises(SpecError, match="no rows"):
         work_precision_picture(Problem("p", "q", "mm", ()))

@@ -295,6 +295,23 @@ def test_a_search_that_is_too_short_does_not_say_that_tolerances_touch() -> None
     assert (edge.lower, edge.boxes < 200) == (0.0, True) and "touch the limit" in edge.reason
 
 
+class _Cap(_Disc):
+    """Binds in a corner of the square around the unit disc."""
+
+    def enclosed(self, x):  # type: ignore[no-untyped-def]
+        return Interval("1.2") - x[0] - x[1]
+
+
+def test_a_hole_in_its_disc_lies_within_what_its_square_bounds() -> None:
+    """The cap of a disc against the corner of its square (theory/probability-of-coupled-joints 1)."""
+    found = probability_of_jamming(_Cap(), {name: D.uniform("[-1, 1]") for name in "xy"}, width=1e-6)
+    distance = 0.6 * np.sqrt(2.0)
+    cap = (np.arccos(distance) - distance * np.sqrt(1.0 - distance**2)) / np.pi
+    more = 4.0 / np.pi
+    assert cap < found.lower <= 0.08 <= found.upper
+    assert 1.0 - more * (1.0 - found.lower) <= cap <= more * found.upper
+
+
 class _Several(_Disc):
     """The least of three margins: a union of events, whose edges cross."""
 
