@@ -14,7 +14,6 @@ from graphsynth.evidence.rows import FLOOR, Problem, Row, RowStatus
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
 #: Okabe and Ito's colours, told apart by colour-blind readers, and markers.
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa4499", "#56b4e9", "#b8860b", "#1b2733", "#7f7f7f", "#e66fb0")
@@ -128,9 +127,8 @@ def _method(
     # the settings at the first and the last point of a line, where no other text stands
     for k in sorted({0, len(good) - 1}) if good else ():
         if good[k].setting:
-            spot = {"textcoords": "offset points", "fontsize": 7, "color": colour, "ha": "left"}
-            offset = (5, -10 if k > 0 or len(rows) == 1 else 6)
-            names.append(axes.annotate(good[k].setting, places[k], offset, **spot))
+            spot = {"textcoords": "offset points", "fontsize": 7, "color": colour}
+            names.append(axes.annotate(good[k].setting, places[k], (6, 6), **spot))
 
 
 #: Where the name of a setting may stand beside its marker, in points: offset and alignment, the best first.
@@ -142,34 +140,27 @@ _SPOTS = tuple(
 
 def _part(figure: Any, axes: Any, names: list[Any]) -> None:
     """Move names of settings that overlap each other, a marker, a line or the edge to a free spot, or drop them."""
-    from matplotlib.transforms import Bbox
-
     figure.draw_without_rendering()
     inside = axes.get_window_extent()
-    taken = np.concatenate([_taken(line, figure.dpi / 72.0) for line in axes.lines])
+    taken: list[Any] = []  # points of lines, and how far a marker reaches from them
+    for line in axes.lines:
+        own = line.get_transform().transform(line.get_xydata())
+        reach = 0.5 * (line.get_markersize() + line.get_markeredgewidth()) * figure.dpi / 72.0
+        for k in range(len(own)):
+            taken += [(*at, reach) for at in np.linspace(own[max(k - 1, 0)], own[k], 32)]
+    x, y, reaches = np.transpose(taken)
     kept: list[Any] = []
     for text in names:
         for offset, side in _SPOTS:
             text.set(ha=side, position=offset)
             box = text.get_window_extent()
             within = inside.x0 <= box.x0 and box.x1 <= figure.bbox.x1 and inside.y0 <= box.y0 and box.y1 <= inside.y1
-            gap = np.maximum(np.maximum(box.min - taken[:, :2], taken[:, :2] - box.max), 0.0)
-            free = not any(box.overlaps(other) for other in kept) and bool((np.hypot(*gap.T) > taken[:, 2]).all())
-            if within and free:
-                kept.append(Bbox(box.padded(1.0)))
+            gaps = np.hypot(x - np.clip(x, box.x0, box.x1), y - np.clip(y, box.y0, box.y1))
+            if within and not any(box.overlaps(other) for other in kept) and (gaps > reaches).all():
+                kept.append(box.padded(1.0))
                 break
         else:
             text.set_visible(False)
-
-
-def _taken(line: Any, scale: float) -> NDArray[np.float64]:
-    """Return discs (N, 3) of places and radii, in pixels, that cover a line and its markers."""
-    at = line.get_transform().transform(line.get_xydata()).reshape(-1, 2)
-    marked = line.get_marker() not in ("", "None", None)
-    size = 0.5 * (line.get_markersize() + line.get_markeredgewidth()) if marked else 0.0
-    along = [point for k in range(1, len(at)) for point in np.linspace(at[k - 1], at[k], 32)]
-    places = np.concatenate([at, np.reshape(along, (-1, 2))])
-    return np.column_stack([places, np.where(np.arange(len(places)) < len(at), size * scale, 0.0)])
 
 
 def _dress(axes: Any, problem: Problem, top: float) -> None:
@@ -192,6 +183,5 @@ def _dress(axes: Any, problem: Problem, top: float) -> None:
     _decades(axes, "y", 3.0)
     axes.grid(which="major", color=LIGHT["pale"], lw=0.8)
     axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
