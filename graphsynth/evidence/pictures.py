@@ -146,8 +146,7 @@ def _part(figure: Any, axes: Any, names: list[Any]) -> None:
     for line in axes.lines:
         own = line.get_transform().transform(line.get_xydata())
         reach = 0.5 * (line.get_markersize() + line.get_markeredgewidth()) * figure.dpi / 72.0
-        for k in range(len(own)):
-            taken += [(*at, reach) for at in np.linspace(own[max(k - 1, 0)], own[k], 32)]
+        taken += [(*at, reach) for k in range(len(own)) for at in np.linspace(own[max(k - 1, 0)], own[k], 32)]
     x, y, reaches = np.transpose(taken)
     kept: list[Any] = []
     for text in names:

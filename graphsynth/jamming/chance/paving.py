@@ -31,8 +31,7 @@ _GRID = 2.0**32
 _BATCH = 256
 #: A box of less probability is left as it is.
 _NOTHING = 1e-18
-#: A bound that falls no further than by this share, for so many rounds, while every box left has such a small side:
-#: what is left is as good as a surface.
+#: A bound that falls no further than by this share, for so many rounds, while boxes have sides below that: a surface.
 _SAME, _STILL_ROUNDS, _THIN = 0.98, 4, 2.0**-20
 _UNDECIDED = (
     " and no part was decided: the tolerances are too wide for it, or positions follow the lengths too fast (near a "
