@@ -257,8 +257,8 @@ def assess_jamming(
         ``tolerances``, one relative number for all lengths (0), or tolerances of parts (`graphsynth.tolerances`), where
         fits may stand for ``joints``; ``seconds``, the time of the proof (20).
         ``model``: "small" (L1), or "exact", which closes every loop in space with finite tilts and is slower
-        (theory/closure-in-space); verdict and tables are then about that, every sample takes some 0.1 s, and
-        ``tolerances`` are not yet for it.  With small tilts the report states the error of its figures.
+        (theory/closure-in-space); verdict and tables are then about that, and every sample takes some 0.1 s.  With
+        small tilts the report states the error of its figures.
 
     Returns
     -------

@@ -23,9 +23,10 @@ from graphsynth.intervals.reading import shortened
 from graphsynth.jamming.assembly.tubes import joined, shortest_reach
 from graphsynth.jamming.joints.limits import Limits, Misalignment, bounds
 from graphsynth.jamming.joints.pieces import PARTS, Found, Work, cut
-from graphsynth.jamming.joints.program import problem
+from graphsynth.jamming.joints.program import JointProblem, problem
 
 if TYPE_CHECKING:
+    from graphsynth.jamming.assembly.positions import Positions
     from graphsynth.mechanism.model import Mechanism
 
 
@@ -187,8 +188,8 @@ def _with_peak(work: Work, pieces: Found) -> Found:
     return Found.join([pieces.take(rest), before, after, points.take(top)])
 
 
-#: Directions tried over the range of each.
-_DIRECTIONS = 9
+#: Directions tried over the range of each; relative width of a range that only encloses a number.
+_DIRECTIONS, _ROUNDING = 9, 1e-12
 
 
 def _deviations(values: Iterable[tuple[str, float]]) -> list[str]:
@@ -232,13 +233,18 @@ class MemberWitness:
         }
 
     @property
-    def sentence(self) -> str:
-        """What is proved."""
+    def named(self) -> str:
+        """The member in words."""
         tilts = [f"alpha = {m.alpha:.9g} at {m.direction:.9g} rad" for m in self.misalignments]
         named = _deviations(self.deviations)
         named += [f"{name} = {value:.12g}" for name, value in self.chosen_limits]
+        return f"a member of the tolerance boxes ({', '.join(tilts + named)})"
+
+    @property
+    def sentence(self) -> str:
+        """What is proved."""
         return (
-            f"a member of the tolerance boxes ({', '.join(tilts + named)}) binds at the input {self.input!r}, proved"
+            f"{self.named} binds at the input {self.input!r}, proved"
             f"{'' if self.exact else ' with small tilts (first order) only'}: its limits would "
             f"have to be {shortened(self.factor, -1, 9)} times as large or more with small tilts"
         )
@@ -246,14 +252,18 @@ class MemberWitness:
 
 def unclosed_member(work: Work, pieces: Found) -> str:
     """Name a member that cannot be assembled in a piece without proved positions, or return an empty text."""
-    u = np.unique(0.5 * (pieces.lo + pieces.hi)[~pieces.proved])
-    if u.size == 0 or work.box.size == 0 or not work.system.dyads:
+    return unclosed_at(work.system, np.unique(0.5 * (pieces.lo + pieces.hi)[~pieces.proved]))
+
+
+def unclosed_at(system: Positions, u: Array) -> str:
+    """Name a member that cannot be assembled at one of the inputs (N,), or return an empty text."""
+    if u.size == 0 or system.box.size == 0 or not system.dyads:
         return ""
-    p, room = shortest_reach(work.system, u)
+    p, room = shortest_reach(system, u)
     at = int(np.argmin(room))
     if not room[at] < 0.0:
         return ""
-    named = ", ".join(_deviations(zip(work.box.names, p[at].tolist())))
+    named = ", ".join(_deviations(zip(system.box.names, p[at].tolist())))
     return f"the member ({named}) cannot be assembled at the input {float(u[at])!r}, proved"
 
 
@@ -266,17 +276,11 @@ def jamming_member(work: Work, pieces: Found, own: Mask) -> MemberWitness | None
             return found
     left = np.flatnonzero(own & (pieces.upper > 1.0))
     boxes = [bounds(tilt, name) for tilt in work.given.misalignments for name in ("alpha", "direction")]
-    lows = []
-    for limit in work.given.limits:
-        ranges = {name: bounds(limit, name) for name in (*limit.tilts, "axial_clearance")}
-        boxes += ranges.values()
-        # so far above the low end that it is inside whatever enclosed a critical tilt
-        least: dict[str, Any] = {name: min(low * (1.0 + 1e-9), high) for name, (low, high) in ranges.items()}
-        lows.append(type(limit)(**least))
+    boxes += [bounds(own, name) for own in work.given.limits for name in (*own.tilts, "axial_clearance")]
     if left.size == 0 or not (work.box.size or any(low < high for low, high in boxes)):
         return None
     tilts = tuple(tilt.sharp() for tilt in work.given.misalignments)
-    member = _member(work, np.zeros(work.box.size), tuple(lows), tilts)
+    member = _member(work, np.zeros(work.box.size), lowest(work.given.limits), tilts)
     at = peak_inputs(member, pieces, left)
     # dimensions last: their corner depends on which way the axes are tilted
     member = _worst_tilts(work, member, at)
@@ -310,14 +314,30 @@ def _of_a_piece(work: Work, pieces: Found, row: int) -> MemberWitness | None:
 
 def _named(work: Work, member: Work, p: Array, at: tuple[float, float], exact: bool = True) -> MemberWitness:
     """Return the member with names for what the tolerances leave open; ``at`` are the input and the factor there."""
-    given, limits = member.given, []
-    for joint, limit, own in zip(work.given.mechanism.joints, work.given.limits, given.limits):
+    given = member.given
+    named = tuple(zip(work.box.names, p.tolist())), limits_chosen(work.given, given.limits)
+    return MemberWitness(*at, given.misalignments, given.limits, given.mechanism, exact, *named)
+
+
+def limits_chosen(given: JointProblem, limits: tuple[Limits, ...]) -> tuple[tuple[str, float], ...]:
+    """Return names and values of the limits that a problem leaves a range, wider than what encloses one number."""
+    found = []
+    for joint, limit, own in zip(given.mechanism.joints, given.limits, limits):
         for name in (*limit.tilts, "axial_clearance"):
             low, high = bounds(limit, name)
-            if low < high:
-                limits.append((f"{name.replace('_', ' ')} of joint {joint.a}-{joint.b}", getattr(own, name)))
-    named = tuple(zip(work.box.names, p.tolist())), tuple(limits)
-    return MemberWitness(*at, given.misalignments, given.limits, given.mechanism, exact, *named)
+            if high - low > _ROUNDING * high:
+                found.append((f"{name.replace('_', ' ')} of joint {joint.a}-{joint.b}", getattr(own, name)))
+    return tuple(found)
+
+
+def lowest(limits: tuple[Limits, ...]) -> tuple[Limits, ...]:
+    """Return limits at the low ends of their ranges, a little above where those only enclose a critical tilt."""
+    found = []
+    for limit in limits:
+        ranges = {name: bounds(limit, name) for name in (*limit.tilts, "axial_clearance")}
+        least: dict[str, Any] = {name: min(low * (1.0 + 1e-9), high) for name, (low, high) in ranges.items()}
+        found.append(type(limit)(**least))
+    return tuple(found)
 
 
 def _in_a_piece(pieces: Found, own: Mask, at: Array, p: Array, points: Found) -> Mask:
@@ -331,21 +351,22 @@ def _in_a_piece(pieces: Found, own: Mask, at: Array, p: Array, points: Found) ->
     return found
 
 
-def _table(work: Work, limits: tuple[Limits, ...], tilts: tuple[Misalignment, ...]) -> dict[tuple[int, int], Limits]:
+def sharp_problem(mechanism: Mechanism, limits: tuple[Limits, ...], tilts: tuple[Misalignment, ...]) -> JointProblem:
+    """Put one member together, its limits in the order of the joints."""
     rigid = {tilt.pair for tilt in tilts if tilt.rigid}
-    return {joint.pair: own for joint, own in zip(work.given.mechanism.joints, limits) if joint.pair not in rigid}
+    table = {joint.pair: own for joint, own in zip(mechanism.joints, limits) if joint.pair not in rigid}
+    return problem(mechanism, table, tilts)
 
 
 def _proving(work: Work, limits: tuple[Limits, ...], tilts: tuple[Misalignment, ...]) -> Work:
     """Work of the same box of parameters with sharp limits and misalignments."""
-    given = problem(work.given.mechanism, _table(work, limits, tilts), tilts)
-    return Work(given, work.motion, work.box)
+    return Work(sharp_problem(work.given.mechanism, limits, tilts), work.motion, work.box)
 
 
 def _member(work: Work, p: Array, limits: tuple[Limits, ...], tilts: tuple[Misalignment, ...]) -> Work:
     """Work of one member of the box of parameters, from the start of the motion: to look for what binds."""
     mechanism = work.box.member(work.given.mechanism, p) if p.any() else work.given.mechanism
-    given = problem(mechanism, _table(work, limits, tilts), tilts)
+    given = sharp_problem(mechanism, limits, tilts)
     return Work(given, replace(work.motion, mechanism=mechanism), 0.0)
 
 

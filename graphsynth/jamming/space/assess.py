@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.assess import CoupledReport, Sensitivity, assess_coupled
+from graphsynth.jamming.joints.drawing import Tolerances, drawn
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.program import Bearings, JointProblem, problem
 from graphsynth.jamming.space.along import NOTHING, Along, Least
@@ -39,26 +39,25 @@ def assess_in_space(
     *,
     condition: Condition = "A",
     certify: bool = True,
-    tolerances: Any = 0.0,
+    tolerances: Tolerances = 0.0,
     seconds: float = 20.0,
 ) -> CoupledReport:
     """Assess a motion with every loop closed in space.
 
     The tables are those of small tilts, filled anew: ``factor`` is the least one on all limits and plays together,
     ``duality_gap`` what the shadow prices miss of their sum, 1; ``allowed_scale`` is solved for where it is smallest,
-    and follows from its slope elsewhere.  All are estimated; the verdict is proved if ``certify``.
+    and follows from its slope elsewhere.  All are estimated, and of the nominal mechanism; the verdict is proved if
+    ``certify``, for all members of the tolerance boxes.
     """
-    if bearings is None or not isinstance(tolerances, int | float) or tolerances:
-        raise GeometryError(
-            f'tolerances = {tolerances}: model="exact" assesses sharp lengths and given limits of joints; '
-            'leave them out, or give model="small"'
-        )
     begin = perf_counter()
-    report = assess_coupled(motion, bearings, tilts, condition=condition)
+    tilts = tuple(tilts) if isinstance(tilts, Iterable) else (tilts,)
+    tolerances = tuple(tolerances) if isinstance(tolerances, Iterable) else tolerances
+    limits, axes, _ = drawn(motion.mechanism, bearings, tilts, tolerances)
+    report = assess_coupled(motion, limits, axes, condition=condition)
     if report.verdict is Verdict.CANNOT_ASSEMBLE:
         return report
     try:
-        along = Along(problem(motion.mechanism, bearings, tilts, condition), motion)
+        along = Along(problem(motion.mechanism, limits, axes, condition), motion)
     except Unsupported as error:
         return replace(report, verdict=Verdict.UNDECIDED, reason=str(error), seconds=perf_counter() - begin)
     report = _tabled(report, along)
@@ -66,7 +65,8 @@ def assess_in_space(
         return replace(report, seconds=perf_counter() - begin)
     if len(along.keep) < 2:
         return replace(report, verdict=Verdict.UNDECIDED, reason="a proof needs a range of inputs, two samples or more")
-    proof = certify_in_space(motion, bearings, tilts, condition=condition, seconds=seconds)
+    options: Any = {"condition": condition, "tolerances": tolerances, "seconds": seconds}
+    proof = certify_in_space(motion, bearings, tilts, **options)
     return replace(
         report, verdict=proof.verdict, reason=proof.reason, certificate=proof, seconds=perf_counter() - begin
     )

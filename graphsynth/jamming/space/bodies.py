@@ -4,7 +4,7 @@ The rotation of a link is ``T(x) Rz(spin)`` from a reference, so every joint see
 the places add up and no rotations are multiplied.  Links behind a joint that cannot tilt share its axis and turn about
 it.  All conditions are necessary ones, which is what a proof of binding needs:
 
-* round every loop ``sum R_i d_i + sum e R_i s = 0`` with shifts and slides e along directions s of link i,
+* round every loop ``sum R_i d_i + sum e R_i s = 0`` with shifts, slides and parameters e along directions s of link i,
 * of a joint with a limit t the axes, ``cos t - axis_a . axis_b <= 0``,
 * of a driven joint that tilts, no turn but the given one.
 
@@ -122,7 +122,7 @@ class Bodies:
             for own in model.column[k, SHIFT_X : SLIDE + 1]:
                 if own >= 0:
                     self.slides[int(own)] = self._new()
-        self.width = self.size + len(given)
+        self.width = self.size + len(given) + model.parameters
         self.bodies = [self._numbered(body) for body in self.bodies]
         self.conditions = self._conditions()
 
@@ -271,7 +271,10 @@ class Bodies:
             joint = self.model.joints[k]
             link = joint.b if forward else joint.a
             p, q = self.model.seats[k][1 if forward else 0][1], self.model.seats[after][0 if onward else 1][1]
-            terms.append(Term(equation, int(self.of_link[link]), ball(q - p), -1))
+            own = int(self.of_link[link])
+            terms.append(Term(equation, own, ball(q - p), -1))
+            for number, moved_by in self.model.moves((k, forward), (after, onward)):
+                terms.append(Term(equation, own, ball(moved_by), self.width - self.model.parameters + number))
             a, A = self._sides(k)[0]
             for axis, own in enumerate(self.model.column[k, SHIFT_X : SLIDE + 1]):
                 if own >= 0:

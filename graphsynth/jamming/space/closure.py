@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals import Interval
 from graphsynth.intervals.balls import Balls, exact, stack, unit
-from graphsynth.jamming.space.model import SHIFT_X, SLIDE, TILT_X, TILT_Y, TURN, SpaceModel
+from graphsynth.jamming.space.model import SHIFT_X, SLIDE, TILT_X, TILT_Y, TURN, SpaceModel, Step
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -116,8 +116,9 @@ def tilt_rates(x: Any, y: Any, xx: Any, yy: Any) -> tuple[Any, list[Any], list[A
 class Loop(NamedTuple):
     """A loop at N points: rotation (N, 3, 3) and place (N, 3) of X, and twists (N, k, 3) of its k unknowns.
 
-    ``columns`` (k,) are the numbers of the unknowns, ``order`` (k,) their places along the loop, alike for tilts of one
-    joint; ``bends`` are pairs of places and the twists (N, pairs, 3) by which tilts of one joint change.
+    ``columns`` are the numbers of the unknowns, ``order`` (k,) their places along the loop, alike for tilts of one
+    joint; ``bends`` are pairs of places and the twists (N, pairs, 3) by which tilts of one joint change.  ``gather``
+    (k, columns) adds up what belongs to one column, where a parameter is met more than once.
     """
 
     R: Any
@@ -127,6 +128,7 @@ class Loop(NamedTuple):
     columns: Ints
     order: Ints
     bends: tuple[Ints, Any, Any]
+    gather: Array | None = None
 
     @property
     def values(self) -> Any:
@@ -143,6 +145,12 @@ class Loop(NamedTuple):
         move = v - cross(self.t[..., None, :], omega)
         return _joined([*(turn[..., i] for i in range(3)), *(move[..., i] for i in range(3))])
 
+    @property
+    def rates(self) -> Any:
+        """Derivatives of the six left sides by the columns, (N, 6, columns)."""
+        found = swapped(self.slopes(self.omega, self.v))
+        return found if self.gather is None else times(found, self.gather)
+
     def repeated(self) -> Loop:
         """Return the loop with an axis for several rows of multipliers."""
         R, t, omega, v = (part[:, None] for part in (self.R, self.t, self.omega, self.v))
@@ -150,7 +158,7 @@ class Loop(NamedTuple):
         return self._replace(R=R, t=t, omega=omega, v=v, bends=(pairs, turned[:, None], pushed[:, None]))
 
     def bend(self, by: Any) -> Any:
-        """Second derivative of the left sides weighed by multipliers (N, 6), shape (N, k, k)."""
+        """Second derivative of the left sides weighed by multipliers (N, 6), shape (N, columns, columns)."""
         r, p = by[..., :3], by[..., 3:]
         hat = joined_rows([[sum_of(_HAT[:, i, j], r) for j in range(3)] for i in range(3)])
         G = 0.5 * times(self.R, swapped(hat))
@@ -173,7 +181,7 @@ class Loop(NamedTuple):
             for part, own in zip(more, (value.mid, value.rad) if isinstance(value, Balls) else (value,)):
                 part[..., pairs[:, 0], pairs[:, 1]] = own
             B = B + (Balls(*more) if isinstance(B, Balls) else more[0])
-        return B
+        return B if self.gather is None else times(swapped(times(B, self.gather)), self.gather)
 
 
 def sum_of(weights: Array, parts: Any) -> Any:
@@ -188,8 +196,16 @@ def _mixed(mask: NDArray[np.bool_], a: Any, b: Any) -> Any:
     return np.where(mask, a, b)
 
 
+class _Moves(NamedTuple):
+    """Parameters that move the place of the joint after some steps of a loop: steps, columns, vectors (moves, 3)."""
+
+    steps: Ints
+    columns: Ints
+    vectors: Any
+
+
 class _Plan(NamedTuple):
-    """What of a loop does not change: joints (m,), signs, which unknowns, constant motions between joints."""
+    """What of a loop does not change: joints (m,), signs, which unknowns, motions between joints."""
 
     joints: Ints
     sign: Array
@@ -199,6 +215,8 @@ class _Plan(NamedTuple):
     bends: tuple[Ints, Ints, Ints]
     rotation: Any
     place: Any
+    moves: _Moves | None
+    gather: Array | None
 
 
 class Closure:
@@ -219,7 +237,7 @@ class Closure:
         table = self.model.column[joints]
         # along the loop: shift, tilt, turn of a joint, or back
         stage = np.array([2, 1, 1, 0, 0, 0])
-        along = 3 * np.arange(len(steps))[:, None] + np.where(sign[:, None] > 0, stage, 2 - stage)
+        along = 4 * np.arange(len(steps))[:, None] + np.where(sign[:, None] > 0, stage, 2 - stage)
         chosen = np.nonzero(table >= 0)
         order = along[chosen]
         place = np.full(table.shape, -1)
@@ -234,13 +252,39 @@ class Closure:
                     at += [m] * (1 + (i != j))
                     kind += [k] * (1 + (i != j))
         constants: list[Any] = [Interval.stack([getattr(s, name) for s in steps]) for name in ("rotation", "place")]
-        constants = [ball(part) if self.exact else part.mid for part in constants]
+        turn, way = (ball(part) if self.exact else part.mid for part in constants)
         bends = (
             np.array(pairs, dtype=np.intp).reshape(-1, 2),
             np.array(at, dtype=np.intp),
             np.array(kind, dtype=np.intp),
         )
-        return _Plan(joints, sign, chosen, table[chosen], order, bends, *constants)
+        columns, moves, gather = table[chosen], self._moves(steps), None
+        if moves is not None:
+            columns = np.concatenate([columns, moves.columns])
+            order = np.concatenate([order, 4 * moves.steps + 3])  # after the joint, all alike: they commute
+            unique, own = np.unique(columns, return_inverse=True)
+            if len(unique) < len(columns):
+                gather, columns = np.eye(len(unique))[own], unique
+        return _Plan(joints, sign, chosen, columns, order, bends, turn, way, moves, gather)
+
+    def _moves(self, steps: tuple[Step, ...]) -> _Moves | None:
+        """Collect what parameters move along a loop."""
+        found = [(place, k, vector) for place, step in enumerate(steps) for k, vector in step.moves]
+        if not found:
+            return None
+        vectors: Any = Interval.stack([vector for _, _, vector in found])
+        first = self.model.width - self.model.parameters
+        columns = np.array([first + k for _, k, _ in found])
+        return _Moves(np.array([place for place, _, _ in found]), columns, ball(vectors) if self.exact else vectors.mid)
+
+    def _ways(self, plan: _Plan, q: Any) -> list[Any]:
+        """Place of every joint of a loop seen from the one before, (1, 3) or (N, 3)."""
+        ways = [plan.place[k][None] for k in range(len(plan.sign))]
+        if plan.moves is not None:
+            for place, k in enumerate(plan.moves.steps.tolist()):
+                size = q[:, plan.moves.columns[place]][:, None]
+                ways[k] = ways[k] + size * plan.moves.vectors[place][None]
+        return ways
 
     def loops(self, q: Any) -> list[Loop]:
         """Evaluate every loop at unknowns and given coordinates (N, width), floats or balls."""
@@ -277,13 +321,13 @@ class Closure:
         local = self._local(plan, q)
         if self.exact and q.rad.any():
             at = self._local(plan, exact(q.mid))
-            both = zip(self._frames(plan, local), self._around(plan, at, q))
+            both = zip(self._frames(plan, local, self._ways(plan, q)), self._around(plan, at, q))
             # entry by entry, or by angles: both have the same midpoints
-            R, t, frames, places = (
+            R, t, frames, places, *after = (
                 Balls(b.mid, np.where(a.mid == b.mid, np.minimum(a.rad, b.rad), b.rad)) for a, b in both
             )
         else:
-            R, t, frames, places = self._frames(plan, local)
+            R, t, frames, places, *after = self._frames(plan, local, self._ways(plan, q))
         signs = plan.sign[:, None, None]
         turned = swapped(frames)
         omega = signs * times(local.omega, turned)
@@ -292,24 +336,24 @@ class Closure:
         pushed = times(local.push, turned) + cross(places[:, :, None], bent)
         pairs, which, kind = plan.bends
         joint, coordinate = plan.chosen
-        return Loop(
-            R,
-            t,
-            omega[:, joint, coordinate],
-            v[:, joint, coordinate],
-            plan.columns,
-            plan.order,
-            (pairs, bent[:, which, kind], pushed[:, which, kind]),
-        )
+        omega, v = omega[:, joint, coordinate], v[:, joint, coordinate]
+        if plan.moves is not None:  # a parameter moves all that comes after, and turns nothing
+            own = times(after[0], plan.moves.vectors[None, ..., None])[..., 0]
+            omega, v = _along([omega, 0.0 * own]), _along([v, own])
+        bends = pairs, bent[:, which, kind], pushed[:, which, kind]
+        return Loop(R, t, omega, v, plan.columns, plan.order, bends, plan.gather)
 
-    def _frames(self, plan: _Plan, local: _Local) -> tuple[Any, Any, Any, Any]:
-        """X, and the frames of all seats a (N, m, 3, 3), with places, on the way round."""
+    def _frames(self, plan: _Plan, local: _Local, ways: list[Any]) -> tuple[Any, ...]:
+        """X, and the frames of all seats a (N, m, 3, 3), with places, on the way round; frames where parameters move.
+
+        The last are (N, moves, 3, 3), and left out where there are none.
+        """
         count, m = local.place.mid.shape[:2] if self.exact else local.place.shape[:2]
         R: Any = np.broadcast_to(_EYE, (count, 3, 3))
         t: Any = np.zeros((count, 3, 1))
         if self.exact:
             R, t = exact(R), exact(t)
-        starts = []
+        starts, after = [], []
         for k in range(m):
             turn, move = local.rotation[:, k], local.place[:, k][..., None]
             if plan.sign[k] > 0:
@@ -319,22 +363,26 @@ class Closure:
                 R = times(R, swapped(turn))
                 t = t - times(R, move)
                 starts.append((R, t))
-            R, t = times(R, plan.rotation[k][None]), t + times(R, plan.place[k][None][..., None])
-        return R, t[..., 0], _across([R for R, _ in starts]), _across([t[..., 0] for _, t in starts])
+            after.append(R)
+            R, t = times(R, plan.rotation[k][None]), t + times(R, ways[k][..., None])
+        moved = [] if plan.moves is None else [_across([after[k] for k in plan.moves.steps])]
+        return R, t[..., 0], _across([R for R, _ in starts]), _across([t[..., 0] for _, t in starts]), *moved
 
-    def _around(self, plan: _Plan, at: _Local, q: Balls) -> tuple[Any, Any, Any, Any]:
+    def _around(self, plan: _Plan, at: _Local, q: Balls) -> tuple[Any, ...]:
         """Frames over boxes: those of the middle, and how far they turn and move at most.
 
         A rotation by an angle a moves a vector by at most a times its length, whatever was turned before; so angles
         add up along the loop, and do not multiply as products of intervals do.
         """
-        R, t, frames, places = self._frames(plan, at)
+        ways = self._ways(plan, exact(q.mid))
+        R, t, frames, places, *after = self._frames(plan, at, ways)
         c = self._coordinates(plan.joints, q).rad
         turn = (c[..., TURN] + np.hypot(c[..., TILT_X], c[..., TILT_Y])) * _UP
         move = np.sqrt((c[..., SHIFT_X:] ** 2).sum(-1)) * _UP
-        offset, step = (np.sqrt((part.size**2).sum(-1)) * _UP for part in (at.place, plan.place))
+        offset, *step = (np.sqrt((part.size**2).sum(-1)) * _UP for part in (at.place, *ways))
+        more = self._pushed(plan, q)
         angle = far = np.zeros(len(q.mid))
-        turned, moved = [], []
+        turned, moved, angles = [], [], []
         for k in range(turn.shape[1]):
             ends = []
             if plan.sign[k] > 0:
@@ -347,10 +395,25 @@ class Closure:
                 ends = [angle, far]
             turned.append(ends[0])
             moved.append(ends[1])
-            far = far + angle * step[k]
-        more, off = (np.stack(part, 1) * _UP for part in (turned, moved))
+            angles.append(angle)
+            far = far + angle * step[k] + more[k]
+        wider, off = (np.stack(part, 1) * _UP for part in (turned, moved))
         whole = R.wider(angle[:, None, None] * _UP), t.wider(far[:, None] * _UP)
-        return *whole, frames.wider(more[..., None, None]), places.wider(off[..., None])
+        found = *whole, frames.wider(wider[..., None, None]), places.wider(off[..., None])
+        if plan.moves is None:
+            return found
+        own = np.stack([angles[k] for k in plan.moves.steps], 1) * _UP
+        return *found, after[0].wider(own[..., None, None])
+
+    def _pushed(self, plan: _Plan, q: Balls) -> Any:
+        """How far parameters move the place after every step at most over boxes, (m, N); zeros without parameters."""
+        if plan.moves is None:
+            return np.zeros(len(plan.sign))
+        far = np.zeros((len(plan.sign), len(q.mid)))
+        size = np.sqrt((plan.moves.vectors.size**2).sum(-1)) * _UP
+        for k, column, length in zip(plan.moves.steps, plan.moves.columns, size):
+            far[k] += q.rad[:, column] * length * _UP
+        return far
 
     def values(self, loops: list[Loop]) -> Any:
         """Left sides of all equations, (N, equations)."""
@@ -359,14 +422,14 @@ class Closure:
 
     def jacobian(self, loops: list[Loop]) -> Any:
         """Return the derivatives, (N, equations, width)."""
-        parts = [loop.slopes(loop.omega, loop.v) for loop in loops]
+        parts = [loop.rates for loop in loops]
 
         def spread(read: Any) -> Array:
             table = np.zeros(
                 (loops[0].t[..., 0].mid.size if self.exact else len(loops[0].t), len(self.rows), self.model.width)
             )
             for place, (k, row) in enumerate(self.rows):
-                table[:, place, loops[k].columns] = read(parts[k])[..., row]
+                table[:, place, loops[k].columns] = read(parts[k])[:, row]
             return table
 
         if self.exact:
@@ -394,6 +457,13 @@ class Closure:
 
             total = total + _each(part, spread) if k else _each(part, spread)
         return total
+
+
+def _along(parts: list[Any]) -> Any:
+    """Join along the second axis."""
+    if isinstance(parts[0], Balls):
+        return Balls(np.concatenate([p.mid for p in parts], 1), np.concatenate([p.rad for p in parts], 1))
+    return np.concatenate(parts, 1)
 
 
 def _across(parts: list[Any]) -> Any:

@@ -12,7 +12,7 @@ the plane across the axis.  The angle between both axes is the tilt.  See theory
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -27,6 +27,7 @@ from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
 if TYPE_CHECKING:
     from graphsynth.jamming.joints.program import JointProblem
     from graphsynth.mechanism.model import Mechanism
+    from graphsynth.tolerances.box import LinkPoint, ParameterBox
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -46,12 +47,15 @@ class Unsupported(Exception):  # noqa: N818 - never leaves the package: it becom
 class Seat:
     """Where a joint sits on a link: a point, and the rotation vector (radians) that turns the z axis to its axis.
 
-    ``turn_box`` (3,) encloses the rotation vector where floats do not say it exactly.
+    ``turn_box`` and ``point_box`` (3,) enclose the rotation vector and the point where floats do not say them exactly.
+    ``moves`` tells the vectors (3,) by which one unit of a parameter of the model moves the point.
     """
 
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turn_box: Interval | None = None
+    point_box: Interval | None = None
+    moves: tuple[tuple[int, Interval], ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("point", "turn"):
@@ -109,12 +113,16 @@ class Bound(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A joint in a loop: forward from a to b or back; the constant motion from it to the next joint of the loop."""
+    """A joint in a loop: forward from a to b or back; the motion from it to the next joint of the loop.
+
+    ``moves``: vectors by which one unit of a parameter moves its place.
+    """
 
     joint: int
     forward: bool
     rotation: Interval
     place: Interval
+    moves: tuple[tuple[int, Interval], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,12 +134,15 @@ class SpaceModel:
     joints : sequence of SpaceJoint
     links : int
     frame : int
+    parameters : int
+        Parameters that move points of links: dimensions within tolerances.
 
     Attributes
     ----------
     column : ndarray, shape (joints, 6)
         Number of the unknown for each coordinate of a joint (turn, tilt x, tilt y, shift x, shift y, slide), or -1;
-        given coordinates of driven joints are numbered after the ``size`` unknowns, ``width`` is the number of both.
+        given coordinates of driven joints are numbered after the ``size`` unknowns, then come the parameters; ``width``
+        is the number of all.
     unit : float
         Power of two that lengths are measured in.
     """
@@ -139,6 +150,7 @@ class SpaceModel:
     joints: tuple[SpaceJoint, ...]
     links: int
     frame: int = 0
+    parameters: int = 0
 
     @cached_property
     def unit(self) -> float:
@@ -171,12 +183,12 @@ class SpaceModel:
     @property
     def width(self) -> int:
         """Number of unknowns and given coordinates."""
-        return int(self.column.max(initial=-1)) + 1
+        return int(self.column.max(initial=-1)) + 1 + self.parameters
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return self.width - sum(joint.driven for joint in self.joints)
+        return self.width - self.parameters - sum(joint.driven for joint in self.joints)
 
     @cached_property
     def bounds(self) -> tuple[Bound, ...]:
@@ -248,7 +260,25 @@ class SpaceModel:
 
     def _seat(self, seat: Seat) -> tuple[Interval, Interval]:
         turn = Interval(list(seat.turn)) if seat.turn_box is None else seat.turn_box
-        return rotation(turn), Interval(list(seat.point)) / self.unit
+        point = Interval(list(seat.point)) if seat.point_box is None else seat.point_box
+        return rotation(turn), point / self.unit
+
+    def moves(self, passed: tuple[int, bool], after: tuple[int, bool]) -> tuple[tuple[int, Interval], ...]:
+        """Vectors by which one unit of a parameter moves the next joint of a loop from the one passed before, in units.
+
+        Both with the way they are passed, as in `paths`.  What moves both alike is left out.
+        """
+        first, second = (self.joints[k] for k, _ in (passed, after))
+        back = dict((first.seat_b if passed[1] else first.seat_a).moves)
+        found = dict((second.seat_a if after[1] else second.seat_b).moves)
+        for k, vector in back.items():
+            if k not in found:
+                found[k] = -vector
+            elif found[k] is vector:
+                del found[k]
+            else:
+                found[k] = found[k] - vector
+        return tuple((k, vector / self.unit) for k, vector in sorted(found.items()))
 
     @cached_property
     def loops(self) -> tuple[tuple[Step, ...], ...]:
@@ -299,8 +329,9 @@ class SpaceModel:
         for (k, forward), (after, onward) in zip(path, path[1:] + path[:1]):
             R, p = self.seats[k][1 if forward else 0]
             S, q = self.seats[after][0 if onward else 1]
-            back = _transposed(R)
-            steps.append(Step(k, forward, product(back, S), (back * (q - p).reshape(1, 3)).sum(-1)))
+            back, way = _transposed(R), self.moves((k, forward), (after, onward))
+            moves = tuple((number, _turned(back, vector)) for number, vector in way)
+            steps.append(Step(k, forward, product(back, S), _turned(back, q - p), moves))
         return tuple(steps)
 
 
@@ -322,6 +353,10 @@ def _transposed(A: Interval) -> Interval:
     return Interval.from_bounds(A.lo.T.copy(), A.hi.T.copy())
 
 
+def _turned(A: Interval, vector: Interval) -> Interval:
+    return (A * vector.reshape(1, 3)).sum(-1)
+
+
 def rotation(vector: Interval) -> Interval:
     """Enclose the rotation about a vector (3,) by its length (radians), shape (3, 3)."""
     v = list(vector)
@@ -339,16 +374,17 @@ def rotation(vector: Interval) -> Interval:
     return Interval.stack(rows)
 
 
-def in_space(given: JointProblem) -> SpaceModel:
-    """Put a plane mechanism with limits and misaligned axes into space.
+def in_space(given: JointProblem, box: ParameterBox | None = None) -> SpaceModel:
+    """Put a plane mechanism with limits and misaligned axes into space, and the parameters of a box of dimensions.
 
     Raises `Unsupported` for gears, cams and driven slots.
     """
     mechanism = given.mechanism
+    box = box if box is not None and box.size else None
     by_pair = {tilt.pair: tilt for tilt in given.misalignments}
     driven = {driver.pair for driver in mechanism.drivers}
     joints = []
-    for joint, limits in zip(mechanism.joints, given.limits):
+    for k, (joint, limits) in enumerate(zip(mechanism.joints, given.limits)):
         if not isinstance(joint, Revolute | Prismatic | PinSlot) or (
             isinstance(joint, PinSlot) and joint.pair in driven
         ):
@@ -358,11 +394,30 @@ def in_space(given: JointProblem) -> SpaceModel:
         seats: list[Seat] = []
         for link, at, angle in ((joint.a, joint.at_a, "angle_a"), (joint.b, joint.at_b, "angle_b")):
             own = tilt if tilt is not None and tilt.base == link else None
-            seats.append(_plane_seat(at, getattr(joint, angle, 0.0), own))
+            seat = _plane_seat(at, getattr(joint, angle, 0.0), own)
+            seats.append(seat if box is None else _toleranced(seat, box.points[k][len(seats)], box))
         own_driven = joint.pair in driven
         turns = not isinstance(joint, Prismatic)
         joints.append(SpaceJoint(joint.a, joint.b, seats[0], seats[1], limits, 0.0, own_driven, guide, turns))
-    return SpaceModel(tuple(joints), mechanism.graph.links, mechanism.frame)
+    return SpaceModel(tuple(joints), mechanism.graph.links, mechanism.frame, 0 if box is None else box.size)
+
+
+def _toleranced(seat: Seat, point: LinkPoint, box: ParameterBox) -> Seat:
+    """Seat whose point moves with the parameters of a box; counted from where the point of the box is.
+
+    With a temperature, lengths times growth are of second order: they are enclosed over the whole box.
+    """
+    still, none = point.place([Interval(0)] * box.size), Interval(0)
+    moves = {k: Interval.stack([none + x, none + y, none]) for k, x, y in point.terms}
+    place = Interval.stack([still.x, still.y, none])
+    if point.growth:
+        from_datum = point._replace(fixed=False, growth=0.0).place([none] * box.size)
+        moves[point.heat] = Interval.stack([from_datum.x, from_datum.y, none]) * point.growth
+        whole = box.whole
+        for k, x, y in point.terms:
+            both = whole[k] * whole[point.heat] * point.growth
+            place = place + Interval.stack([both * x, both * y, none])
+    return replace(seat, point=tuple(place.mid.tolist()), point_box=place, moves=tuple(moves.items()))
 
 
 def _plane_seat(at: tuple[float, float], angle: float, tilt: Misalignment | None) -> Seat:

@@ -72,11 +72,11 @@ def prove_pose(
     given = np.zeros(model.width - model.size) if given is None else given
     if not boxes:
         found = some_closure(floats, q)
-        if found.scale < 1.0 and closes(enclosed, found.q, _rates(floats, found.q), given):
+        if found.scale < 1.0 and closes(enclosed, found.q, rates(floats, found.q), given):
             return PoseProof(1, found.scale, math.inf, "closes within all limits", found)
     found = least_scale(floats, q)
     if found.scale < 1.0 and found.missed < 1e-9:
-        free = closes(enclosed, found.q, _rates(floats, found.q), given)
+        free = closes(enclosed, found.q, rates(floats, found.q), given)
         reason = "closes within all limits" if free else "a closure is found, but not proved"
         return PoseProof(int(free), found.scale, math.inf, reason, found)
     if stands_apart(model):
@@ -115,7 +115,7 @@ def _bound_joints(
     """Largest reach with a proof of binding in the coordinates of the joints, or 0; first without cuts."""
     model = enclosed.model
     floats = closures(model)[0]
-    tried, rate = [], _rates(floats, q, free=True)
+    tried, rate = [], rates(floats, q, free=True)
     for reach in _reaches(model, q, found, reaches):
         box, empty = contract(enclosed, branch_box(model, q, reach, given, rate))
         proofs = certificates(floats, found, box)
@@ -138,7 +138,7 @@ def _reaches(model: SpaceModel, q: Array, found: Optimum, reaches: tuple[float, 
     return (*(reach for reach in reaches if reach > least), least)
 
 
-def _rates(floats: Closure, q: Array, free: bool = False) -> Array:
+def rates(floats: Closure, q: Array, free: bool = False) -> Array:
     """Change of the unknowns with the given coordinates, the least by what their limits leave, (size, drivers).
 
     With ``free`` only of unknowns without limits.

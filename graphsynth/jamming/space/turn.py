@@ -4,48 +4,84 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from itertools import pairwise
 from time import perf_counter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals import Interval
+from graphsynth.intervals.reading import shortened
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.certify import TurnCertificate
-from graphsynth.jamming.joints.limits import Misalignment
+from graphsynth.jamming.joints.drawing import Tolerances, drawn
+from graphsynth.jamming.joints.limits import Misalignment, bounds
 from graphsynth.jamming.joints.pieces import check_range
-from graphsynth.jamming.joints.program import Bearings, problem
-from graphsynth.jamming.space.model import MODEL, SpaceModel, Unsupported, driven_at, in_space, start
-from graphsynth.jamming.space.pose import REACHES, PoseProof, prove_pose
+from graphsynth.jamming.joints.program import Bearings, JointProblem, problem
+from graphsynth.jamming.joints.search import limits_chosen
+from graphsynth.jamming.space.members import Members, Place, SpaceWitness, binding_member, slopes
+from graphsynth.jamming.space.model import MODEL, Unsupported
+from graphsynth.jamming.space.pose import REACHES, PoseProof, prove_pose, rates
 from graphsynth.jamming.verdict import Verdict
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
+    from graphsynth.tolerances.box import ParameterBox
 
 Array = NDArray[np.float64]
+#: Ends of the input, and of the parameters.
+_Span: TypeAlias = tuple[float, float, Array, Array]
 #: Pieces of a full rotation at first, of any range at least; parts into which one is cut; half width of the
 #: branch in unlimited turns and travels.
 _FIRST, _FEWEST, _PARTS, _REACH = 96, 4, 3, 0.03
 #: Boxes into which the unknowns at a single input are cut.
 _BOXES = 300
+#: So many times the parameters of a piece are halved at most; how far (radians, units) a coordinate may lead the
+#: unknowns; how near to 1 a factor is for a member to be looked at; spread by the input, beside that by the dimensions,
+#: from which on a piece with members of both kinds is cut.
+_CUTS, _MOVED, _NEAR, _CLEAR = 12, 0.03, 1e-3, 0.3
 
 
 class _Piece(NamedTuple):
-    """A piece of the input and what is proved about it."""
+    """A piece of the input and of the dimensions, and what is proved about it.
+
+    ``p_low``, ``p_high`` (m,): ends of the parameters; ``worth`` (1 + m,) says what is worth cutting; ``ends``: the
+    smallest and largest of the least factors of all members; ``spread``: how far that of one lies to either side over
+    the input.  The last three are estimates.
+    """
 
     low: float
     high: float
+    p_low: Array
+    p_high: Array
     proof: PoseProof
+    worth: Array
+    ends: tuple[float, float] = (math.nan, math.nan)
+    spread: float = 0.0
+
+    @property
+    def mixed(self) -> bool:
+        """Whether some members seem to bind and some do not."""
+        return self.ends[0] < 1.0 < self.ends[1]
+
+    @property
+    def told(self) -> str:
+        """Why it is undecided."""
+        if not self.mixed:
+            return self.proof.reason
+        low, high = self.ends
+        return f"some members seem to bind and some do not (least factors {low:.4g} to {high:.4g}, estimated)"
 
 
 def certify_in_space(
     motion: Motion,
-    bearings: Bearings,
+    bearings: Bearings | None,
     tilts: Misalignment | Iterable[Misalignment],
     *,
     condition: Condition = "A",
+    tolerances: Tolerances = 0.0,
     resolution: float = 1e-3,
     max_pieces: int = 5000,
     seconds: float = 60.0,
@@ -61,6 +97,8 @@ def certify_in_space(
         Of `graphsynth.simulate`, with revolute and prismatic joints and pins in slots.
     bearings, tilts, condition
         As for `graphsynth.jamming.joints.assess_coupled`; the verdict holds for every value in their ranges.
+    tolerances : float or iterable of PartTolerance
+        As for `graphsynth.jamming.joints.certify_coupled`; the verdict holds for every member, or names one that binds.
     resolution : float
         Width of a piece, over the range, below which it is left undecided.
     max_pieces, seconds : optional
@@ -84,106 +122,180 @@ def certify_in_space(
     """
     begin = perf_counter()
     check_range(motion, resolution=resolution, max_pieces=max_pieces, seconds=seconds)
-    given = problem(motion.mechanism, bearings, tilts, condition)
+    limits, axes, box = drawn(motion.mechanism, bearings, tilts, tolerances)
+    given = problem(motion.mechanism, limits, axes, condition)
     try:
-        model = in_space(given)
+        work = _Work(given, motion, box)
     except Unsupported as error:
         ends = motion.inputs[motion.assembled]
-        nothing = _columns([_Piece(float(ends.min()), float(ends.max()), PoseProof.unknown(str(error)))])
+        unknown = PoseProof.unknown(str(error))
+        nothing = _columns([_Piece(float(ends.min()), float(ends.max()), box.low, box.high, unknown, np.zeros(1))])
         return TurnCertificate(
             Verdict.UNDECIDED, str(error), *nothing, False, None, 0, perf_counter() - begin, model=MODEL
         )
-    work = _Work(model, motion)
     pieces, stopped = work.search(resolution, max_pieces, begin + seconds)
-    verdict, reason = _verdict(motion, pieces, stopped)
-    spent = perf_counter() - begin
-    return TurnCertificate(verdict, reason, *_columns(pieces), False, None, work.evaluated, spent, model=MODEL)
+    decided = _decided(pieces, box)
+    witness = None if decided == 1.0 else work.witness(pieces)
+    verdict, reason = _verdict(motion, pieces, stopped, witness)
+    if box.size and verdict is not Verdict.CERTIFIED_FREE:
+        u = np.unique([0.5 * (p.low + p.high) for p in pieces if p.proof.state == 0])
+        share = f"of all inputs and dimensions together {shortened(100.0 * decided, -1, 3)} % are decided"
+        reason = "; ".join(filter(None, (reason, work.members.unclosed(u), share)))
+    columns, spent = _columns(pieces), perf_counter() - begin
+    found = TurnCertificate(verdict, reason, *columns, False, witness, work.evaluated, spent, model=MODEL)
+    return replace(found, decided=decided)
 
 
 class _Work:
-    """Proofs for pieces of the input along one motion."""
+    """Proofs for pieces of the input and of the dimensions along one motion.
 
-    def __init__(self, model: SpaceModel, motion: Motion) -> None:
-        self.model, self.motion = model, motion
-        keep = np.flatnonzero(motion.assembled)
-        ends = motion.inputs[keep]
-        self.low, self.high = float(ends.min()), float(ends.max())
-        self.start = motion.poses[keep[int(np.argmin(ends))]]
+    ``members`` have their limits at the low ends of their ranges, for freedom, ``loose`` at the high ones, for a jam.
+    """
+
+    def __init__(self, given: JointProblem, motion: Motion, box: ParameterBox) -> None:
+        ranges = bool(limits_chosen(given, given.limits))
+        self.members = Members(_at_end(given, 0) if ranges else given, motion, box)
+        self.loose = Members(_at_end(given, 1), motion, box) if ranges else self.members
+        self.given, self.several = given, ranges or box.size > 0
+        self.likely: list[_Piece] = []
         self.evaluated = 0
 
     def search(self, resolution: float, most: int, end: float) -> tuple[list[_Piece], str]:
-        """Cut the range until every piece is decided or too narrow; say what stopped the work."""
-        count = int(np.clip(math.ceil(_FIRST * (self.high - self.low) / math.tau), _FEWEST, _FIRST))
-        edges = np.linspace(self.low, self.high, count + 1).tolist()
-        waiting, done, stopped = list(pairwise(edges)), [], ""
+        """Cut until every piece is decided, too narrow or of members of both kinds; say what stopped the work."""
+        own = self.members
+        count = int(np.clip(math.ceil(_FIRST * (own.high - own.low) / math.tau), _FEWEST, _FIRST))
+        edges = np.linspace(own.low, own.high, count + 1).tolist()
+        waiting: list[_Span] = [(a, b, own.box.low, own.box.high) for a, b in pairwise(edges)]
+        done, stopped, first = [], "", True
         peak: _Piece | None = None
         while waiting:
             fits = self.evaluated + len(waiting) <= most and perf_counter() < end
             if not fits:
                 stopped = f"the limit of work was reached after {self.evaluated} pieces"
                 unknown = PoseProof.unknown(stopped)
-                done += [_Piece(a, b, unknown) for a, b in waiting]
+                done += [_Piece(*span, unknown, np.zeros(1 + own.box.size)) for span in waiting]
                 break
             pieces = self._round(waiting, end)
-            if not done and peak is None:
-                peak = self._peak(pieces)
-            again = [p for p in pieces if p.proof.state == 0 and p.high - p.low > resolution * (self.high - self.low)]
-            done += [p for p in pieces if p not in again]
-            waiting = [part for piece in again for part in _cut(piece)]
+            if first:
+                peak, first = self._peak(pieces), False
+            least = resolution * (own.high - own.low)
+            waiting = []
+            self.likely += [p for p in pieces if p.proof.state == 0 and p.ends[1] > 1.0 - _NEAR]
+            for piece in pieces:
+                parts = self._cut(piece, least) if piece.proof.state == 0 else []
+                waiting += parts
+                done += [] if parts else [piece]
         if peak is not None:
             done = _split(done, peak)
-        return sorted(done, key=lambda piece: (piece.low, piece.high)), stopped
+        return sorted(done, key=lambda piece: (piece.low, piece.high, *piece.p_low)), stopped
+
+    def _cut(self, piece: _Piece, least: float) -> list[_Span]:
+        """Cut a piece where it is worth most: the input into equal parts, or a parameter in two.
+
+        None where it is too narrow, or as far as the input goes holds members of both kinds: no cut decides these.
+        """
+        box, p_low, p_high = self.members.box, piece.p_low, piece.p_high
+        wide, worth = piece.high - piece.low > least, piece.worth.copy()
+        if not self.several:
+            return [(a, b, p_low, p_high) for a, b in _thirds(piece)] if wide else []
+        if piece.mixed and piece.spread < _CLEAR * (piece.ends[1] - piece.ends[0]):
+            return []
+        whole = np.where(box.high > box.low, box.high - box.low, 1.0)
+        cuts = -np.log2(np.where(box.high > box.low, (p_high - p_low) / whole, 1.0)).sum()
+        if piece.mixed or cuts >= _CUTS - 0.5:
+            worth[1:] = 0.0
+        worth[0] *= wide
+        k = int(worth.argmax())
+        if not worth[k] > 0.0:
+            return []
+        if k == 0:
+            return [(a, b, p_low, p_high) for a, b in _thirds(piece)]
+        spans = []
+        for half in (0, 1):
+            low, high = p_low.copy(), p_high.copy()
+            (high if half == 0 else low)[k - 1] = 0.5 * (p_low[k - 1] + p_high[k - 1])
+            inside, held = box.in_discs(Interval.from_bounds(low[None], high[None]))
+            if held[0]:
+                spans.append((piece.low, piece.high, inside.lo[0], inside.hi[0]))
+        return spans
 
     def _peak(self, pieces: list[_Piece]) -> _Piece | None:
         """Try to prove that it binds in the middle of the undecided piece with the largest factor."""
-        left = [p for p in pieces if p.proof.state == 0 and p.proof.scale > 1.0]
+        left = [p for p in pieces if p.proof.state == 0 and p.ends[0] > 1.0]
         if not left or any(p.proof.state < 0 for p in pieces):
             return None
         top = max(left, key=lambda piece: piece.proof.scale)
         u = 0.5 * (top.low + top.high)
-        single = self._round([(u, u)], math.inf, _BOXES)[0]
+        single = self._round([(u, u, top.p_low, top.p_high)], math.inf, _BOXES)[0]
         return single if single.proof.state < 0 else None
 
-    def _round(self, spans: list[tuple[float, float]], end: float, boxes: int = 0) -> list[_Piece]:
-        """Prove what can be proved about pieces of the input."""
-        from graphsynth.kinematics.simulation import simulate
+    def witness(self, pieces: list[_Piece]) -> SpaceWitness | None:
+        """Name a member that is proved to bind, unless all of them do at some input."""
+        if (_columns(pieces)[2] == -1).any() or not self.several:
+            return None
+        sure = [p for p in pieces if p.proof.state < 0]
+        left = sure + sorted(self.likely, key=lambda p: -p.ends[1])
+        places = (Place(p.low, p.high, 0.5 * (p.p_low + p.p_high)) for p in left)
+        return binding_member(self.given, self.members.motion, self.members.box, places)
 
-        low, high = np.array(spans).T
-        middle = 0.5 * (low + high)
-        passed, back = np.unique(np.concatenate([[self.low], middle]), return_inverse=True)
-        found = simulate(self.motion.mechanism, passed, start=self.start, events=False)
-        given = driven_at(self.model, self.motion.mechanism, Interval.from_bounds(low, high))
-        pieces = []
-        for k, (a, b) in enumerate(spans):
-            at = int(back[k + 1])
-            if not found.assembled[at] or perf_counter() > end:
-                why = "the time was up" if found.assembled[at] else "the plane mechanism is not assembled"
-                pieces.append(_Piece(a, b, PoseProof.unknown(why)))
+    def _round(self, spans: list[_Span], end: float, boxes: int = 0) -> list[_Piece]:
+        """Prove what can be proved about pieces."""
+        low, high, p_low, p_high = (np.array(part) for part in zip(*spans))
+        box = Interval.from_bounds(low, high), Interval.from_bounds(p_low, p_high)
+        poses, pieces = self.members.poses(*box), []
+        options: Any = {"boxes": boxes, "reaches": REACHES if boxes else (_REACH,)}
+        nothing = np.ones(1 + self.members.box.size)
+        for k, span in enumerate(spans):
+            if not poses.found[k] or perf_counter() > end:
+                why = "the time was up" if poses.found[k] else "the plane mechanism is not assembled"
+                pieces.append(_Piece(*span, PoseProof.unknown(why), nothing))
                 continue
-            q = start(self.model, self.motion.mechanism, found.poses[at])
-            q[self.model.size :] = given.mid[k]
             self.evaluated += 1
-            reaches = REACHES if boxes else (_REACH,)
-            pieces.append(
-                _Piece(
-                    a,
-                    b,
-                    prove_pose(self.model, q, given=given.rad[k], boxes=boxes, reaches=reaches),
-                )
-            )
+            proof = prove_pose(self.members.model, poses.q[k], given=poses.given[k], **options)
+            least = proof.scale
+            if self.loose is not self.members and proof.state < 1:
+                own = self.loose.poses(*(part[k : k + 1] for part in box))
+                other = prove_pose(self.loose.model, own.q[0], given=own.given[0], **options)
+                proof, least = replace(proof, state=min(other.state, 0)), other.scale
+            pieces.append(_Piece(*span, proof, *self._worth(proof, least, poses.given[k])))
         return pieces
+
+    def _worth(self, proof: PoseProof, least: float, given: Array) -> tuple[Array, tuple[float, float], float]:
+        """Estimate what is worth cutting of an undecided piece, the ends of its factors, their spread by the input.
+
+        ``least`` is the factor with limits at their high ends.
+        """
+        m = self.members.box.size
+        if proof.state or not self.several or proof.optimum is None:
+            return np.ones(1 + m), (least, proof.scale), 0.0
+        spread = np.abs(slopes(self.members.model, proof.optimum)) * given
+        moved = np.abs(rates(self.members.floats, proof.optimum.q)) * given[None]
+        worth = spread / max(abs(proof.scale - 1.0), 1e-9) + moved.max(0, initial=0.0) / _MOVED
+        drivers = len(given) - m
+        by_input, side = float(spread[:drivers].sum()), float(spread[drivers:].sum())
+        worth = np.append(worth[:drivers].max(initial=0.0), worth[drivers:])
+        return worth, (least - side, proof.scale + side), by_input
+
+
+def _at_end(given: JointProblem, end: int) -> JointProblem:
+    """Return a problem with all limits at the low (0) or high (1) ends of their ranges."""
+    limits = []
+    for own in given.limits:
+        values: Any = {name: bounds(own, name)[end] for name in (*own.tilts, "axial_clearance")}
+        limits.append(type(own)(**values))
+    return replace(given, limits=tuple(limits))
 
 
 def _split(pieces: list[_Piece], single: _Piece) -> list[_Piece]:
     """Put a single input between the two parts of the undecided piece that holds it."""
-    at = next((p for p in pieces if p.proof.state == 0 and p.low < single.low < p.high), None)
-    if at is None:
-        return pieces
-    parts = [at._replace(high=single.low), single, at._replace(low=single.low)]
-    return [p for p in pieces if p is not at] + parts
+    found = []
+    for p in pieces:
+        inside = p.low < single.low < p.high
+        found += [p._replace(high=single.low), p._replace(low=single.low)] if inside else [p]
+    return [*found, single]
 
 
-def _cut(piece: _Piece) -> list[tuple[float, float]]:
+def _thirds(piece: _Piece) -> list[tuple[float, float]]:
     """Equal parts of a piece, which share their ends."""
     width = piece.high - piece.low
     edges = [piece.low, *(piece.low + width * k / _PARTS for k in range(1, _PARTS)), piece.high]
@@ -191,26 +303,46 @@ def _cut(piece: _Piece) -> list[tuple[float, float]]:
 
 
 def _columns(pieces: list[_Piece]) -> tuple[Array, Array, NDArray[np.int8], Array, Array]:
-    """Return ends, states and bounds of the factor."""
+    """Return ends, states and bounds of the factor: one piece for each range of inputs, decided if all over it are."""
     low, high = np.array([[p.low, p.high] for p in pieces]).T
     state = np.array([p.proof.state for p in pieces], dtype=np.int8)
+    if any(len(p.p_low) for p in pieces):
+        edges = np.unique(np.concatenate([low, high]))
+        still = np.unique(low[low == high])
+        ends = np.concatenate([np.stack([edges[:-1], edges[1:]], 1), np.stack([still, still], 1)])
+        ends = ends[np.lexsort((ends[:, 1], ends[:, 0]))]
+        merged = []
+        for a, b in ends.tolist():
+            own = state[(low == a) & (high == a)] if a == b else state[(low <= a) & (high >= b)]
+            merged.append(own[0] if (own == own[0]).all() else 0)
+        (low, high), state = ends.T, np.array(merged, dtype=np.int8)
     return low, high, state, np.where(state == -1, 1.0, 0.0), np.where(state == 1, 1.0, math.inf)
 
 
-def _verdict(motion: Motion, pieces: list[_Piece], stopped: str) -> tuple[Verdict, str]:
-    """Return what the pieces prove together, and one sentence on it."""
-    width = np.array([p.high - p.low for p in pieces])
+def _decided(pieces: list[_Piece], box: ParameterBox) -> float:
+    """Share of all inputs and dimensions together that is proved free or binding."""
+    wide = box.high > box.low
+    size = np.array([(p.high - p.low) * float((p.p_high - p.p_low)[wide].prod()) for p in pieces])
     state = np.array([p.proof.state for p in pieces])
+    return 1.0 if (state != 0).all() else float(size[state != 0].sum() / size.sum())
+
+
+def _verdict(motion: Motion, pieces: list[_Piece], stopped: str, witness: SpaceWitness | None) -> tuple[Verdict, str]:
+    """Return what the pieces prove together, and one sentence on it."""
+    low, high, state, *_ = _columns(pieces)
+    width = high - low
     binding, undecided = (float(width[state == s].sum() / width.sum()) for s in (-1, 0))
     left = next((p for p in pieces if p.proof.state == 0), None)
-    why = "" if left is None else f"near the input {left.low:.9g}: {stopped or left.proof.reason}"
+    why = "" if left is None else f"near the input {left.low:.9g}: {stopped or left.told}"
     if binding == 0.0 and (state == -1).any():
-        u = pieces[int(np.argmin(state))].low
+        u = float(low[int(np.argmin(state))])
         return Verdict.CERTIFIED_JAMMED, f"binds at the input {u!r}, proved with exact closure in space; else {why}"
     if binding > 0.0:
         part = "the whole range" if (state == -1).all() else f"{100.0 * binding:.3g} % of the range"
         rest = f"; undecided over {undecided:.3g} of it, {why}" if why else ""
         return Verdict.CERTIFIED_JAMMED, f"binds over {part}, proved with exact closure in space{rest}"
+    if witness is not None:
+        return Verdict.CERTIFIED_JAMMED_FOR_SOME, witness.sentence
     if why:
         return Verdict.UNDECIDED, f"undecided over {undecided:.3g} of the range, {why}"
     if not motion.completed:

@@ -1,0 +1,184 @@
+"""Mechanisms in space whose dimensions lie within tolerances: where all members of a box are, and one that binds.
+
+The parameters of the box are given coordinates of the model, beside the input.  So a proof over a box of the given
+coordinates is one for all inputs and all members in it.  See theory/closure-in-space 8.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.intervals import Interval
+from graphsynth.jamming.assembly import positions
+from graphsynth.jamming.assembly.positions import Positions, points
+from graphsynth.jamming.joints.program import JointProblem
+from graphsynth.jamming.joints.search import MemberWitness, limits_chosen, lowest, sharp_problem, unclosed_at
+from graphsynth.jamming.space.closure import Closure, closures
+from graphsynth.jamming.space.model import SpaceModel, driven_at, in_space, start
+from graphsynth.jamming.space.optimum import Optimum, least_scale
+from graphsynth.jamming.space.pose import PoseProof, prove_pose
+from graphsynth.tolerances.box import relative_box
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.result import Motion
+    from graphsynth.mechanism.model import Mechanism
+    from graphsynth.tolerances.box import ParameterBox
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+#: Boxes into which the unknowns of one member are cut; rounds of the search for a member; inputs tried in a piece.
+_BOXES, _ROUNDS, _INPUTS = 300, 2, 7
+#: Pieces in which a binding member is sought; a closure that is missed by more is none.
+_PIECES, _MISSED = 4, 1e-9
+
+
+class MemberPoses(NamedTuple):
+    """References at the middles of N pieces, half widths of the given coordinates, whether the plane poses were found.
+
+    ``q`` (N, width), ``given`` (N, given coordinates); where not ``found`` (N,) the others say nothing.
+    """
+
+    q: Array
+    given: Array
+    found: Mask
+
+
+class Members:
+    """All members of a box of dimensions along a motion; raises `Unsupported` for what the model does not describe."""
+
+    def __init__(self, given: JointProblem, motion: Motion, box: ParameterBox) -> None:
+        self.given, self.motion, self.box = given, motion, box
+        self.model = in_space(given, box)
+        keep = np.flatnonzero(motion.assembled)
+        ends = motion.inputs[keep]
+        self.low, self.high = float(ends.min()), float(ends.max())
+        self.start = motion.poses[keep[int(np.argmin(ends))]]
+
+    def unclosed(self, inputs: Array) -> str:
+        """Name a member whose plane mechanism cannot be assembled at one of some inputs, or return an empty text."""
+        try:
+            return unclosed_at(Positions(self.motion.mechanism, self.box, self.start), inputs) if self.box.size else ""
+        except positions.Unsupported:
+            return ""
+
+    @property
+    def floats(self) -> Closure:
+        """Closure in floats."""
+        return closures(self.model)[0]
+
+    def prove(self, u: float, p: Array) -> PoseProof:
+        """Prove what can be proved of one member at one input."""
+        poses = self.poses(points(np.array([u])), points(p[None]))
+        if not poses.found[0]:
+            return PoseProof.unknown("the plane mechanism is not assembled")
+        return prove_pose(self.model, poses.q[0], given=poses.given[0], boxes=_BOXES)
+
+    def mechanism(self, p: Array) -> Mechanism:
+        """Return the plane mechanism of a member, rounded to doubles."""
+        nominal = self.motion.mechanism
+        return self.box.member(nominal, p) if p.any() else nominal
+
+    def poses(self, u: Interval, p: Interval) -> MemberPoses:
+        """Return references for pieces u (N,) of the input and p (N, m) of the dimensions."""
+        from graphsynth.kinematics.simulation import simulate
+
+        model = self.model
+        driven = driven_at(model, self.motion.mechanism, u)
+        given = Interval.from_bounds(np.hstack([driven.lo, p.lo]), np.hstack([driven.hi, p.hi]))
+        middles, u_mid = np.clip(p.mid, p.lo, p.hi), u.mid
+        q, found = np.zeros((len(u_mid), model.width)), np.zeros(len(u_mid), dtype=np.bool_)
+        for middle in np.unique(middles, axis=0):
+            rows = np.flatnonzero((middles == middle).all(axis=1))
+            passed, back = np.unique(np.concatenate([[self.low], u_mid[rows]]), return_inverse=True)
+            mechanism = self.mechanism(middle)
+            motion = simulate(mechanism, passed, start=self.start, events=False)
+            for row, at in zip(rows.tolist(), back[1:].tolist()):
+                found[row] = motion.assembled[at]
+                if found[row]:
+                    q[row] = start(model, mechanism, motion.poses[at])
+        q[:, model.size :] = given.mid
+        return MemberPoses(q, np.asarray(given.rad), found)
+
+
+def slopes(model: SpaceModel, found: Optimum) -> Array:
+    """Return the derivatives of the least factor by the given coordinates, from the multipliers (estimated)."""
+    floats = closures(model)[0]
+    J = floats.jacobian(floats.loops(found.q[None]))[0]
+    return np.asarray(found.by @ J[:, model.size :])
+
+
+@dataclass(frozen=True, eq=False)
+class SpaceWitness(MemberWitness):
+    """A member of the tolerance boxes that is proved to bind with every loop closed in space (certified).
+
+    ``factor`` is 1, which the least factor on the limits is proved to exceed; ``scale`` what it is (estimated).
+    """
+
+    scale: float = math.nan
+
+    @property
+    def sentence(self) -> str:
+        """What is proved."""
+        return (
+            f"{self.named} binds at the input {self.input!r}, proved with exact closure in space; its limits would "
+            f"have to be {self.scale:.6g} times as large (estimated)"
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Plain values."""
+        return super().summary() | {"scale": self.scale}
+
+
+class Place(NamedTuple):
+    """Where a binding member may be: ends of the input, and a member of the box."""
+
+    low: float
+    high: float
+    p: Array
+
+
+def binding_member(
+    given: JointProblem, motion: Motion, box: ParameterBox, places: Iterable[Place]
+) -> SpaceWitness | None:
+    """Look for a member that binds, and prove it; the places are tried in their order.
+
+    Limits are taken at their low ends, dimensions at the corner that the multipliers point to.  It is proved as a point
+    of the box, and as the mechanism whose dimensions are rounded to doubles.
+    """
+    tilts, limits = tuple(tilt.sharp() for tilt in given.misalignments), lowest(given.limits)
+    own = Members(sharp_problem(motion.mechanism, limits, tilts), motion, box)
+    for place in islice(places, _PIECES):
+        u, p, scale = _worst(own, place)
+        if not scale > 1.0 or own.prove(u, p).state >= 0:
+            continue
+        mechanism = own.mechanism(p)
+        alone = sharp_problem(mechanism, limits, tilts), replace(motion, mechanism=mechanism)
+        if Members(*alone, relative_box(mechanism, 0.0)).prove(u, np.zeros(0)).state < 0:
+            named = tuple(zip(box.names, p.tolist())), limits_chosen(given, limits)
+            return SpaceWitness(u, 1.0, tilts, limits, mechanism, True, *named, scale)
+    return None
+
+
+def _worst(members: Members, place: Place) -> tuple[float, Array, float]:
+    """Input, member and its least factor, the largest found in a piece (estimated)."""
+    inputs, best = np.linspace(place.low, place.high, _INPUTS), (place.low, place.p, -math.inf)
+    p = place.p
+    for _ in range(_ROUNDS):
+        poses = members.poses(points(inputs), points(np.tile(p, (len(inputs), 1))))
+        tried = [(u, least_scale(members.floats, q)) for u, q in zip(inputs[poses.found], poses.q[poses.found])]
+        tried = [(u, found) for u, found in tried if found.missed < _MISSED]
+        if not tried:
+            break
+        u, found = max(tried, key=lambda pair: pair[1].scale)
+        if found.scale > best[2]:
+            best = float(u), p, found.scale
+        rises = slopes(members.model, found)[-members.box.size or None :]
+        p, inputs = members.box.furthest(rises), np.unique([u, *inputs[np.abs(inputs - u).argsort()[1:3]]])
+    return best
