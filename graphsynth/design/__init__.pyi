@@ -16,3 +16,13 @@ from .poses.linkages import (
     PoseLinkages as PoseLinkages,
     four_bars_for_poses as four_bars_for_poses,
 )
+from .task.answers import DesignedMechanism as DesignedMechanism
+from .task.search import Designs as Designs, design as design
+from .task.targets import (
+    DwellTarget as DwellTarget,
+    FunctionTarget as FunctionTarget,
+    PathTarget as PathTarget,
+    PosesTarget as PosesTarget,
+    SwingTarget as SwingTarget,
+)
+from .task.task import Task as Task

@@ -43,8 +43,11 @@ def at_times(own: MovingLink, times: Array) -> tuple[Array, Array]:
     )
     a, b, c, d = (1 + 2 * x) * (1 - x) ** 2, x * (1 - x) ** 2 * h, x * x * (3 - 2 * x), x * x * (x - 1) * h
     frames = a * p + b * first + c * q + d * second
-    frames[..., 2:] /= np.maximum(np.hypot(frames[..., 2], frames[..., 3]), 1e-300)[..., None]
-    return frames, (1 - x) * v + x * w
+    speed = (1 - x) * (1 - 3 * x) * first + x * (3 * x - 2) * second + 6 * x * (1 - x) * (q - p) / h
+    size = np.maximum(np.hypot(frames[..., 2], frames[..., 3]), 1e-300)[..., None]
+    frames[..., 2:] /= size
+    turn = (frames[..., 2] * speed[..., 3] - frames[..., 3] * speed[..., 2]) / size[..., 0]
+    return frames, np.concatenate([speed[..., :2], turn[..., None]], axis=-1)
 
 
 class Wanted(NamedTuple):

@@ -290,10 +290,10 @@ def dimensioned(problem: DimensionProblem, x: Array) -> Mechanism | None:
     if problem.fit is None or not problem.fit.placed:
         s, t = _placement(problem, frames, table)
     world = [
-        _carried(World.read(row), frames[joint.a], frames[joint.b], (s, t))
+        carried(World.read(row), frames[joint.a], frames[joint.b], (s, t))
         for joint, row in zip(design.graph.joints, table)
     ]
-    own = [_frame(problem, link, world) for link in range(design.graph.links)]
+    own = [own_frame(design, link, world) for link in range(design.graph.links)]
     joints = design.joints(world, own)
     points: dict[str, TracePoint] = {}
     if problem.fit is not None:
@@ -308,7 +308,7 @@ def dimensioned(problem: DimensionProblem, x: Array) -> Mechanism | None:
     return Mechanism(design.graph, joints, drivers, points, tuple(pose))
 
 
-def _carried(at: World, frame_a: Array, frame_b: Array, by: tuple[complex, complex]) -> World:
+def carried(at: World, frame_a: Array, frame_b: Array, by: tuple[complex, complex]) -> World:
     """Return where a joint lies at the first input, multiplied and moved: frames are x, y, cos, sin of its links."""
     (s, t), turn = by, cmath.phase(complex(frame_a[2], frame_a[3]) * by[0])
     A, B = (s * (complex(x, y) + complex(c, z) * p) + t for (x, y, c, z), p in ((frame_a, at.A), (frame_b, at.B)))
@@ -335,13 +335,13 @@ def _placement(problem: DimensionProblem, frames: Array, table: Array) -> tuple[
     return s, -s * z[0]
 
 
-def _frame(problem: DimensionProblem, link: int, world: list[World]) -> tuple[complex, float]:
+def own_frame(design: Design, link: int, world: list[World]) -> tuple[complex, float]:
     """Origin and angle of a link's own frame at the first input."""
-    if link == problem.design.graph.frame:
+    if link == design.graph.frame:
         return 0j, 0.0
-    joints = problem.design.joints_of(link)
-    driven = [k for k in joints if k in problem.design.driver_joints]
-    joints = sorted(joints, key=lambda k: (k not in driven, problem.design.kinds[k] != "R", k))
+    joints = design.joints_of(link)
+    driven = [k for k in joints if k in design.driver_joints]
+    joints = sorted(joints, key=lambda k: (k not in driven, design.kinds[k] != "R", k))
     z = [world[k].A for k in joints]
     far = [p for p in z[1:] if abs(p - z[0]) > 0.0]
     return z[0], cmath.phase(far[0] - z[0]) if far else 0.0

@@ -1,0 +1,1 @@
+"""From a task to mechanisms that do it: targets, wishes, the search over chains and dimensions, ranked answers."""

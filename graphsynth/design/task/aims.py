@@ -1,0 +1,331 @@
+"""Errors of every kind of target over many candidates: when it is looked at, by how much it is missed, why.
+
+All are in tolerances of their target, spread over its samples, so that targets add up by their weights.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.design.task.model import Moved, Rows, Unknowns
+from graphsynth.design.task.targets import DwellTarget, FunctionTarget, PathTarget, PosesTarget, SwingTarget
+from graphsynth.design.task.task import Task
+from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, followed, matched
+
+if TYPE_CHECKING:
+    from graphsynth.design.task.model import Model
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+#: Samples of a dwell; inputs before and after a dead centre between which its speed is differentiated.
+_STILL, _NEAR = 13, 0.02
+
+
+class Aim(ABC):
+    """A target for the candidates of one model; ``at`` is where its own unknowns begin in the vector.
+
+    ``unknowns``: how many it adds; ``shared``: inputs at which motions must be sampled exactly.
+    """
+
+    unknowns = 0
+    shared: tuple[float, ...] = ()
+
+    def __init__(self, model: Model, at: int, weight: float) -> None:
+        self.model, self.at, self.weight = model, at, weight
+
+    @abstractmethod
+    def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
+        """Return the inputs (sets, n) at which it is looked at, near those before, if any."""
+
+    @abstractmethod
+    def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
+        """Return errors at frames (sets, n, links, 4) and rates (sets, n, links, 3)."""
+
+    def begin(self, times: Array, moved: Moved, random: np.random.Generator) -> Array:
+        """Return first values (sets, unknowns) of its own unknowns."""
+        return np.zeros((len(moved.frames), self.unknowns))
+
+    def blank(self, sets: int, deep: int, n: int) -> tuple[Array, Array]:
+        """Return loads and direct derivatives, all zero."""
+        return np.zeros((sets, deep, self.model.links, 3, n)), np.zeros((sets, deep, n, self.model.size))
+
+    def own(self, u: Unknowns, k: int) -> Array:
+        """Return one of its own unknowns (sets, 1)."""
+        first = self.at - self.model.own_at + k
+        return u.own[:, first : first + 1]
+
+
+class TimedAim(Aim):
+    """Times of a target: given from the common start, from a start of its own, or found (``wanted``)."""
+
+    wanted: Wanted | None = None
+
+    def __init__(self, model: Model, at: int, weight: float, inputs: tuple[float, ...] | None, own_start: bool) -> None:
+        super().__init__(model, at, weight)
+        self.inputs, self.own_start = inputs, own_start
+        if inputs is not None and not own_start:
+            self.shared = inputs
+        self.unknowns = int(own_start and inputs is not None)
+
+    def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
+        """Given, shifted, or followed along the motion of the named point."""
+        sets = len(moved.frames)
+        if self.inputs is not None:
+            return np.array(self.inputs) + (self.own(u, self.unknowns - 1) if self.own_start else np.zeros((sets, 1)))
+        own = self.seen(moved, u)
+        assert self.wanted is not None
+        return matched(own, self.wanted) if before is None else followed(own, before, self.wanted)
+
+    def seen(self, moved: Moved, u: Unknowns) -> MovingLink:
+        """Return the motion of the link with its origin in the named point."""
+        raise NotImplementedError
+
+    @property
+    def start(self) -> int:
+        """Where the start of its own stands in the vector; -1 if there is none."""
+        return self.at + self.unknowns - 1 if self.own_start and self.inputs is not None else -1
+
+
+class PointAim(TimedAim):
+    """A point passes points, or a link poses; for poses one more unknown, the line from which angles are measured."""
+
+    def __init__(self, model: Model, at: int, target: PathTarget | PosesTarget) -> None:
+        super().__init__(model, at, target.weight / target.tolerance, target.inputs, target.own_start)  # type: ignore[arg-type]
+        self.goal, self.size = target.goal, target.size
+        self.turn = target.turn if isinstance(target, PosesTarget) else None
+        self.unknowns += self.turn is not None
+        self.link, self.point = model.carrier(target.point), model.point_at(target.point)
+        closed = isinstance(target, PathTarget) and target.closed
+        self.wanted = Wanted(self.goal, self.turn, self.size, closed, free=False)
+        self.weight /= math.sqrt(len(self.goal))
+
+    def place(self, u: Unknowns) -> Complex:
+        """Place of the point on its link, (sets, 1)."""
+        k = (self.point - self.model.points_at) // 2
+        return u.points[:, k : k + 1, 0] + 1j * u.points[:, k : k + 1, 1]
+
+    def seen(self, moved: Moved, u: Unknowns) -> MovingLink:
+        """Return the motion of the link with its origin in the named point."""
+        own, p = moved.link(self.link), self.place(u)
+        arm = (own.frames[..., 2] + 1j * own.frames[..., 3]) * p
+        frames, rates = own.frames.copy(), own.rates.copy()
+        frames[..., 0] += arm.real
+        frames[..., 1] += arm.imag
+        rates[..., 0] -= arm.imag * own.rates[..., 2]
+        rates[..., 1] += arm.real * own.rates[..., 2]
+        return MovingLink(own.u, frames, rates, own.period)
+
+    def begin(self, times: Array, moved: Moved, random: np.random.Generator) -> Array:
+        """Measure angles from the line that suits best; begin anywhere."""
+        found = random.uniform(0.0, self.model.task.span, (len(times), self.unknowns))
+        if self.turn is not None:
+            frames, _ = moved.at(times)
+            w = frames[:, :, self.link, 2] + 1j * frames[:, :, self.link, 3]
+            found[:, 0] = np.angle((w * np.exp(-1j * self.turn)).sum(axis=1))
+        return found
+
+    def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
+        """Real and imaginary parts of distances over the size, and angles."""
+        own = frames[:, :, self.link]
+        z, w = own[..., 0] + 1j * own[..., 1], own[..., 2] + 1j * own[..., 3]
+        arm = w * self.place(u)
+        e = (z + arm - self.goal) / self.size
+        sets, n = z.shape
+        loads, direct = self.blank(sets, 2 + (self.turn is not None), n)
+        loads[:, 0, self.link, 0] = loads[:, 1, self.link, 1] = 1.0 / self.size
+        loads[:, 0, self.link, 2], loads[:, 1, self.link, 2] = -arm.imag / self.size, arm.real / self.size
+        direct[:, 0, :, self.point], direct[:, 1, :, self.point] = w.real / self.size, w.imag / self.size
+        direct[:, 0, :, self.point + 1], direct[:, 1, :, self.point + 1] = -w.imag / self.size, w.real / self.size
+        values = [e.real, e.imag]
+        if self.turn is not None:
+            values.append(np.angle(w * np.exp(-1j * (self.turn + self.own(u, 0)))))
+            loads[:, 2, self.link, 2] = 1.0
+            direct[:, 2, :, self.at] = -1.0
+        free = self.inputs is None
+        return Rows(times, np.stack(values, axis=1), loads, direct, self.weight, free, start=self.start)
+
+
+class Measure:
+    """What a link on the frame does: its angle, or of a slider its place along its guide."""
+
+    def __init__(self, model: Model, name: str) -> None:
+        design, self.link = model.plan.design, model.carrier(name)
+        frame = design.graph.frame
+        at_frame = [k for k, (a, b, _) in enumerate(design.graph.joints) if {a, b} == {frame, self.link}]
+        self.guide = model.angle_at(at_frame[0]) if at_frame and design.kinds[at_frame[0]] == "P" else -1
+        self.model = model
+
+    def along(self, u: Unknowns) -> Complex:
+        """Direction of the guide (sets, 1)."""
+        number = self.model.angles[self.guide - 2 * len(self.model.free)]
+        return np.exp(1j * u.numbers[:, number : number + 1])
+
+    def values(self, frames: Array, u: Unknowns) -> Array:
+        """Values (sets, n): angles in (-pi, pi]."""
+        own = frames[:, :, self.link]
+        if self.guide < 0:
+            return np.arctan2(own[..., 3], own[..., 2])
+        return np.asarray((np.conj(self.along(u)) * (own[..., 0] + 1j * own[..., 1])).real)
+
+    def rates(self, rates: Array, u: Unknowns) -> Array:
+        """Derivatives by the input (sets, n)."""
+        own = rates[:, :, self.link]
+        if self.guide < 0:
+            return np.asarray(own[..., 2])
+        return np.asarray((np.conj(self.along(u)) * (own[..., 0] + 1j * own[..., 1])).real)
+
+    def put(self, loads: Array, direct: Array, frames: Array, u: Unknowns) -> None:
+        """Write the derivatives of the values into the first row of loads and direct derivatives."""
+        if self.guide < 0:
+            loads[:, 0, self.link, 2] = 1.0
+            return
+        own, along = frames[:, :, self.link], self.along(u)
+        loads[:, 0, self.link, 0], loads[:, 0, self.link, 1] = along.real, along.imag
+        direct[:, 0, :, self.guide] = (np.conj(along) * (own[..., 0] + 1j * own[..., 1])).imag
+
+    def wrapped(self, values: Array) -> Array:
+        """Differences of angles in (-pi, pi], of places as they are."""
+        return values if self.guide >= 0 else np.asarray(np.mod(values + math.pi, math.tau) - math.pi)
+
+
+class FunctionAim(TimedAim):
+    """A function of the input, or a dwell; one more unknown, the zero of the output."""
+
+    def __init__(self, model: Model, at: int, target: FunctionTarget | DwellTarget) -> None:
+        if isinstance(target, FunctionTarget):
+            inputs, outputs, own_start = target.inputs, np.array(target.outputs), target.own_start
+        else:
+            inputs = tuple(((target.start or 0.0) + np.linspace(0.0, target.span, _STILL)).tolist())
+            outputs, own_start = np.zeros(_STILL), target.start is None
+        super().__init__(model, at, target.weight / target.tolerance / math.sqrt(len(outputs)), inputs, own_start)  # type: ignore[arg-type]
+        self.outputs, self.measure = outputs, Measure(model, target.link)
+        self.unknowns += 1
+
+    def begin(self, times: Array, moved: Moved, random: np.random.Generator) -> Array:
+        """Begin where the output is nearest to what is wanted."""
+        if not self.own_start:
+            return np.zeros((len(moved.frames), 1))
+        shifts = np.linspace(0.0, self.model.task.span, 48, endpoint=False)
+        own, base = moved.link(self.measure.link), np.array(self.inputs)
+        theta = np.unwrap(np.arctan2(own.frames[..., 3], own.frames[..., 2]), axis=1)
+        error = [
+            np.ptp(np.stack([np.interp(np.mod(base + s, self.model.task.span), own.u, row) for row in theta]) - self.outputs, axis=1)
+            for s in shifts
+        ]
+        return np.stack([np.zeros(len(theta)), shifts[np.argmin(error, axis=0)]], axis=1)
+
+    def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
+        """Differences from the outputs."""
+        values = self.measure.wrapped(self.measure.values(frames, u) - self.outputs - self.own(u, 0))
+        loads, direct = self.blank(len(values), 1, values.shape[1])
+        self.measure.put(loads, direct, frames, u)
+        direct[:, 0, :, self.at] -= 1.0
+        return Rows(times, values[:, None], loads, direct, self.weight, start=self.start)
+
+    def zero(self, times: Array, moved: Moved, u: Unknowns) -> Array:
+        """Return the zero of the output (sets,) that suits best."""
+        frames, _ = moved.at(times)
+        left = self.measure.values(frames, u) - self.outputs
+        return np.asarray(left.mean(axis=1) if self.measure.guide >= 0 else np.angle(np.exp(1j * left).sum(axis=1)))
+
+
+class SwingAim(Aim):
+    """How far a link swings: its values where they are largest and smallest."""
+
+    def __init__(self, model: Model, at: int, target: SwingTarget) -> None:
+        super().__init__(model, at, target.weight / target.tolerance)
+        self.target, self.measure = target, Measure(model, target.link)
+
+    def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
+        """Inputs of the largest and the smallest value (sets, 2)."""
+        values = self.measure.values(np.where(moved.complete[:, None, None, None], moved.frames, _REST), u)
+        values = values if self.measure.guide >= 0 else np.unwrap(values, axis=1)
+        rates = np.where(moved.complete[:, None], self.measure.rates(np.nan_to_num(moved.rates), u), 1.0)
+        return np.stack([_extreme(moved, values, rates, 1.0), _extreme(moved, values, rates, -1.0)], axis=1)
+
+    def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
+        """What the stroke lacks or has too much."""
+        values = self.measure.values(frames, u)
+        swing = values[:, :1] - values[:, 1:]
+        swing = swing if self.measure.guide >= 0 else np.mod(swing, math.tau)
+        loads, direct = self.blank(len(values), 1, 2)
+        self.measure.put(loads, direct, frames, u)
+        away = swing - np.clip(swing, self.target.least, self.target.most)
+        active = (away != 0.0)[:, None, :, None]
+        return Rows(times, away[:, None], loads * active[..., None], direct * active, self.weight, mix=np.array([[1.0, -1.0]]))
+
+
+_REST = np.array([0.0, 0.0, 1.0, 0.0])
+
+
+def _extreme(moved: Moved, values: Array, rates: Array, sign: float) -> Array:
+    """Input of the largest value times the sign (sets,), where the rate passes zero next to the largest sample."""
+    k = (sign * values).argmax(axis=1)
+    row = np.arange(len(k))
+    rising = sign * rates[row, k] > 0.0
+    low = np.where(rising, k, k - 1)
+    last = len(moved.inputs) - 1
+    low = np.mod(low, last) if moved.period else np.clip(low, 0, last - 1)
+    a, b = sign * rates[row, low], sign * rates[row, low + 1]
+    inside = (a > 0.0) & (b < 0.0)
+    part = np.where(inside, a / np.where(inside, a - b, 1.0), np.where(low == k, 0.0, 1.0))
+    return np.asarray(moved.inputs[low] + part * (moved.inputs[low + 1] - moved.inputs[low]))
+
+
+class RatioAim(Aim):
+    """Two dead centres, the slow stroke apart: speeds there, at a start of its own."""
+
+    unknowns = 1
+
+    def __init__(self, model: Model, at: int, target: SwingTarget) -> None:
+        super().__init__(model, at, target.weight / target.tolerance)
+        self.measure = Measure(model, target.link)
+        ratio = target.time_ratio or 1.0
+        self.slow = math.tau * ratio / (1.0 + ratio)
+
+    def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
+        """Just before and after both dead centres (sets, 4)."""
+        return self.own(u, 0) + np.array([-_NEAR, _NEAR, self.slow - _NEAR, self.slow + _NEAR])
+
+    def begin(self, times: Array, moved: Moved, random: np.random.Generator) -> Array:
+        """Begin at a dead centre, the largest or the smallest value."""
+        own = moved.link(self.measure.link)
+        theta = np.unwrap(np.arctan2(own.frames[..., 3], own.frames[..., 2]), axis=1)
+        if self.measure.guide >= 0:
+            theta = np.abs(own.frames[..., 0] + 1j * own.frames[..., 1])
+        up = random.choice([-1.0, 1.0], (len(theta), 1))
+        return np.asarray(own.u[(up * theta).argmax(axis=1)][:, None])
+
+    def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
+        """Both speeds by differences, so that their derivatives are those of the poses."""
+        mix = np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]]) / (2.0 * _NEAR)
+        values = self.measure.values(frames, u)
+        if self.measure.guide < 0:
+            values = np.unwrap(values, axis=1)
+        loads, direct = self.blank(len(values), 1, 4)
+        self.measure.put(loads, direct, frames, u)
+        return Rows(times, (values @ mix.T)[:, None], loads, direct, self.weight, mix=mix, start=self.at)
+
+
+def aims_of(task: Task, model: Model) -> list[Aim]:
+    """Return the aims of all targets, with their own unknowns one after the other."""
+    found: list[Aim] = []
+    at = model.own_at
+    for target in task.targets:
+        made: list[Aim] = []
+        if isinstance(target, PathTarget | PosesTarget):
+            made.append(PointAim(model, at, target))
+        elif isinstance(target, FunctionTarget | DwellTarget):
+            made.append(FunctionAim(model, at, target))
+        elif isinstance(target, SwingTarget):
+            made.append(SwingAim(model, at, target))
+            if target.time_ratio is not None:
+                made.append(RatioAim(model, at, target))
+        found += made
+        at += sum(aim.unknowns for aim in made)
+    return found

@@ -1,0 +1,345 @@
+"""From a candidate to an answer: the mechanism, simulated anew and judged by what the task asks; certified if it can be.
+
+Nothing is accepted on the word of the search.  Errors are those of the new motion, the largest over each target.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.shown import Shown
+from graphsynth.design.task.model import Model
+from graphsynth.design.task.plans import Plan
+from graphsynth.design.task.targets import DwellTarget, FunctionTarget, PathTarget, PosesTarget, SwingTarget, Target
+from graphsynth.design.task.task import Task
+from graphsynth.kinematics.dimensional.design import World
+from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, matched
+from graphsynth.kinematics.dimensional.problem import carried, own_frame
+from graphsynth.kinematics.dimensional.verify import length_ratio, smallest_transmission
+from graphsynth.kinematics.simulation import simulate
+from graphsynth.mechanism.laws import Driver, Linear
+from graphsynth.mechanism.model import Mechanism, TracePoint
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.certify.poses import MotionCertificate
+    from graphsynth.kinematics.engine.result import Motion
+
+Array = NDArray[np.float64]
+#: Samples of a motion that is judged, slack of bounds, and the largest gap of a joint.
+_SAMPLES, _SLACK, _RESIDUAL = 720, 1e-6, 1e-9
+#: Samples of a motion that is certified, and boxes it may take.
+_PROVED, _BOXES = 181, 20_000
+
+
+class Candidate(NamedTuple):
+    """What a search found: its error in tolerances, the plan, the mechanism, starts of targets with their own."""
+
+    error: float
+    plan: Plan
+    mechanism: Mechanism
+    starts: tuple[float, ...]
+
+
+def built(model: Model, x: Array) -> tuple[Mechanism, tuple[float, ...]]:
+    """Return the mechanism of a vector, in its pose at the input 0, and where targets with their own start begin."""
+    u = model.read(x[None])
+    frames, design = model.move(u).frames[0, 0], model.plan.design
+    table = design.dimensions(u.places, u.numbers)[0]
+    world = [
+        carried(World.read(row), frames[joint.a], frames[joint.b], (1.0 + 0j, 0j))
+        for joint, row in zip(design.graph.joints, table)
+    ]
+    own = [own_frame(design, link, world) for link in range(design.graph.links)]
+    points: dict[str, TracePoint] = {}
+    for k, name in enumerate(name for name, of_point in model.task.names.items() if of_point):
+        link = model.carrier(name)
+        x0, y0, c, s = frames[link]
+        at = complex(x0, y0) + complex(c, s) * complex(*u.points[0, k])
+        local = (at - own[link][0]) * np.exp(-1j * own[link][1])
+        points[name] = TracePoint(link, (float(local.real), float(local.imag)))
+    (base, driven), joint = design.drivers[0], design.driver_joints[0]
+    turns = design.kinds[joint] == "R"
+    law = Linear(float(model.sense), own[driven][1] - own[base][1]) if turns else Linear(model.sense * float(u.stroke[0]))
+    pose = tuple((z.real, z.imag, angle) for z, angle in own)
+    starts = tuple(float(x[aim.start]) for aim in model.aims if getattr(aim, "start", -1) >= 0)
+    return Mechanism(design.graph, design.joints(world, own), (Driver(base, driven, law),), points, pose), starts
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DesignedMechanism(Shown):
+    """An answer to a task.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        In the coordinates of the task, with its named points; inputs run from 0 over the range of the drive.
+    motion : Motion
+        Simulated anew over the range.
+    errors : tuple of float
+        Of every target, in the unit of its tolerance.
+    accepted : bool
+        Every target met and every bound kept.
+    reasons : tuple of str
+        Why it is not accepted.
+    links : int
+    size : float
+        Diagonal of the box that holds all joints and points over the motion.
+    transmission : float
+        Smallest transmission angle, radians.
+    ratio : float
+        Longest over shortest length.
+    score : float
+        What it is ranked by; less is better.
+    certificate : MotionCertificate or None
+        Proof that the motion is one branch over the whole range; None if it was not tried.
+    carriers : mapping of str to int
+        Link of every name of the task.
+    """
+
+    mechanism: Mechanism
+    motion: Motion
+    errors: tuple[float, ...]
+    accepted: bool
+    reasons: tuple[str, ...]
+    links: int
+    size: float
+    transmission: float
+    ratio: float
+    score: float
+    certificate: MotionCertificate | None
+    carriers: Mapping[str, int]
+
+    @property
+    def key(self) -> str:
+        """Canonical key of its graph."""
+        return str(self.mechanism.graph.key)
+
+    @property
+    def certified(self) -> bool:
+        """Whether its motion is proved over the whole range."""
+        return self.certificate is not None and self.certificate.certified
+
+    def _told(self) -> tuple[str, list[tuple[str, str]]]:
+        rows = [
+            ("accepted", "yes" if self.accepted else "; ".join(self.reasons)),
+            ("errors", ", ".join(f"{error:.3g}" for error in self.errors)),
+            ("transmission angle", f"{math.degrees(self.transmission):.1f} deg"),
+            ("size", f"{self.size:.4g}"),
+            ("motion", "certified" if self.certified else "estimated"),
+        ]
+        return f"Mechanism of {self.links} links", rows
+
+    def _picture(self) -> str:
+        return str(self.motion._picture())
+
+
+def judged(task: Task, found: Candidate) -> DesignedMechanism:
+    """Simulate a candidate anew and judge it."""
+    inputs = np.linspace(0.0, task.span, _SAMPLES + 1)
+    motion = simulate(found.mechanism, inputs)
+    done = motion.completed
+    carriers = dict(zip(task.names, found.plan.carriers))
+    errors = _errors(task, motion, carriers, found.starts) if done else (math.inf,) * len(task.targets)
+    angle, ratio = smallest_transmission(motion), length_ratio(motion.mechanism)
+    closed = motion.closure.tested and motion.closure.closed
+    meet = any(event.kind in ("change point", "near fold", "fold", "escape", "singular") for event in motion.events)
+    places = _places(motion)
+    wrong = {
+        "the range is not completed": not done,
+        "not closed after the turn": done and task.drive == "rotation" and not closed,
+        "two assembly modes meet or nearly meet": meet,
+        "an assembly mode changes": done and bool((motion.modes != motion.modes[0]).any()),
+        "a joint opens": done and not motion.residual <= _RESIDUAL,
+        "the transmission angle is too small": not angle >= task.transmission - _SLACK,
+        "the length ratio is too large": not ratio <= task.length_ratio * (1.0 + _SLACK),
+        **_bounds(task, motion, places),
+    }
+    for target, error in zip(task.targets, errors):
+        name = type(target).__name__.removesuffix("Target").lower()
+        wrong[f"the {name} is missed"] = wrong.get(f"the {name} is missed", False) or not error <= target.tolerance
+    reasons = tuple(reason for reason, is_so in wrong.items() if is_so)
+    size = float(abs(complex(*np.ptp(places.reshape(-1, 2), axis=0)))) if done else math.inf
+    worst = max(error / target.tolerance * target.weight for target, error in zip(task.targets, errors))
+    links, weight = found.mechanism.graph.links, task.rank
+    score = weight["error"] * worst + weight["links"] * links + weight["size"] * size / task.size
+    score -= weight["transmission"] * (angle if done else 0.0)
+    return DesignedMechanism(
+        found.mechanism, motion, errors, not reasons, reasons, links, size, angle, ratio, score, None, carriers
+    )
+
+
+def proved(answer: DesignedMechanism, span: float) -> MotionCertificate:
+    """Certify the motion of an answer over the range."""
+    from graphsynth.kinematics.certify.poses import certify
+
+    motion = simulate(answer.mechanism, np.linspace(0.0, span, _PROVED))
+    return certify(motion, max_boxes=_BOXES, seconds=10.0)
+
+
+def _places(motion: Motion) -> Array:
+    """Places of all joints and points over the motion (samples, places, 2)."""
+    own = [motion.point(joint.a, joint.at_a).position for joint in motion.mechanism.joints]
+    return np.stack([*own, *(motion.point(name).position for name in motion.mechanism.points)], axis=1)
+
+
+def _bounds(task: Task, motion: Motion, places: Array) -> dict[str, bool]:
+    """Tell which bounds of the task are broken."""
+    slack, mechanism = _SLACK * task.size, motion.mechanism
+    broken: dict[str, bool] = {}
+
+    def outside(box: tuple[float, ...], points: Array) -> bool:
+        low, high = np.nanmin(points.reshape(-1, 2), axis=0), np.nanmax(points.reshape(-1, 2), axis=0)
+        return bool((low < np.array(box[:2]) - slack).any() or (high > np.array(box[2:]) + slack).any())
+
+    if task.box is not None:
+        broken["it leaves the box"] = outside(task.box, places)
+    frame = [k for k, joint in enumerate(mechanism.joints) if mechanism.frame in joint.pair]
+    if task.pivot_region is not None:
+        broken["a pivot leaves its region"] = outside(task.pivot_region, places[:1, frame])
+    lengths = _lengths(mechanism)
+    if task.lengths is not None:
+        broken["a length is out of its bounds"] = bool(
+            min(lengths) < task.lengths[0] * (1 - _SLACK) or max(lengths) > task.lengths[1] * (1 + _SLACK)
+        )
+    if task.linear and task.stroke is not None:
+        stroke = abs(mechanism.drivers[0].law.rate)  # type: ignore[union-attr]
+        broken["the stroke is out of its bounds"] = not (
+            task.stroke[0] * (1 - _SLACK) <= stroke <= task.stroke[1] * (1 + _SLACK)
+        )
+    return broken
+
+
+def _lengths(mechanism: Mechanism) -> list[float]:
+    """Distances of revolute joints on one link."""
+    found = []
+    for link in range(mechanism.graph.links):
+        own = [j.at_a if j.a == link else j.at_b for j in mechanism.joints if link in j.pair and j.kind == "R"]
+        found += [math.dist(p, q) for i, p in enumerate(own) for q in own[i + 1 :]]
+    return found or [1.0]
+
+
+def signature(answer: DesignedMechanism) -> Array:
+    """Lengths and arms in order of size: near copies, renumbered or moved, have nearly the same."""
+    mechanism, found = answer.mechanism, _lengths(answer.mechanism)
+    for point in mechanism.points.values():
+        own = [j.at_a if j.a == point.link else j.at_b for j in mechanism.joints if point.link in j.pair]
+        found += [math.dist(point.at, p) for p in own]
+    return np.sort(found)
+
+
+# --- errors of targets, from the new motion
+
+
+def _errors(task: Task, motion: Motion, carriers: Mapping[str, int], starts: tuple[float, ...]) -> tuple[float, ...]:
+    """Errors of all targets, in their order."""
+    left, found = iter(starts), []
+    for target in task.targets:
+        timed = getattr(target, "inputs", None)
+        own = timed is not None and getattr(target, "own_start", False)
+        own = own or (isinstance(target, DwellTarget) and target.start is None)
+        start = next(left) if own else 0.0
+        if isinstance(target, SwingTarget):
+            found.append(_swing_error(task, target, motion, carriers[target.link]))
+        elif isinstance(target, PathTarget | PosesTarget):
+            found.append(_point_error(task, target, motion, carriers[target.point], start))
+        else:
+            found.append(_angle_error(task, target, motion, carriers, start))
+    return tuple(found)
+
+
+def _seen(task: Task, motion: Motion, link: int, name: str = "") -> MovingLink:
+    """Motion of a link, with its origin in a named point."""
+    poses, rates = motion.poses[:, link], motion.velocities[:, link]
+    z, v = poses[:, 0] + 1j * poses[:, 1], rates[:, 0] + 1j * rates[:, 1]
+    if name:
+        path = motion.point(name)
+        z, v = path.position @ [1.0, 1.0j], path.velocity @ [1.0, 1.0j]
+    frames = np.stack([z.real, z.imag, np.cos(poses[:, 2]), np.sin(poses[:, 2])], axis=-1)
+    period = task.span if task.drive == "rotation" else 0.0
+    return MovingLink(motion.inputs, frames[None], np.stack([v.real, v.imag, rates[:, 2]], axis=-1)[None], period)
+
+
+def _point_error(
+    task: Task, target: PathTarget | PosesTarget, motion: Motion, link: int, start: float
+) -> float:
+    """Largest distance over the size; of poses also the largest angle, from the line that suits best."""
+    own = _seen(task, motion, link, target.point)
+    turn = target.turn if isinstance(target, PosesTarget) else None
+    if target.inputs is not None:
+        times = np.array(target.inputs)[None] + start
+    else:
+        closed = isinstance(target, PathTarget) and target.closed
+        times = matched(own, Wanted(target.goal, turn, target.size, closed, free=False))
+    at = at_times(own, times)[0][0]
+    far = float(np.abs(at[:, 0] + 1j * at[:, 1] - target.goal).max()) / target.size
+    if turn is None:
+        return far
+    rest = (at[:, 2] + 1j * at[:, 3]) * np.exp(-1j * turn)
+    return max(far, float(np.abs(np.angle(rest * np.conj(rest.sum()))).max()))
+
+
+def _output(motion: Motion, link: int) -> tuple[Array, Array]:
+    """What a link does over the motion, and its rate: an angle, or of a slider the place along its guide."""
+    mechanism = motion.mechanism
+    joint = next((j for j in mechanism.joints if {*j.pair} == {mechanism.frame, link}), None)
+    if joint is None or joint.kind != "P":
+        return np.unwrap(motion.poses[:, link, 2]), motion.velocities[:, link, 2]
+    way = np.ptp(motion.poses[:, link, :2], axis=0)
+    z = motion.poses[:, link, :2] @ [1.0, 1.0j]
+    far = z - z[0]
+    k = int(np.abs(far).argmax())
+    along = np.conj(far[k]) / max(abs(far[k]), 1e-300) if way.any() else 1.0
+    return (along * z).real, (along * (motion.velocities[:, link, :2] @ [1.0, 1.0j])).real
+
+
+def _angle_error(
+    task: Task, target: Target, motion: Motion, carriers: Mapping[str, int], start: float
+) -> float:
+    """Half the spread of the differences from a function; of a dwell half the spread of the output."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    assert isinstance(target, FunctionTarget | DwellTarget)
+    values, rates = _output(motion, carriers[target.link])
+    spline = CubicHermiteSpline(motion.inputs, values, rates)
+    whole = values[-1] - values[0]  # of a link that turns with the driver
+    if isinstance(target, DwellTarget):
+        start += target.start or 0.0
+        at, wanted = start + np.linspace(0.0, target.span, 121), np.zeros(121)
+    else:
+        assert target.inputs is not None
+        at, wanted = start + np.array(target.inputs), np.array(target.outputs)
+    turns, rest = np.divmod(at, task.span) if task.drive == "rotation" else (0.0 * at, at)
+    every = spline(rest) + turns * whole
+    return min(float(0.5 * np.ptp(every - sign * wanted)) for sign in ((1.0, -1.0) if _slides(motion, carriers, target) else (1.0,)))
+
+
+def _slides(motion: Motion, carriers: Mapping[str, int], target: FunctionTarget | DwellTarget) -> bool:
+    mechanism = motion.mechanism
+    pair = {mechanism.frame, carriers[target.link]}
+    return any({*joint.pair} == pair and joint.kind == "P" for joint in mechanism.joints)
+
+
+def _swing_error(task: Task, target: SwingTarget, motion: Motion, link: int) -> float:
+    """What the stroke lacks or has too much, and how far the slow stroke is from its time (input)."""
+    values, _ = _output(motion, link)
+    swing = float(np.ptp(values))
+    error = abs(swing - min(max(swing, target.least), target.most))
+    if target.time_ratio is None:
+        return error
+    apart = abs(_peak(motion.inputs, values) - _peak(motion.inputs, -values))
+    slow = max(apart, math.tau - apart)
+    return max(error, abs(slow - math.tau * target.time_ratio / (1.0 + target.time_ratio)))
+
+
+def _peak(u: Array, values: Array) -> float:
+    """Input of the largest value of a periodic function, by the parabola through it and its neighbours."""
+    k = int(values[:-1].argmax())
+    a, b, c = values[k - 1 if k else -2], values[k], values[k + 1]
+    bend = a - 2.0 * b + c
+    return float(u[k] + (0.5 * (a - c) / bend if bend else 0.0) * (u[1] - u[0]))

@@ -1,0 +1,106 @@
+"""Chains that may do a task: which link is fixed, which is driven, which link carries each named point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations, permutations, product
+
+import numpy as np
+
+from graphsynth.design.task.targets import Point
+from graphsynth.design.task.task import Task
+from graphsynth.kinematics.dimensional.design import Design, choices
+from graphsynth.structure.assur import find_fault
+from graphsynth.structure.graph import MechanismGraph
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All but the numbers.
+
+    ``carriers``: the link of every name of the task, in its order; ``given``: joints on the frame whose places are
+    given, and these; ``pins``: of a cylinder its driven joint and the joints at its two ends.
+    """
+
+    design: Design
+    carriers: tuple[int, ...]
+    given: tuple[tuple[int, Point], ...] = ()
+    pins: tuple[int, int, int] | None = None
+
+    @property
+    def text(self) -> str:
+        """Structure in words: links, sliders, driver, carriers."""
+        sliders = self.design.kinds.count("P") - (self.pins is not None)
+        drive = "-".join(map(str, self.design.drivers[0]))
+        return f"{self.design.graph.links} links, {sliders} sliders, driven {drive}, carried by {self.carriers}"
+
+
+def plans(task: Task, links: int) -> Iterator[Plan]:
+    """Yield every plan with so many links, simple ones first."""
+    from graphsynth.synthesis import enumerate_chains
+
+    for chain in enumerate_chains(links):
+        for graph, driver in _driven(task, chain):
+            for design, pins in _kinds(task, graph, driver):
+                for carriers in _carriers(task, design):
+                    for given in _given(task, design):
+                        yield Plan(design, carriers, given, pins)
+
+
+def _driven(task: Task, chain: MechanismGraph) -> Iterator[tuple[MechanismGraph, tuple[int, int]]]:
+    """Yield frames and drivers."""
+    if task.drive != "cylinder":
+        yield from ((graph, drivers[0]) for graph, drivers in choices(chain, None))
+        return
+    for graph in chain.inversions():
+        for a, b, _ in graph.joints:
+            binary = graph.degrees[a] == graph.degrees[b] == 2  # noqa: PLR2004  # barrel and rod have two joints each
+            if graph.frame not in (a, b) and binary and find_fault(graph, ((a, b),)) is None:
+                yield graph, (a, b)
+
+
+def _kinds(
+    task: Task, graph: MechanismGraph, driver: tuple[int, int]
+) -> Iterator[tuple[Design, tuple[int, int, int] | None]]:
+    """Yield designs with all choices of sliders; of a cylinder also its joints."""
+    pairs = [(joint.a, joint.b) for joint in graph.joints]
+    driven = pairs.index((min(driver), max(driver)))
+    others = [k for k in range(len(pairs)) if k != driven]
+    ends = None
+    if task.drive == "cylinder":
+        first, second = (next(k for k in others if link in pairs[k]) for link in pairs[driven])
+        ends, others = (driven, first, second), [k for k in others if k not in (first, second)]
+    for count in range(task.sliders + 1):
+        for chosen in combinations(others, count):
+            sliding = {*chosen, driven} if task.linear else {*chosen}
+            blocks = [sum(link in pairs[k] for k in sliding) for link in range(graph.links)]
+            if all(n < graph.degrees[link] for link, n in enumerate(blocks)):  # no link is held by guides alone
+                kinds = tuple("P" if k in sliding else "R" for k in range(len(pairs)))
+                yield Design(graph, (driver,), kinds), ends
+
+
+def _carriers(task: Task, design: Design) -> Iterator[tuple[int, ...]]:
+    """Yield a link for each name: of points no link that turns about a pivot, of outputs one that does."""
+    graph, frame = design.graph, design.graph.frame
+    assert frame is not None
+    near = {link for link in range(graph.links) if graph.neighbours[frame] >> link & 1}
+    driven = {*design.drivers[0]} if task.drive == "cylinder" else {design.drivers[0][1]}
+    free = [link for link in range(graph.links) if link != frame and link not in near | driven]
+    outputs = [link for link in sorted(near) if link not in driven]
+    yield from product(*(free if of_point else outputs for of_point in task.names.values()))
+
+
+def _given(task: Task, design: Design) -> Iterator[tuple[tuple[int, Point], ...]]:
+    """Yield the ways in which joints on the frame take the given pivots."""
+    assert design.graph.frame is not None
+    own = [k for k in design.joints_of(design.graph.frame) if design.kinds[k] == "R"]
+    for chosen in permutations(own, len(task.pivots)):
+        yield tuple(zip(chosen, task.pivots, strict=True))
+
+
+def drawn(task: Task, links: int, count: int, random: np.random.Generator) -> list[Plan]:
+    """Return so many plans with so many links in random order, all if there are no more."""
+    every = list(plans(task, links))
+    order = random.permutation(len(every))[:count]
+    return [every[k] for k in order]

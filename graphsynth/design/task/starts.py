@@ -1,0 +1,236 @@
+"""First candidates: many random ones, placed where they suit the targets best; the best of these go on.
+
+A start from elsewhere (an index of curves, a closed form) is a mechanism with a pose: see `from_mechanism`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.design.task.aims import FunctionAim, PointAim
+from graphsynth.design.task.model import Model, Moved, Unknowns
+from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times
+
+if TYPE_CHECKING:
+    from graphsynth.design.task.plans import Plan
+    from graphsynth.design.task.task import Task
+    from graphsynth.mechanism.model import Mechanism
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+#: Parts of a curve in which an open path is looked for, from so many of its points; points compared.
+_PARTS, _PHASES, _COMPARED = (0.12, 0.2, 0.3, 0.45, 0.65, 0.9), 32, 14
+#: Weight of given pivots when a start is placed; points tried on each link; sets looked at together.
+_HELD, _TRIED, _TOGETHER = 30.0, 2, 128
+
+
+class Starts(Protocol):
+    """Where starts come from besides chance: mechanisms with a pose whose named points are those of the task."""
+
+    def __call__(self, task: Task, plan: Plan, random: np.random.Generator) -> Iterable[Mechanism]:
+        """Yield mechanisms of the plan's graph, drivers and kinds of joints; any place and size."""
+        ...
+
+
+def random_starts(model: Model, count: int, random: np.random.Generator) -> Unknowns:
+    """Return candidates near the sketch and far from it, with driven links of many sizes."""
+    design = model.plan.design
+    wide = random.choice([0.0, 0.0, 1.0], (count, 1, 1))
+    places = model.sketch + random.normal(0.0, 1.0, (count, *model.sketch.shape)) * (
+        random.uniform(0.0, 0.4, (count, 1, 1)) + wide
+    )
+    if model.task.drive == "rotation":
+        for joint, own in design.cranks:
+            size = np.exp(random.uniform(math.log(0.12), math.log(2.0), (count, 1)))
+            for k in {*own} - {joint}:
+                places[:, k] = places[:, joint] + size * (places[:, k] - places[:, joint])
+    numbers = random.uniform(0.0, math.pi, (count, len(design.numbers)))
+    stroke = np.exp(random.uniform(math.log(0.3), math.log(2.0), count)) if model.task.linear else np.ones(count)
+    points = np.zeros((count, sum(model.task.names.values()), 2))
+    for k, name in enumerate(name for name, of_point in model.task.names.items() if of_point):
+        own = design.joints_of(model.carrier(name))
+        points[:, k] = places[:, own].mean(axis=1) + random.normal(0.0, 1.0, (count, 2))
+    return Unknowns(*model._tied(places, numbers), points, np.zeros((count, model.stroke_at - model.own_at)), stroke)
+
+
+def placed_starts(model: Model, u: Unknowns, keep: int, random: np.random.Generator) -> tuple[Array, list[Array]]:
+    """Place candidates where they suit the first path or poses best; return the best as vectors, and times."""
+    moved = model.move(u)
+    whole = np.flatnonzero(moved.complete)
+    u, moved = _some(u, whole), _moved(moved, whole)
+    first = next((aim for aim in model.aims if isinstance(aim, PointAim)), None)
+    held = u.places[:, model.given, 0] + 1j * u.places[:, model.given, 1]
+    goals = np.array([complex(*p) for _, p in model.plan.given])
+    if not len(whole):
+        return np.zeros((0, model.size)), []
+    if first is None:
+        s, t = _similar(held, goals, model.task.size, len(whole), random)
+        error, times, q = np.zeros(len(whole)), None, u.points[:, :1, 0] * 0j
+    else:
+        error, times, c = _screened(model, first, moved, u, held, goals, random)
+        s, q, t = c[:, :1], c[:, 1:2], c[:, 2:]
+    order = np.argsort(error, kind="stable")[:keep]
+    order = order[np.isfinite(error[order])]
+    u, s, t, q = _some(u, order), s[order], t[order], q[order]
+    z = u.places[..., 0] + 1j * u.places[..., 1]
+    p = u.points[..., 0] + 1j * u.points[..., 1]
+    p = s * p + t
+    if first is not None:
+        k = (first.point - model.points_at) // 2
+        p[:, k : k + 1] = q + t
+    place = s * z + t
+    if len(goals):
+        place[:, model.given] = goals
+    numbers = u.numbers + np.angle(s)
+    u = Unknowns(_pairs(place), numbers, _pairs(p), u.own, u.stroke * np.abs(s[:, 0]) if model.task.linear else u.stroke)
+    return _begun(model, u, {} if first is None or times is None else {id(first): times[order]}, random)
+
+
+def _begun(model: Model, u: Unknowns, known: dict[int, Array], random: np.random.Generator) -> tuple[Array, list[Array]]:
+    """Give the unknowns of single targets their first values; return vectors and times."""
+    u = model.read(model.write(u))  # what is given or tied is so
+    moved = model.move(u)
+    own, times, at = u.own.copy(), [], 0
+    for aim in model.aims:
+        if aim.unknowns:
+            start = aim.times(moved, u, None) if id(aim) not in known else known[id(aim)]
+            own[:, at : at + aim.unknowns] = aim.begin(start, moved, random)
+            u = u._replace(own=own)
+            if id(aim) in known and isinstance(aim, PointAim) and aim.start >= 0:
+                assert aim.inputs is not None
+                own[:, at + aim.unknowns - 1] = known[id(aim)][:, 0] - aim.inputs[0]
+        found = known.get(id(aim)) if getattr(aim, "inputs", 0) is None else None
+        times.append(aim.times(moved, u, found))
+        if isinstance(aim, FunctionAim):
+            own[:, at] = aim.zero(times[-1], moved, u)
+        at += aim.unknowns
+    return model.write(u._replace(own=own)), times
+
+
+def from_mechanism(model: Model, mechanism: Mechanism) -> Unknowns:
+    """Return one candidate with the places that joints and named points have in the pose of a mechanism."""
+    assert mechanism.pose is not None
+    frames = [(complex(x, y), complex(math.cos(a), math.sin(a)), a) for x, y, a in mechanism.pose]
+
+    def world(link: int, local: tuple[float, float]) -> complex:
+        return frames[link][0] + frames[link][1] * complex(*local)
+
+    place = np.array([[world(joint.a, joint.at_a) for joint in mechanism.joints]])
+    numbers = [getattr(mechanism.joints[k], "angle_a", 0.0) + frames[mechanism.joints[k].a][2] for k, _ in model.plan.design.numbers]
+    named = [mechanism.points[name] for name, of_point in model.task.names.items() if of_point]
+    points = np.array([[world(link, at) for link, at in named]], dtype=np.complex128).reshape(1, -1)
+    own = np.zeros((1, model.stroke_at - model.own_at))
+    return Unknowns(_pairs(place), np.array([numbers]).reshape(1, -1), _pairs(points), own, np.ones(1))
+
+
+def _some(u: Unknowns, at: NDArray[np.intp]) -> Unknowns:
+    return Unknowns(*(part[at] for part in u))
+
+
+def _moved(moved: Moved, at: NDArray[np.intp]) -> Moved:
+    return moved._replace(frames=moved.frames[at], rates=moved.rates[at], complete=moved.complete[at])
+
+
+def _pairs(z: Complex) -> Array:
+    return np.stack([z.real, z.imag], axis=-1)
+
+
+def _similar(
+    held: Complex, goals: Complex, size: float, count: int, random: np.random.Generator
+) -> tuple[Complex, Complex]:
+    """Factors and shifts (sets, 1) that put pivots where they are given, any others at random."""
+    turn = np.exp(1j * random.uniform(0.0, math.tau, (count, 1))) * size * np.exp(random.normal(0.0, 0.5, (count, 1)))
+    if len(goals) == 0:
+        return turn, np.zeros((count, 1), dtype=np.complex128)
+    if len(goals) > 1:
+        turn = ((goals[1] - goals[0]) / (held[:, 1] - held[:, 0]))[:, None]
+    return turn, goals[0] - turn * held[:, :1]
+
+
+def _screened(
+    model: Model, aim: PointAim, moved: Moved, u: Unknowns, held: Complex, goals: Complex, random: np.random.Generator
+) -> tuple[Array, Array, Complex]:
+    """Errors over the size (sets,), times of all points (sets, n), and the placement (sets, 3) of the best."""
+    own, wanted = moved.link(aim.link), aim.wanted
+    assert wanted is not None
+    n, sets = len(wanted.points), len(moved.frames)
+    few = np.unique(np.linspace(0, n - 1, min(n, _COMPARED)).round().astype(int))
+    best, times, c = np.full(sets, np.inf), np.zeros((sets, n)), np.zeros((sets, 3), dtype=np.complex128)
+    joints = model.plan.design.joints_of(aim.link)
+    for _ in range(1 if aim.inputs is not None else _TRIED):
+        point = u.places[:, joints].mean(axis=1) + random.normal(0.0, 0.8, (sets, 2))
+        guess = point[:, :1] + 1j * point[:, 1:]
+        for at in (slice(k, k + _TOGETHER) for k in range(0, sets, _TOGETHER)):
+            some = own._replace(frames=own.frames[at], rates=own.rates[at])
+            tried = _guesses(model, aim, some, guess[at], wanted)  # (sets, guesses, n)
+            error, placement = _fitted(some, tried[:, :, few], wanted, few, held[at], goals)
+            row, k = np.arange(len(error)), error.argmin(axis=1)
+            better = error[row, k] < best[at]
+            best[at] = np.where(better, error[row, k], best[at])
+            times[at] = np.where(better[:, None], tried[row, k], times[at])
+            c[at] = np.where(better[:, None], placement[row, k], c[at])
+    return best, times, c
+
+
+def _guesses(model: Model, aim: PointAim, own: MovingLink, guess: Complex, wanted: Wanted) -> Array:
+    """Times (sets, guesses, n) at which the points may be passed: as given, or spread by the arc of a curve."""
+    sets, span = len(own.frames), model.task.span
+    if aim.inputs is not None:
+        shifts = np.arange(_PHASES) * (span / _PHASES) if aim.own_start else np.zeros(1)
+        return np.tile((np.array(aim.inputs) + shifts[:, None])[None], (sets, 1, 1))
+    w = own.frames[..., 2] + 1j * own.frames[..., 3]
+    z = own.frames[..., 0] + 1j * own.frames[..., 1] + w * guess
+    arc = np.concatenate([np.zeros((sets, 1)), np.cumsum(np.abs(np.diff(z, axis=1)) + 1e-9, axis=1)], axis=1)
+    arc /= arc[:, -1:]
+    goal = wanted.points
+    steps = np.abs(np.diff(goal)) + 1e-3 * wanted.size
+    share = np.concatenate([[0.0], np.cumsum(steps)])
+    share /= share[-1] + (abs(goal[0] - goal[-1]) + 1e-3 * wanted.size if wanted.closed else 0.0)
+    phases = np.arange(_PHASES) / _PHASES
+    parts = (1.0,) if wanted.closed else _PARTS
+    if own.period:
+        every = [phase + part * share for part in parts for phase in phases]
+    else:
+        every = [phase + part * share for part in (*parts, 1.0) for phase in phases[::4] if phase + part <= 1.0 + 1e-9]
+    at = np.array(every)
+    turns, rest = np.divmod(at, 1.0) if own.period else (0.0 * at, at)
+    u = own.u - own.u[0]
+    return np.stack([np.interp(rest, row, u) + turns * span for row in arc])
+
+
+def _fitted(
+    own: MovingLink, times: Array, wanted: Wanted, few: NDArray[np.intp], held: Complex, goals: Complex
+) -> tuple[Array, Complex]:
+    """Root mean square errors over the size (sets, guesses) and the placement s, q, t by least squares."""
+    sets, count, n = times.shape
+    frames, _ = at_times(own, times.reshape(sets, -1))
+    frames = frames.reshape(sets, count, n, 4)
+    z, w = frames[..., 0] + 1j * frames[..., 1], frames[..., 2] + 1j * frames[..., 3]
+    goal = np.broadcast_to(wanted.points[few], z.shape)
+    B = np.stack([z, w, np.ones_like(z)], axis=3)
+    if len(goals):
+        more = np.stack([held, 0.0 * held, np.ones_like(held)], axis=2)[:, None] * _HELD
+        B = np.concatenate([B, np.broadcast_to(more, (sets, count, *more.shape[2:]))], axis=2)
+        goal = np.concatenate([goal, np.broadcast_to(goals * _HELD, (sets, count, len(goals)))], axis=2)
+    H = np.conj(np.swapaxes(B, 2, 3))
+    N = H @ B
+    N += 1e-12 * np.trace(N, axis1=2, axis2=3).real[..., None, None] * np.eye(3)
+    c = np.linalg.solve(N, H @ goal[..., None])
+    e = ((B @ c)[..., 0] - goal) / wanted.size
+    square = (np.abs(e) ** 2).sum(axis=2)
+    if wanted.angles is not None:
+        rest = np.exp(-1j * wanted.angles[few]) * w
+        square += (np.angle(rest * np.conj(rest.sum(axis=2, keepdims=True))) ** 2).sum(axis=2)
+    size = np.abs(c[..., 0, 0])  # a curve drawn by a huge or tiny mechanism is no start
+    square = np.where((size > 0.02 * wanted.size) & (size < 50.0 * wanted.size), square / n, np.inf)
+    return np.sqrt(square), c[..., 0]
+
+
+def own_starts(model: Model, given: Iterable[Mechanism]) -> Iterator[Unknowns]:
+    """Read mechanisms as candidates."""
+    yield from (from_mechanism(model, mechanism) for mechanism in given)

@@ -1,0 +1,339 @@
+"""What a mechanism shall do: paths of points, poses and angles of links, dwells, strokes.
+
+Targets name what they speak of: ``point`` a point of some link, ``link`` a link.  Targets with the same name speak of
+the same point or link; which link of a chain it is, the search finds out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.angles import angle, angles
+from graphsynth.core.checks import finite, point, positive, whole
+from graphsynth.core.errors import GeometryError
+
+Point = tuple[float, float]
+#: Points of a curve that is given as a whole: a segment, an arc, a drawing.
+_COUNT = 48
+#: Most points, poses or values of a target.
+MOST = 400
+
+
+@dataclass(frozen=True, kw_only=True)
+class Target:
+    """What every target has.
+
+    Parameters
+    ----------
+    tolerance : float
+        Largest error with which the target counts as met: of paths and poses a part of their size, else radians.
+    weight : float
+        Weight among several targets.
+    """
+
+    tolerance: float = 0.01
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        positive("tolerance", self.tolerance)
+        positive("weight", self.weight)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimedTarget(Target):
+    """A target that may say at which inputs of the driver it is met.
+
+    Parameters
+    ----------
+    inputs : sequence of float or str, optional
+        Inputs of the driver, increasing: radians or texts such as "30 deg" of a rotation, parts 0 to 1 of a stroke.
+    own_start : bool
+        The inputs count from a start of their own, which is free; else from the start that all targets share.
+    """
+
+    inputs: Sequence[float] | None = None
+    own_start: bool = False
+
+    def _time(self, count: int) -> None:
+        """Check and keep the inputs of a target with so many values."""
+        if self.inputs is None:
+            return
+        found = tuple(angles("inputs", list(self.inputs)).tolist())
+        if len(found) != count:
+            raise GeometryError(f"the target has {count} values but {len(found)} inputs; give one input for each")
+        if any(b <= a for a, b in pairwise(found)) or found[-1] - found[0] > math.tau + 1e-12:
+            raise GeometryError("inputs must increase, over at most one turn, 2 pi; sort them and remove duplicates")
+        object.__setattr__(self, "inputs", found)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathTarget(TimedTarget):
+    """A point passes given points, in order.
+
+    `GeometryError` for fewer than two points, or all at one place.
+
+    Parameters
+    ----------
+    points : sequence of (x, y)
+    closed : bool
+        Without inputs: the last point is followed by the first, and the path is the whole curve.
+    point : str
+        Name of the point.
+
+    Examples
+    --------
+    >>> PathTarget.segment((0, 0), (2, 0), count=3).points
+    ((0.0, 0.0), (1.0, 0.0), (2.0, 0.0))
+    """
+
+    points: Sequence[Point]
+    closed: bool = False
+    point: str = "P"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        places = tuple(point(f"points[{k}]", p) for k, p in enumerate(self.points))
+        if not 2 <= len(places) <= MOST or len(set(places)) < 2:
+            raise GeometryError(f"a path needs 2 to {MOST} points that do not all coincide; it has {len(places)}")
+        object.__setattr__(self, "points", places)
+        self._time(len(places))
+
+    @property
+    def goal(self) -> NDArray[np.complex128]:
+        """The points as complex numbers."""
+        return np.array([complex(*p) for p in self.points])
+
+    @property
+    def size(self) -> float:
+        """Largest distance of a point from their mean."""
+        return float(np.abs(self.goal - self.goal.mean()).max())
+
+    @classmethod
+    def segment(cls, start: Point, end: Point, *, count: int = _COUNT, **more: Any) -> Self:
+        """Return a straight segment; with ``inputs`` of its two ends it is passed at a constant velocity."""
+        first, last = complex(*point("start", start)), complex(*point("end", end))
+        return cls._drawn(np.linspace(first, last, whole("count", count, 2, MOST)), more)
+
+    @classmethod
+    def polyline(cls, corners: Sequence[Point], *, count: int = _COUNT, **more: Any) -> Self:
+        """Return a line from corner to corner, in points of equal distance along it; ``closed`` joins last and first."""
+        z = np.array([complex(*point(f"corners[{k}]", p)) for k, p in enumerate(corners)])
+        closed = bool(more.get("closed")) and z[0] != z[-1]
+        z = np.append(z, z[0]) if closed else z
+        return cls._drawn(evenly(z, whole("count", count, 2, MOST), bool(more.get("closed"))), more)
+
+    @classmethod
+    def arc(
+        cls, centre: Point, radius: float, start: float | str, end: float | str, *, count: int = _COUNT, **more: Any
+    ) -> Self:
+        """Return an arc of a circle between two directions; with ``inputs`` of its ends at a constant speed."""
+        turn = np.linspace(angle("start", start), angle("end", end), whole("count", count, 2, MOST))
+        return cls._drawn(complex(*point("centre", centre)) + positive("radius", radius) * np.exp(1j * turn), more)
+
+    @classmethod
+    def svg(cls, data: str, *, count: int = _COUNT, **more: Any) -> Self:
+        """Return the first curve of SVG path data, in points of equal distance along it; y turned up.
+
+        A curve that ends where it began, or with Z, is closed unless ``closed`` says otherwise.
+        """
+        curve = _read_svg(data)
+        ends = abs(curve[0] - curve[-1]) < 1e-9 * np.abs(curve - curve.mean()).max()
+        closed = bool(more.setdefault("closed", bool(ends)))
+        return cls._drawn(evenly(curve, whole("count", count, 2, MOST), closed and bool(ends)), more)
+
+    @classmethod
+    def _drawn(cls, z: NDArray[np.complex128], more: dict[str, Any]) -> Self:
+        ends = more.get("inputs")
+        if ends is not None and len(ends) == 2:  # noqa: PLR2004  # of both ends
+            more["inputs"] = np.linspace(*angles("inputs", list(ends)), len(z)).tolist()
+        return cls(points=[(p.real, p.imag) for p in z.tolist()], **more)
+
+
+def evenly(z: NDArray[np.complex128], count: int, closed: bool) -> NDArray[np.complex128]:
+    """Return points of equal distance along a polyline; of a closed one, whose ends meet, the last is left out."""
+    along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(z)))])
+    at = np.linspace(0.0, along[-1], count + closed)[:count]
+    return np.asarray(np.interp(at, along, z.real) + 1j * np.interp(at, along, z.imag))
+
+
+def _read_svg(data: str, fine: int = 64) -> NDArray[np.complex128]:
+    """Return the first sub-path of SVG path data as a fine polyline."""
+    from fontTools.pens.recordingPen import DecomposingRecordingPen
+    from fontTools.svgLib.path import parse_path
+
+    pen = DecomposingRecordingPen({})
+    try:
+        parse_path(data, pen)
+    except Exception as error:  # the reader raises whatever its grammar meets
+        raise GeometryError(f"SVG path data {data[:40]!r} cannot be read ({error}); give the text of an attribute d") from None
+    z: list[complex] = []
+    t = np.linspace(0.0, 1.0, fine + 1)[1:]
+    for kind, given in pen.value:
+        if kind == "moveTo" and z or kind in ("closePath", "endPath"):
+            z += z[:1] if kind == "closePath" and z[-1] != z[0] else []
+            break
+        ends = [complex(*p) for p in given]
+        if kind in ("moveTo", "lineTo"):
+            z += ends
+        elif kind == "curveTo":
+            a, b, c, d = z[-1], *ends
+            z += ((1 - t) ** 3 * a + 3 * (1 - t) ** 2 * t * b + 3 * (1 - t) * t * t * c + t**3 * d).tolist()
+        else:  # one or more quadratic curves with the points between them implied
+            implied = [(p + q) / 2 for p, q in zip(ends, ends[1:-1])]
+            for b, d in zip(ends[:-1], [*implied, ends[-1]]):
+                z += ((1 - t) ** 2 * z[-1] + 2 * (1 - t) * t * b + t * t * d).tolist()
+    if len(z) < 2:  # noqa: PLR2004  # a curve has two ends
+        raise GeometryError(f"SVG path data {data[:40]!r} draws nothing; give M and at least one more command")
+    return np.conj(np.array(z))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PosesTarget(TimedTarget):
+    """A link passes poses, in order (motion generation).
+
+    `GeometryError` for fewer than two or more than 400 poses.
+
+    Parameters
+    ----------
+    poses : sequence of (x, y, theta)
+        Places of one point of the link, and angles of the link, radians or texts such as "30 deg"; the line on the link
+        from which they are measured is free.
+    point : str
+        Name of the point.
+    """
+
+    poses: Sequence[tuple[float, float, float]]
+    point: str = "P"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        rows = [(*point(f"poses[{k}]", (p[0], p[1])), angle(f"poses[{k}]", p[2])) for k, p in enumerate(self.poses)]
+        if not 2 <= len(rows) <= MOST:
+            raise GeometryError(f"a motion needs 2 to {MOST} poses; it has {len(rows)}")
+        object.__setattr__(self, "poses", tuple(rows))
+        self._time(len(rows))
+
+    @property
+    def goal(self) -> NDArray[np.complex128]:
+        """The places as complex numbers."""
+        return np.array([complex(x, y) for x, y, _ in self.poses])
+
+    @property
+    def turn(self) -> NDArray[np.float64]:
+        """The angles, from the first."""
+        return np.array([theta - self.poses[0][2] for _, _, theta in self.poses])
+
+    @property
+    def size(self) -> float:
+        """Largest distance of a place from their mean; angles count as arcs of it."""
+        return float(np.abs(self.goal - self.goal.mean()).max()) or 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class FunctionTarget(TimedTarget):
+    """The angle of a link is a function of the input; of a slider its place.  Only differences count.
+
+    Parameters
+    ----------
+    outputs : sequence of float or str
+        At the inputs, which must be given: radians or texts such as "30 deg"; lengths of a slider.
+    link : str
+        Name of the output link, which is jointed to the frame.
+    """
+
+    outputs: Sequence[float]
+    link: str = "output"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.inputs is None:
+            raise GeometryError("a function needs inputs; give one for each output")
+        object.__setattr__(self, "outputs", tuple(angles("outputs", list(self.outputs)).tolist()))
+        self._time(len(self.outputs))
+
+    @classmethod
+    def of(
+        cls,
+        function: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+        between: tuple[float, float],
+        *,
+        input_range: float | str,
+        output_range: float | str,
+        count: int = 25,
+        **more: Any,
+    ) -> Self:
+        """Return a function y(x) between two x, drawn out over ranges of input and output.
+
+        >>> FunctionTarget.of(np.log10, (1, 2), input_range="60 deg", output_range="90 deg", count=3).inputs[1]
+        0.5235987755982988
+        """
+        first, last = (finite(f"between[{k}]", value) for k, value in enumerate(between))
+        y = np.asarray(function(np.linspace(first, last, whole("count", count, 3, MOST))))
+        if not np.isfinite(y).all() or y[0] == y[-1]:
+            raise GeometryError(f"the function must be finite and differ at both ends of {between}; choose others")
+        span, reach = angle("input_range", input_range), angle("output_range", output_range)
+        return cls(inputs=np.linspace(0.0, span, len(y)).tolist(), outputs=(reach * (y - y[0]) / (y[-1] - y[0])).tolist(), **more)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DwellTarget(Target):
+    """A link stands still while the driver goes on; ``tolerance`` says how still, ``SwingTarget`` what it does else.
+
+    Parameters
+    ----------
+    span : float or str
+        How long: of the input.
+    start : float or str, optional
+        From where on; free by default.
+    link : str
+    """
+
+    span: float
+    start: float | None = None
+    link: str = "output"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        span = positive("span", angle("span", self.span))
+        if span > math.tau:
+            raise GeometryError(f"span = {span:.6g} is longer than a turn, 2 pi; give the part of it that is to be still")
+        object.__setattr__(self, "span", span)
+        if self.start is not None:
+            object.__setattr__(self, "start", angle("start", self.start))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SwingTarget(Target):
+    """A link swings to and fro: how far, and how much longer one way than the other.
+
+    Parameters
+    ----------
+    least, most : float or str
+        Limits of the stroke: radians or texts such as "30 deg", lengths of a slider.
+    time_ratio : float, optional
+        Time of the slow stroke over that of the quick one, at a constant speed of the driver (full rotation).
+    link : str
+    """
+
+    least: float = 0.0
+    most: float = math.inf
+    time_ratio: float | None = None
+    link: str = "output"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        least = angle("least", self.least)
+        most = math.inf if self.most == math.inf else angle("most", self.most)
+        if not 0.0 <= least <= most or most <= 0.0:
+            raise GeometryError(f"least = {least:.6g} and most = {most:.6g} must be 0 <= least <= most; correct them")
+        object.__setattr__(self, "least", least)
+        object.__setattr__(self, "most", most)
+        if self.time_ratio is not None and not 1.0 <= finite("time_ratio", self.time_ratio) <= 20.0:  # noqa: PLR2004
+            raise GeometryError(f"time_ratio = {self.time_ratio} must lie in 1 to 20: slow over quick")

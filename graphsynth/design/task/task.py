@@ -1,0 +1,160 @@
+"""A task: what a mechanism shall do, and what is given, bounded or wished."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from graphsynth.core.angles import angle
+from graphsynth.core.checks import choice, finite, point, positive, whole
+from graphsynth.core.errors import GeometryError
+from graphsynth.core.shown import Shown
+from graphsynth.design.task.targets import PathTarget, Point, PosesTarget, SwingTarget, Target
+
+Drive = Literal["rotation", "rocking", "cylinder", "slide"]
+#: x and y of the lower left, then of the upper right corner.
+Box = tuple[float, float, float, float]
+#: What answers are ranked by, and how much each counts: errors in tolerances, links, size of the task, radians.
+RANKED = {"error": 1.0, "links": 0.05, "size": 0.02, "transmission": 0.1}
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Task(Shown):
+    """Targets, all in one set of coordinates, and bounds that every answer keeps.
+
+    `GeometryError` for bounds that contradict themselves.
+
+    Parameters
+    ----------
+    targets : sequence of PathTarget, PosesTarget, FunctionTarget, DwellTarget or SwingTarget
+        Several at once: one frame, one drive.
+    drive : {"rotation", "rocking", "cylinder", "slide"}
+        A link on the frame that turns fully, or by ``span``; a cylinder between any two links; a slide on the frame.
+    span : float or str
+        Of a rocking drive, radians or a text such as "90 deg".
+    stroke : (float, float), optional
+        Limits of the stroke of a cylinder or slide; free by default.
+    links : sequence of int
+        Numbers of links that are allowed; fewer links are tried first.
+    sliders : int
+        Most prismatic joints, the drive not counted.
+    pivots : sequence of (x, y)
+        Given revolute joints on the frame; a chain may have more of them.
+    pivot_region, box : (x0, y0, x1, y1), optional
+        Where all joints on the frame lie; where all joints and named points stay over the whole motion.
+    lengths : (float, float), optional
+        Shortest and longest distance of two revolute joints on a link.
+    crank : float, optional
+        Given length of the driven link.
+    length_ratio : float
+        Longest over shortest of these distances; those of points from the joints of their link count as long ones.
+    transmission : float or str
+        Smallest transmission angle over the motion.
+    rank : mapping of str to float
+        What counts how much in the ranking, beside the defaults: "error", "links", "size", "transmission".
+
+    Examples
+    --------
+    >>> task = Task(targets=[PathTarget.segment((0, 0), (4, 0))], pivots=[(1, -3)])
+    >>> task.links, task.size
+    ((4, 6), 2.0)
+    """
+
+    targets: Sequence[Target]
+    drive: Drive = "rotation"
+    span: float = math.tau
+    stroke: tuple[float, float] | None = None
+    links: Sequence[int] = (4, 6)
+    sliders: int = 0
+    pivots: Sequence[Point] = ()
+    pivot_region: Box | None = None
+    box: Box | None = None
+    lengths: tuple[float, float] | None = None
+    crank: float | None = None
+    length_ratio: float = 8.0
+    transmission: float = math.radians(25.0)
+    rank: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        targets = tuple(self.targets)
+        if not targets or not all(isinstance(target, Target) for target in targets):
+            raise GeometryError(f"targets = {self.targets!r} must be one or more targets, such as a PathTarget")
+        put(self, "targets", targets)
+        choice("drive", self.drive, ("rotation", "rocking", "cylinder", "slide"))
+        span = 1.0 if self.linear else positive("span", angle("span", self.span))
+        if span > math.tau or (self.drive == "rotation" and span < math.tau):
+            raise GeometryError(f"span = {span:.6g} must be at most 2 pi, and a turn for a rotation; use drive 'rocking'")
+        put(self, "span", span)
+        if self.stroke is not None:
+            put(self, "stroke", _between("stroke", self.stroke))
+        put(self, "links", tuple(sorted({whole("links", n, 4, 10) for n in self.links})))
+        if not self.links or any(n % 2 for n in self.links):
+            raise GeometryError(f"links = {self.links} must be even numbers, 4 to 10: others have not one freedom")
+        whole("sliders", self.sliders, 0, 3)
+        put(self, "pivots", tuple(point(f"pivots[{k}]", p) for k, p in enumerate(self.pivots)))
+        if len(set(self.pivots)) < len(self.pivots):
+            raise GeometryError("pivots repeat; give each once")
+        for name in ("pivot_region", "box"):
+            if getattr(self, name) is not None:
+                put(self, name, _box(name, getattr(self, name)))
+        if self.lengths is not None:
+            put(self, "lengths", _between("lengths", self.lengths))
+        if self.crank is not None:
+            positive("crank", self.crank)
+        if finite("length_ratio", self.length_ratio) < 1.0:
+            raise GeometryError(f"length_ratio = {self.length_ratio} must be 1 or more")
+        put(self, "transmission", angle("transmission", self.transmission))
+        if not 0.0 <= self.transmission < 0.5 * math.pi:
+            raise GeometryError(f"transmission = {self.transmission:.6g} must lie in [0, pi/2); give radians")
+        for name, value in self.rank.items():
+            choice("rank", name, tuple(RANKED))
+            finite(f"rank[{name!r}]", value)
+        put(self, "rank", {**RANKED, **self.rank})
+        for target in targets:
+            last = (getattr(target, "inputs", None) or (0.0,))[-1]
+            if last > span + 1e-9 and self.drive != "rotation":
+                raise GeometryError(f"a target has an input of {last:.6g}, but the drive ends at {span:.6g}")
+            if isinstance(target, SwingTarget) and target.time_ratio is not None and self.drive != "rotation":
+                raise GeometryError("a time ratio needs a drive that turns fully; use drive = 'rotation'")
+
+    @property
+    def linear(self) -> bool:
+        """Whether the drive pushes; then inputs are parts of its stroke."""
+        return self.drive in ("cylinder", "slide")
+
+    @property
+    def size(self) -> float:
+        """Length by which the task is measured: of its largest path, else the distance of given pivots, else 1."""
+        sizes = [target.size for target in self.targets if isinstance(target, PathTarget | PosesTarget)]
+        apart = [math.dist(p, q) for p in self.pivots for q in self.pivots]
+        return max(sizes, default=0.0) or max(apart, default=0.0) or 1.0
+
+    @property
+    def names(self) -> dict[str, bool]:
+        """Names of the points and links the targets speak of, in their order; true of points."""
+        found: dict[str, bool] = {}
+        for target in self.targets:
+            name = str(getattr(target, "point", "") or getattr(target, "link", ""))
+            found[name] = found.get(name, False) or hasattr(target, "point")
+        return found
+
+    def _told(self) -> tuple[str, list[tuple[str, str]]]:
+        rows = [(type(t).__name__, f"tolerance {t.tolerance:g}, weight {t.weight:g}") for t in self.targets]
+        return f"Task: {self.drive}, {' or '.join(map(str, self.links))} links", rows
+
+
+def _between(name: str, given: tuple[float, float]) -> tuple[float, float]:
+    least, most = (positive(f"{name}[{k}]", value) for k, value in enumerate(given))
+    if least > most:
+        raise GeometryError(f"{name} = ({least:g}, {most:g}): the first must not be larger than the second")
+    return least, most
+
+
+def _box(name: str, given: Box) -> Box:
+    x0, y0, x1, y1 = (finite(f"{name}[{k}]", value) for k, value in enumerate(given))
+    if not (x0 < x1 and y0 < y1):
+        raise GeometryError(f"{name} = {given} must be (x0, y0, x1, y1) with x0 < x1 and y0 < y1")
+    return x0, y0, x1, y1

@@ -1,0 +1,166 @@
+"""Bounds as penalties: numbers that vanish where a bound is kept, with their derivatives.
+
+What depends on the motion is looked at where it is worst; the rest depends on the unknowns alone.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.design.task.model import Moved, Rows, Unknowns
+
+if TYPE_CHECKING:
+    from graphsynth.design.task.model import Model
+
+Array = NDArray[np.float64]
+#: How much of a bound is asked beyond, and the violation that counts like a tolerance.
+_BEYOND, _UNIT = 1.03, 0.01
+
+
+def sampled_wishes(model: Model, moved: Moved, u: Unknowns, strict: float) -> list[Rows]:
+    """Transmission angles of dyads, and the box."""
+    found = [_transmission(model, moved, u, dyad, strict / _UNIT) for dyad in model.dyads]
+    if model.task.box is not None:
+        found.append(_box(model, moved, u, model.task.box, strict / _UNIT))
+    return found
+
+
+def _transmission(
+    model: Model, moved: Moved, u: Unknowns, dyad: tuple[int, int, int, int, int], weight: float
+) -> Rows:
+    """What the sine of the angle between both links of a dyad lacks where it is least."""
+    p, q, A, B, C = dyad
+    one, two = u.places[:, B] - u.places[:, A], u.places[:, B] - u.places[:, C]
+    first, second = (moved.link(link).frames for link in (p, q))
+    turn = (second[..., 2] + 1j * second[..., 3]) * (first[..., 2] - 1j * first[..., 3])
+    between = (two[:, 0] + 1j * two[:, 1]) * (one[:, 0] - 1j * one[:, 1])
+    mu = between[:, None] * turn / np.maximum(np.abs(between), 1e-300)[:, None]
+    mu = mu * np.where(mu[:, :1].imag < 0.0, -1.0, 1.0)
+    worst = mu.imag.argmin(axis=1)
+    row, least = np.arange(len(mu)), max(_BEYOND * math.sin(model.task.transmission), 1e-3)
+    short = (least - mu[row, worst].imag) / least
+    slope = np.where(short > 0.0, -mu[row, worst].real / least, 0.0)
+    loads, direct = np.zeros((len(mu), 1, model.links, 3, 1)), np.zeros((len(mu), 1, 1, model.size))
+    loads[:, 0, p, 2, 0], loads[:, 0, q, 2, 0] = -slope, slope
+    for arm, sign, end in ((one, -1.0, A), (two, 1.0, C)):
+        normal = sign * slope[:, None] * np.stack([-arm[:, 1], arm[:, 0]], 1) / np.maximum((arm**2).sum(1), 1e-300)[:, None]
+        for joint, way in ((B, normal), (end, -normal)):
+            if (at := model.column(joint)) >= 0:
+                direct[:, 0, 0, at : at + 2] += way
+    return Rows(moved.inputs[worst][:, None], np.maximum(short, 0.0)[:, None, None], loads, direct, weight)
+
+
+def _box(model: Model, moved: Moved, u: Unknowns, box: tuple[float, ...], weight: float) -> Rows:
+    """How far joints and points leave the box on each of its four sides, over the size of the task."""
+    links = [joint.a for joint in model.plan.design.graph.joints]
+    columns = [model.column(k) for k in range(model.joints)]
+    for name, of_point in model.task.names.items():
+        if of_point:
+            links.append(model.carrier(name))
+            columns.append(model.point_at(name))
+    local = np.concatenate([u.places, u.points], axis=1)
+    w = np.stack([moved.link(k).frames for k in links], axis=2)  # (sets, samples, places, 4)
+    x = w[..., 0] + w[..., 2] * local[:, None, :, 0] - w[..., 3] * local[:, None, :, 1]
+    y = w[..., 1] + w[..., 3] * local[:, None, :, 0] + w[..., 2] * local[:, None, :, 1]
+    sets, row, size = len(x), np.arange(len(x)), model.task.size
+    loads, direct = np.zeros((sets, 1, model.links, 3, 4)), np.zeros((sets, 1, 4, model.size))
+    values, times = np.zeros((sets, 1, 4)), np.zeros((sets, 4))
+    for side, (z, sign, limit, axis) in enumerate(((x, -1.0, box[0], 0), (y, -1.0, box[1], 1), (x, 1.0, box[2], 0), (y, 1.0, box[3], 1))):
+        over = (sign * (z - limit) / size).reshape(sets, -1)
+        worst = over.argmax(axis=1)
+        sample, place = np.divmod(worst, len(links))
+        out = over[row, worst] > 0.0
+        values[:, 0, side], times[:, side] = np.where(out, over[row, worst], 0.0), moved.inputs[sample]
+        at, p, unit = w[row, sample, place], local[row, place], np.where(out, sign / size, 0.0)
+        arm = (at[:, 2] + 1j * at[:, 3]) * (p[:, 0] + 1j * p[:, 1])
+        own = np.array(links)[place]
+        loads[row, 0, own, axis, side] = unit
+        loads[row, 0, own, 2, side] = unit * (-arm.imag if axis == 0 else arm.real)
+        column = np.array(columns)[place]
+        free = column >= 0
+        by = (at[:, 2], -at[:, 3]) if axis == 0 else (at[:, 3], at[:, 2])
+        for k in (0, 1):
+            direct[row[free], 0, side, column[free] + k] = (unit * by[k])[free]
+    return Rows(times, values, loads, direct, weight)
+
+
+def direct_wishes(model: Model, u: Unknowns, strict: float) -> tuple[Array, Array]:
+    """Lengths, pivots and the stroke: numbers (sets, m) and their derivatives (sets, m, size)."""
+    task, sets = model.task, len(u.places)
+    values: list[Array] = []
+    slopes: list[Array] = []
+
+    def add(value: Array, slope: Array) -> None:
+        active = value > 0.0
+        values.append(np.where(active, value, 0.0))
+        slopes.append(slope * active[:, None])
+
+    sides, arms = _pairs(model)
+    length, by = _logarithms(model, u, sides + arms)
+    short = length[:, : len(sides)].argmin(axis=1)
+    row = np.arange(sets)
+    for k in range(len(sides) + len(arms)):
+        over = length[:, k] - length[row, short] - math.log(task.length_ratio / _BEYOND)
+        add(over, by[:, k] - by[row, short])
+    if task.lengths is not None:
+        for k in range(len(sides)):
+            add(math.log(task.lengths[0]) - length[:, k], -by[:, k])
+            add(length[:, k] - math.log(task.lengths[1]), by[:, k])
+    if task.crank is not None and (k := _crank(model, sides)) >= 0:
+        values.append(length[:, k] - math.log(task.crank))
+        slopes.append(by[:, k])
+    if task.pivot_region is not None:
+        frame = model.plan.design.graph.frame
+        assert frame is not None
+        for joint in model.plan.design.joints_of(frame):
+            if (at := model.column(joint)) >= 0:
+                for axis in (0, 1):
+                    for sign, limit in ((-1.0, task.pivot_region[axis]), (1.0, task.pivot_region[axis + 2])):
+                        slope = np.zeros((sets, model.size))
+                        slope[:, at + axis] = sign / task.size
+                        add(sign * (u.places[:, joint, axis] - limit) / task.size, slope)
+    if task.linear and task.stroke is not None:
+        for sign, bound in ((-1.0, task.stroke[0]), (1.0, task.stroke[1])):
+            slope = np.zeros((sets, model.size))
+            slope[:, model.stroke_at] = sign / u.stroke
+            add(sign * (np.log(np.maximum(u.stroke, 1e-300)) - math.log(bound)), slope)
+    weight = strict / _UNIT
+    if not values:
+        return np.zeros((sets, 0)), np.zeros((sets, 0, model.size))
+    return weight * np.stack(values, axis=1), weight * np.stack(slopes, axis=1)
+
+
+def _pairs(model: Model) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """Pairs of joints whose distance is a length; of points (numbers after the joints) and joints of their link."""
+    design, arms, number = model.plan.design, [], model.joints
+    for name, of_point in model.task.names.items():
+        if of_point:
+            arms += [(number, k) for k in design.joints_of(model.carrier(name)) if design.kinds[k] == "R"]
+            number += 1
+    return [(int(p), int(q)) for p, q in design.sides], arms
+
+
+def _logarithms(model: Model, u: Unknowns, pairs: list[tuple[int, int]]) -> tuple[Array, Array]:
+    """Logarithms of distances (sets, pairs) and their derivatives."""
+    places = np.concatenate([u.places, u.points], axis=1)
+    found, slope = np.zeros((len(places), len(pairs))), np.zeros((len(places), len(pairs), model.size))
+    for k, (p, q) in enumerate(pairs):
+        d = places[:, p] - places[:, q]
+        square = np.maximum((d**2).sum(axis=1), 1e-24)
+        found[:, k] = 0.5 * np.log(square)
+        for place, sign in ((p, 1.0), (q, -1.0)):
+            at = model.column(place) if place < model.joints else model.points_at + 2 * (place - model.joints)
+            if at >= 0:
+                slope[:, k, at : at + 2] += sign * d / square[:, None]
+    return found, slope
+
+
+def _crank(model: Model, sides: list[tuple[int, int]]) -> int:
+    """Index of the driven link's length; -1 if it has none."""
+    driven = model.plan.design.drivers[0][1]
+    own = {*model.plan.design.joints_of(driven)}
+    return next((k for k, pair in enumerate(sides) if {*pair} <= own), -1)
