@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 #: Samples of a dwell; inputs before and after a dead centre between which its speed is differentiated.
 _STILL, _NEAR = 13, 0.02
+#: Steps of the times of a path after each step of its mechanism.
+_ROUNDS = 2
 
 
 class Aim(ABC):
@@ -79,7 +81,7 @@ class TimedAim(Aim):
             return np.array(self.inputs) + (self.own(u, self.unknowns - 1) if self.own_start else np.zeros((sets, 1)))
         own = self.seen(moved, u)
         assert self.wanted is not None
-        return matched(own, self.wanted) if before is None else followed(own, before, self.wanted)
+        return matched(own, self.wanted) if before is None else followed(own, before, self.wanted, _ROUNDS)
 
     def seen(self, moved: Moved, u: Unknowns) -> MovingLink:
         """Return the motion of the link with its origin in the named point."""
@@ -243,9 +245,9 @@ class SwingAim(Aim):
 
     def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
         """Inputs of the largest and the smallest value (sets, 2)."""
-        values = self.measure.values(np.where(moved.complete[:, None, None, None], moved.frames, _REST), u)
+        values = self.measure.values(moved.frames, u)
         values = values if self.measure.guide >= 0 else np.unwrap(values, axis=1)
-        rates = np.where(moved.complete[:, None], self.measure.rates(np.nan_to_num(moved.rates), u), 1.0)
+        rates = self.measure.rates(moved.rates, u)
         return np.stack([_extreme(moved, values, rates, 1.0), _extreme(moved, values, rates, -1.0)], axis=1)
 
     def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
@@ -258,9 +260,6 @@ class SwingAim(Aim):
         away = swing - np.clip(swing, self.target.least, self.target.most)
         active = (away != 0.0)[:, None, :, None]
         return Rows(times, away[:, None], loads * active[..., None], direct * active, self.weight, mix=np.array([[1.0, -1.0]]))
-
-
-_REST = np.array([0.0, 0.0, 1.0, 0.0])
 
 
 def _extreme(moved: Moved, values: Array, rates: Array, sign: float) -> Array:

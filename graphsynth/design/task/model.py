@@ -44,7 +44,7 @@ class Unknowns(NamedTuple):
 
 
 class Moved(NamedTuple):
-    """Motions: inputs (M,), frames (sets, M, links, 4), rates (sets, M, links, 3), and which are complete."""
+    """Motions: inputs (M,), frames (sets, M, links, 4), rates (sets, M, links, 3); something harmless if incomplete."""
 
     inputs: Array
     frames: Array
@@ -54,14 +54,11 @@ class Moved(NamedTuple):
 
     def link(self, k: int) -> MovingLink:
         """Return the motion of one link, harmless where it is not complete."""
-        keep = self.complete[:, None, None]
-        frames, rates = np.where(keep, self.frames[:, :, k], _REST), np.where(keep, self.rates[:, :, k], _SLOW)
-        return MovingLink(self.inputs, frames, rates, self.period)
+        return MovingLink(self.inputs, self.frames[:, :, k], self.rates[:, :, k], self.period)
 
     def at(self, times: Array) -> tuple[Array, Array]:
         """Return frames (sets, n, links, 4) and rates (sets, n, links, 3) at times (sets, n)."""
-        every = [at_times(self.link(k), times) for k in range(self.frames.shape[2])]
-        return np.stack([f for f, _ in every], axis=2), np.stack([r for _, r in every], axis=2)
+        return at_times(MovingLink(self.inputs, self.frames, self.rates, self.period), times)
 
 
 class Rows(NamedTuple):
@@ -193,6 +190,7 @@ class Model:
         frames[..., :2] *= scale[..., None]
         rates[..., :2] *= scale[..., None]
         complete &= np.isfinite(rates).all(axis=(1, 2, 3))
+        frames[~complete], rates[~complete] = _REST, _SLOW
         return Moved(self.inputs, frames, rates, complete, period)
 
     # --- errors and derivatives

@@ -29,9 +29,9 @@ from graphsynth.design.task.task import Task
 
 #: First candidates of a piece; kept at each stage, and iterations there: with bounds weak, then strict.
 _FIRST = 600
-_STAGES = ((60, 0.2, 8), (20, 0.2, 15), (6, 3.0, 40))
-#: Pieces of a wave, of which so many go to the best plans so far; waves for each number of links.
-_WAVE, _AGAIN, _WAVES = 24, 12, 4
+_STAGES = ((80, 0.2, 8), (25, 0.2, 15), (6, 3.0, 40))
+#: Pieces of a wave, of which so many go to the best plans so far; waves by the number of links.
+_WAVE, _AGAIN, _WAVES = 8, 4, {4: 4, 6: 8, 8: 16, 10: 16}
 #: Candidates of a piece that are kept; lengths that differ by less, over the size, are near copies.
 _KEPT, _ALIKE = 2, 0.02
 #: Candidates judged after each wave, for each answer asked.
@@ -194,7 +194,7 @@ class _Run:
             every = list(plans(self.task, links))
             random = np.random.default_rng([self.seed, links])
             random.shuffle(every)  # type: ignore[arg-type]
-            for wave in range(_WAVES if every else 0):
+            for wave in range(_WAVES[links] if every else 0):
                 fits = True
                 self._wave(self._chosen(every, wave), executor, progress)
                 if self.stopped or self._enough():
@@ -207,17 +207,19 @@ class _Run:
 
     def _chosen(self, every: Sequence[Plan], wave: int) -> list[Plan]:
         """Return the plans of a wave: new ones in turn, and those that came nearest so far."""
-        new = [every[k % len(every)] for k in range(wave * _AGAIN, (wave + 1) * _AGAIN)]
-        if not wave:
-            return [*new, *(every[k % len(every)] for k in range(_AGAIN, _WAVE))]
+        fresh = _WAVE if wave == 0 else _WAVE - _AGAIN
+        begun = 0 if wave == 0 else _WAVE + (wave - 1) * fresh
+        new = [every[k % len(every)] for k in range(begun, begun + fresh)]
+        if wave == 0:
+            return new
         order: dict[int, None] = {}
         of_chain = {id(plan) for plan in every}
         for candidate in sorted(self.found, key=lambda c: c.error):
             if id(candidate.plan) in of_chain:
                 order.setdefault(id(candidate.plan))
         by_id = {id(plan): plan for plan in every}
-        good = [by_id[k] for k in order][: _AGAIN // 3] or list(every)
-        return [*new, *(good[k % len(good)] for k in range(_WAVE - _AGAIN))]
+        good = [by_id[k] for k in order][: _AGAIN // 2] or list(every)
+        return [*new, *(good[k % len(good)] for k in range(_AGAIN))]
 
     def _wave(
         self, chosen: Sequence[Plan], executor: Executor | None, progress: Callable[[Progress], None] | None
@@ -303,7 +305,7 @@ class _Run:
 def worked(piece: Piece) -> tuple[list[Candidate], dict[str, int]]:
     """Do one piece: begin with many candidates, keep the best, improve them; return the best and what failed."""
     random = np.random.default_rng([piece.seed, piece.number])
-    sense = -1 if piece.number % 2 else 1
+    sense = int(random.choice([-1, 1]))
     try:
         model = Model(piece.task, piece.plan, sense, random)
         if not model.regular:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from graphsynth.design.task.aims import FunctionAim, PointAim
 from graphsynth.design.task.model import Model, Moved, Unknowns
-from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times
+from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted
 
 if TYPE_CHECKING:
     from graphsynth.design.task.plans import Plan
@@ -157,6 +157,7 @@ def _screened(
 ) -> tuple[Array, Array, Complex]:
     """Errors over the size (sets,), times of all points (sets, n), and the placement (sets, 3) of the best."""
     own, wanted = moved.link(aim.link), aim.wanted
+    own = own._replace(frames=np.ascontiguousarray(own.frames))
     assert wanted is not None
     n, sets = len(wanted.points), len(moved.frames)
     few = np.unique(np.linspace(0, n - 1, min(n, _COMPARED)).round().astype(int))
@@ -208,9 +209,10 @@ def _fitted(
 ) -> tuple[Array, Complex]:
     """Root mean square errors over the size (sets, guesses) and the placement s, q, t by least squares."""
     sets, count, n = times.shape
-    frames, _ = at_times(own, times.reshape(sets, -1))
-    frames = frames.reshape(sets, count, n, 4)
-    z, w = frames[..., 0] + 1j * frames[..., 1], frames[..., 2] + 1j * frames[..., 3]
+    u = np.mod(times, own.period) if own.period else times
+    row, k = np.arange(sets)[:, None, None], np.clip(np.searchsorted(own.u, u, side="right") - 1, 0, len(own.u) - 2)
+    x = (u - own.u[k]) / (own.u[k + 1] - own.u[k])  # chords are near enough to compare starts
+    z, w = ((1.0 - x) * f[row, k] + x * f[row, k + 1] for f in own.frames.view(np.complex128).transpose(2, 0, 1))
     goal = np.broadcast_to(wanted.points[few], z.shape)
     B = np.stack([z, w, np.ones_like(z)], axis=3)
     if len(goals):

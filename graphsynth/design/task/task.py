@@ -14,6 +14,8 @@ from graphsynth.core.shown import Shown
 from graphsynth.design.task.targets import PathTarget, Point, PosesTarget, SwingTarget, Target
 
 Drive = Literal["rotation", "rocking", "cylinder", "slide"]
+#: Lengths of links unless they are given, in sizes of the task.
+_SHORT, _LONG = 0.1, 6.0
 #: x and y of the lower left, then of the upper right corner.
 Box = tuple[float, float, float, float]
 #: What answers are ranked by, and how much each counts: errors in tolerances, links, size of the task, radians.
@@ -45,7 +47,7 @@ class Task(Shown):
     pivot_region, box : (x0, y0, x1, y1), optional
         Where all joints on the frame lie; where all joints and named points stay over the whole motion.
     lengths : (float, float), optional
-        Shortest and longest distance of two revolute joints on a link.
+        Shortest and longest distance of two revolute joints on a link; by default 0.1 and 6 sizes of the task.
     crank : float, optional
         Given length of the driven link.
     length_ratio : float
@@ -102,6 +104,8 @@ class Task(Shown):
                 put(self, name, _box(name, getattr(self, name)))
         if self.lengths is not None:
             put(self, "lengths", _between("lengths", self.lengths))
+        else:
+            put(self, "lengths", (_SHORT * self.size, _LONG * self.size))
         if self.crank is not None:
             positive("crank", self.crank)
         if finite("length_ratio", self.length_ratio) < 1.0:

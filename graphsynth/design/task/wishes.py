@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 #: How much of a bound is asked beyond, and the violation that counts like a tolerance.
-_BEYOND, _UNIT = 1.03, 0.01
+_BEYOND, _SPARE, _UNIT = 1.03, 0.003, 0.01
 
 
 def sampled_wishes(model: Model, moved: Moved, u: Unknowns, strict: float) -> list[Rows]:
@@ -70,7 +70,7 @@ def _box(model: Model, moved: Moved, u: Unknowns, box: tuple[float, ...], weight
     loads, direct = np.zeros((sets, 1, model.links, 3, 4)), np.zeros((sets, 1, 4, model.size))
     values, times = np.zeros((sets, 1, 4)), np.zeros((sets, 4))
     for side, (z, sign, limit, axis) in enumerate(((x, -1.0, box[0], 0), (y, -1.0, box[1], 1), (x, 1.0, box[2], 0), (y, 1.0, box[3], 1))):
-        over = (sign * (z - limit) / size).reshape(sets, -1)
+        over = (sign * (z - limit) / size + _SPARE).reshape(sets, -1)
         worst = over.argmax(axis=1)
         sample, place = np.divmod(worst, len(links))
         out = over[row, worst] > 0.0
@@ -108,8 +108,8 @@ def direct_wishes(model: Model, u: Unknowns, strict: float) -> tuple[Array, Arra
         add(over, by[:, k] - by[row, short])
     if task.lengths is not None:
         for k in range(len(sides)):
-            add(math.log(task.lengths[0]) - length[:, k], -by[:, k])
-            add(length[:, k] - math.log(task.lengths[1]), by[:, k])
+            add(math.log(task.lengths[0]) + _SPARE - length[:, k], -by[:, k])
+            add(length[:, k] - math.log(task.lengths[1]) + _SPARE, by[:, k])
     if task.crank is not None and (k := _crank(model, sides)) >= 0:
         values.append(length[:, k] - math.log(task.crank))
         slopes.append(by[:, k])
@@ -122,12 +122,12 @@ def direct_wishes(model: Model, u: Unknowns, strict: float) -> tuple[Array, Arra
                     for sign, limit in ((-1.0, task.pivot_region[axis]), (1.0, task.pivot_region[axis + 2])):
                         slope = np.zeros((sets, model.size))
                         slope[:, at + axis] = sign / task.size
-                        add(sign * (u.places[:, joint, axis] - limit) / task.size, slope)
+                        add(sign * (u.places[:, joint, axis] - limit) / task.size + _SPARE, slope)
     if task.linear and task.stroke is not None:
         for sign, bound in ((-1.0, task.stroke[0]), (1.0, task.stroke[1])):
             slope = np.zeros((sets, model.size))
             slope[:, model.stroke_at] = sign / u.stroke
-            add(sign * (np.log(np.maximum(u.stroke, 1e-300)) - math.log(bound)), slope)
+            add(sign * (np.log(np.maximum(u.stroke, 1e-300)) - math.log(bound)) + _SPARE, slope)
     weight = strict / _UNIT
     if not values:
         return np.zeros((sets, 0)), np.zeros((sets, 0, model.size))

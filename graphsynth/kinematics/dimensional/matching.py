@@ -30,24 +30,33 @@ class MovingLink(NamedTuple):
 
 
 def at_times(own: MovingLink, times: Array) -> tuple[Array, Array]:
-    """Frames (sets, N, 4) and rates (sets, N, 3) at times (sets, N), by cubics between the samples."""
+    """Frames (sets, N, ..., 4) and rates (sets, N, ..., 3) at times (sets, N), by cubics between the samples.
+
+    Of one link or, with more axes in the middle, of many at once.
+    """
     u = own.u[0] + np.mod(times - own.u[0], own.period) if own.period else np.clip(times, own.u[0], own.u[-1])
     k = np.clip(np.searchsorted(own.u, u, side="right") - 1, 0, len(own.u) - 2)
-    row, h = np.arange(len(u))[:, None], (own.u[k + 1] - own.u[k])[..., None]
-    x = (u - own.u[k])[..., None] / h
+    row, wide = np.arange(len(u))[:, None], (*u.shape, *(1,) * (own.frames.ndim - 2))
+    h = (own.u[k + 1] - own.u[k]).reshape(wide)
+    x = (u - own.u[k]).reshape(wide) / h
     p, q = own.frames[row, k], own.frames[row, k + 1]
-    v, w = own.rates[row, k], own.rates[row, k + 1]
-    first, second = (
-        np.stack([rate[..., 0], rate[..., 1], -rate[..., 2] * f[..., 3], rate[..., 2] * f[..., 2]], axis=-1)
-        for rate, f in ((v, p), (w, q))
-    )
-    a, b, c, d = (1 + 2 * x) * (1 - x) ** 2, x * (1 - x) ** 2 * h, x * x * (3 - 2 * x), x * x * (x - 1) * h
-    frames = a * p + b * first + c * q + d * second
-    speed = (1 - x) * (1 - 3 * x) * first + x * (3 * x - 2) * second + 6 * x * (1 - x) * (q - p) / h
+    first, second = (_speed(own.rates[row, k + i], f) for i, f in enumerate((p, q)))
+    y = 1 - x
+    frames = (1 + 2 * x) * y * y * p + x * y * y * h * first + x * x * (3 - 2 * x) * q - x * x * y * h * second
+    speed = y * (1 - 3 * x) * first + x * (3 * x - 2) * second + 6 * x * y / h * (q - p)
     size = np.maximum(np.hypot(frames[..., 2], frames[..., 3]), 1e-300)[..., None]
     frames[..., 2:] /= size
     turn = (frames[..., 2] * speed[..., 3] - frames[..., 3] * speed[..., 2]) / size[..., 0]
     return frames, np.concatenate([speed[..., :2], turn[..., None]], axis=-1)
+
+
+def _speed(rate: Array, frames: Array) -> Array:
+    """Derivatives of x, y, cos, sin from rates of x, y, theta."""
+    found = np.empty_like(frames)
+    found[..., :2] = rate[..., :2]
+    found[..., 2] = -rate[..., 2] * frames[..., 3]
+    found[..., 3] = rate[..., 2] * frames[..., 2]
+    return found
 
 
 class Wanted(NamedTuple):
