@@ -98,6 +98,13 @@ _VERBS: dict[str, tuple[str, *tuple[Option, ...]]] = {
         _option("--fresh", "start anew, do not go on with an interrupted run in DIR"),
         _option("--explain", "print what ran and why, what did not, imports, time and memory"),
     ),
+    "design": (
+        "Find mechanisms that do a task: ranked answers, a report, a file of each mechanism.",
+        _option("TASK", "name of a shipped scene of module 'design', or a TOML file", dest="scene"),
+        _option("--out DIR", "report folder (default graphsynth-out/TASK)", Path),
+        _option("--seconds S", "time limit of the search (default: as the task says)", float),
+        _option("--workers K", "worker processes (default: all cores)", workers),
+    ),
     "accuracy": (
         "Measure error against run time of the methods in a scene.",
         _SCENE,

@@ -25,4 +25,4 @@ from .task.targets import (
     PosesTarget as PosesTarget,
     SwingTarget as SwingTarget,
 )
-from .task.task import Task as Task
+from .task.task import DesignTask as DesignTask

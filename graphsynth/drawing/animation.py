@@ -187,14 +187,17 @@ def animated_svg(
     seconds: float = 5.0,
     width: float = 560.0,
     height: float = 480.0,
+    behind: Sequence[Shape] = (),
 ) -> str:
     """One SVG that moves by itself (SMIL, one clock), for pages and slides where no script runs.
 
-    `motion`, `frames`, `title`, `seconds`, `width`, `height`: as for :func:`animation_html`. It stands still for
-    readers who ask for reduced motion. Raises `GeometryError`: nothing of the motion is assembled, or a number is out
-    of its bounds.
+    `motion`, `frames`, `title`, `seconds`, `width`, `height`: as for :func:`animation_html`. `behind`: shapes that
+    stand still behind it, in the coordinates of the frame, as what a point should draw. It stands still for readers
+    who ask for reduced motion. Raises `GeometryError`: nothing of the motion is assembled, or a number is out of its
+    bounds.
     """
     stage = _Stage(motion, frames, seconds, width, height, title)
+    stage.sketch.shapes[:0] = behind
     shown = stage.frames
     last = len(shown.poses) - 1
     # round, or to and fro: one clock moves everything, so it runs over the whole period

@@ -181,7 +181,8 @@ class Running:
 
     def _run_stage(self, stage: Stage, later: Sequence[Stage]) -> None:
         """Import and call one stage; a stream is gathered if a stage over all candidates needs it whole."""
-        result, spent = measured(stage, self._context, [self._products[need] for need in stage.needs])
+        context = replace(self._context, told=lambda what: self._tell(what, len(self.times)))
+        result, spent = measured(stage, context, [self._products[need] for need in stage.needs])
         if stage.stream:
             start = time.perf_counter()
             whole = set(self._wanted).union(*(other.needs for other in later if not other.each))

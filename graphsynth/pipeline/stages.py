@@ -26,6 +26,7 @@ class Context:
 
     scene: Scene
     executor: Executor | None = None
+    told: Callable[[str], None] | None = None  # says how far a stage over all is
 
 
 def build(scene: Scene) -> Any:

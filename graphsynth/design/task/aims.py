@@ -7,18 +7,13 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.design.task.model import Moved, Rows, Unknowns
+from graphsynth.design.task.model import Model, Moved, Rows, Unknowns
 from graphsynth.design.task.targets import DwellTarget, FunctionTarget, PathTarget, PosesTarget, SwingTarget
-from graphsynth.design.task.task import Task
 from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, followed, matched
-
-if TYPE_CHECKING:
-    from graphsynth.design.task.model import Model
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -31,11 +26,10 @@ _ROUNDS = 2
 class Aim(ABC):
     """A target for the candidates of one model; ``at`` is where its own unknowns begin in the vector.
 
-    ``unknowns``: how many it adds; ``shared``: inputs at which motions must be sampled exactly.
+    ``unknowns``: how many it has.
     """
 
     unknowns = 0
-    shared: tuple[float, ...] = ()
 
     def __init__(self, model: Model, at: int, weight: float) -> None:
         self.model, self.at, self.weight = model, at, weight
@@ -70,8 +64,6 @@ class TimedAim(Aim):
     def __init__(self, model: Model, at: int, weight: float, inputs: tuple[float, ...] | None, own_start: bool) -> None:
         super().__init__(model, at, weight)
         self.inputs, self.own_start = inputs, own_start
-        if inputs is not None and not own_start:
-            self.shared = inputs
         self.unknowns = int(own_start and inputs is not None)
 
     def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
@@ -175,7 +167,7 @@ class Measure:
         return np.asarray((np.conj(self.along(u)) * (own[..., 0] + 1j * own[..., 1])).real)
 
     def rates(self, rates: Array, u: Unknowns) -> Array:
-        """Derivatives by the input (sets, n)."""
+        """Return derivatives by the input (sets, n)."""
         own = rates[:, :, self.link]
         if self.guide < 0:
             return np.asarray(own[..., 2])
@@ -216,7 +208,11 @@ class FunctionAim(TimedAim):
         own, base = moved.link(self.measure.link), np.array(self.inputs)
         theta = np.unwrap(np.arctan2(own.frames[..., 3], own.frames[..., 2]), axis=1)
         error = [
-            np.ptp(np.stack([np.interp(np.mod(base + s, self.model.task.span), own.u, row) for row in theta]) - self.outputs, axis=1)
+            np.ptp(
+                np.stack([np.interp(np.mod(base + s, self.model.task.span), own.u, row) for row in theta])
+                - self.outputs,
+                axis=1,
+            )
             for s in shifts
         ]
         return np.stack([np.zeros(len(theta)), shifts[np.argmin(error, axis=0)]], axis=1)
@@ -244,14 +240,14 @@ class SwingAim(Aim):
         self.target, self.measure = target, Measure(model, target.link)
 
     def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
-        """Inputs of the largest and the smallest value (sets, 2)."""
+        """Return inputs of the largest and the smallest value (sets, 2)."""
         values = self.measure.values(moved.frames, u)
         values = values if self.measure.guide >= 0 else np.unwrap(values, axis=1)
         rates = self.measure.rates(moved.rates, u)
         return np.stack([_extreme(moved, values, rates, 1.0), _extreme(moved, values, rates, -1.0)], axis=1)
 
     def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
-        """What the stroke lacks or has too much."""
+        """Return what the stroke lacks or has too much."""
         values = self.measure.values(frames, u)
         swing = values[:, :1] - values[:, 1:]
         swing = swing if self.measure.guide >= 0 else np.mod(swing, math.tau)
@@ -259,7 +255,9 @@ class SwingAim(Aim):
         self.measure.put(loads, direct, frames, u)
         away = swing - np.clip(swing, self.target.least, self.target.most)
         active = (away != 0.0)[:, None, :, None]
-        return Rows(times, away[:, None], loads * active[..., None], direct * active, self.weight, mix=np.array([[1.0, -1.0]]))
+        return Rows(
+            times, away[:, None], loads * active[..., None], direct * active, self.weight, mix=np.array([[1.0, -1.0]])
+        )
 
 
 def _extreme(moved: Moved, values: Array, rates: Array, sign: float) -> Array:
@@ -270,10 +268,17 @@ def _extreme(moved: Moved, values: Array, rates: Array, sign: float) -> Array:
     low = np.where(rising, k, k - 1)
     last = len(moved.inputs) - 1
     low = np.mod(low, last) if moved.period else np.clip(low, 0, last - 1)
+    h = moved.inputs[low + 1] - moved.inputs[low]
     a, b = sign * rates[row, low], sign * rates[row, low + 1]
+    rise = sign * (values[row, low + 1] - values[row, low]) / h
+    first, second = 6.0 * rise - 4.0 * a - 2.0 * b, 3.0 * (a + b) - 6.0 * rise  # rate a + first x + second x^2
     inside = (a > 0.0) & (b < 0.0)
-    part = np.where(inside, a / np.where(inside, a - b, 1.0), np.where(low == k, 0.0, 1.0))
-    return np.asarray(moved.inputs[low] + part * (moved.inputs[low + 1] - moved.inputs[low]))
+    root = -first + np.sqrt(np.maximum(first**2 - 4.0 * a * second, 0.0)) * np.where(first > 0.0, -1.0, 1.0)
+    x = np.where(np.abs(root) > 0.0, 2.0 * a / np.where(root == 0.0, 1.0, root), 0.5)
+    other = np.where(second == 0.0, 0.5, root / np.where(second == 0.0, 1.0, 2.0 * second))
+    x = np.where((x >= 0.0) & (x <= 1.0), x, other)
+    part = np.where(inside, np.clip(x, 0.0, 1.0), np.where(low == k, 0.0, 1.0))
+    return np.asarray(moved.inputs[low] + part * h)
 
 
 class RatioAim(Aim):
@@ -311,11 +316,11 @@ class RatioAim(Aim):
         return Rows(times, (values @ mix.T)[:, None], loads, direct, self.weight, mix=mix, start=self.at)
 
 
-def aims_of(task: Task, model: Model) -> list[Aim]:
+def aims_of(model: Model) -> list[Aim]:
     """Return the aims of all targets, with their own unknowns one after the other."""
     found: list[Aim] = []
     at = model.own_at
-    for target in task.targets:
+    for target in model.task.targets:
         made: list[Aim] = []
         if isinstance(target, PathTarget | PosesTarget):
             made.append(PointAim(model, at, target))
@@ -326,5 +331,5 @@ def aims_of(task: Task, model: Model) -> list[Aim]:
             if target.time_ratio is not None:
                 made.append(RatioAim(model, at, target))
         found += made
-        at += sum(aim.unknowns for aim in made)
+        at += target.unknowns
     return found

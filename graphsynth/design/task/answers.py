@@ -1,4 +1,4 @@
-"""From a candidate to an answer: the mechanism, simulated anew and judged by what the task asks; certified if it can be.
+"""From a candidate to an answer: the mechanism, simulated anew, judged by what the task asks, certified if it can be.
 
 Nothing is accepted on the word of the search.  Errors are those of the new motion, the largest over each target.
 """
@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.shown import Shown
-from graphsynth.design.task.model import Model
 from graphsynth.design.task.plans import Plan
+from graphsynth.design.task.problem import TaskProblem
 from graphsynth.design.task.targets import DwellTarget, FunctionTarget, PathTarget, PosesTarget, SwingTarget, Target
-from graphsynth.design.task.task import Task
+from graphsynth.design.task.task import DesignTask
 from graphsynth.kinematics.dimensional.design import World
 from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, matched
 from graphsynth.kinematics.dimensional.problem import carried, own_frame
@@ -46,8 +46,9 @@ class Candidate(NamedTuple):
     starts: tuple[float, ...]
 
 
-def built(model: Model, x: Array) -> tuple[Mechanism, tuple[float, ...]]:
+def built(problem: TaskProblem, x: Array) -> tuple[Mechanism, tuple[float, ...]]:
     """Return the mechanism of a vector, in its pose at the input 0, and where targets with their own start begin."""
+    model = problem.model
     u = model.read(x[None])
     frames, design = model.move(u).frames[0, 0], model.plan.design
     table = design.dimensions(u.places, u.numbers)[0]
@@ -65,9 +66,11 @@ def built(model: Model, x: Array) -> tuple[Mechanism, tuple[float, ...]]:
         points[name] = TracePoint(link, (float(local.real), float(local.imag)))
     (base, driven), joint = design.drivers[0], design.driver_joints[0]
     turns = design.kinds[joint] == "R"
-    law = Linear(float(model.sense), own[driven][1] - own[base][1]) if turns else Linear(model.sense * float(u.stroke[0]))
+    law = (
+        Linear(float(model.sense), own[driven][1] - own[base][1]) if turns else Linear(model.sense * float(u.stroke[0]))
+    )
     pose = tuple((z.real, z.imag, angle) for z, angle in own)
-    starts = tuple(float(x[aim.start]) for aim in model.aims if getattr(aim, "start", -1) >= 0)
+    starts = tuple(float(x[aim.start]) for aim in problem.aims if getattr(aim, "start", -1) >= 0)
     return Mechanism(design.graph, design.joints(world, own), (Driver(base, driven, law),), points, pose), starts
 
 
@@ -139,7 +142,7 @@ class DesignedMechanism(Shown):
         return str(self.motion._picture())
 
 
-def judged(task: Task, found: Candidate) -> DesignedMechanism:
+def judged(task: DesignTask, found: Candidate) -> DesignedMechanism:
     """Simulate a candidate anew and judge it."""
     inputs = np.linspace(0.0, task.span, _SAMPLES + 1)
     motion = simulate(found.mechanism, inputs)
@@ -188,7 +191,7 @@ def _places(motion: Motion) -> Array:
     return np.stack([*own, *(motion.point(name).position for name in motion.mechanism.points)], axis=1)
 
 
-def _bounds(task: Task, motion: Motion, places: Array) -> dict[str, bool]:
+def _bounds(task: DesignTask, motion: Motion, places: Array) -> dict[str, bool]:
     """Tell which bounds of the task are broken."""
     slack, mechanism = _SLACK * task.size, motion.mechanism
     broken: dict[str, bool] = {}
@@ -236,7 +239,7 @@ def signature(answer: DesignedMechanism) -> Array:
 # --- errors of targets, from the new motion
 
 
-def _errors(task: Task, motion: Motion, carriers: Mapping[str, int], starts: tuple[float, ...]) -> tuple[float, ...]:
+def _errors(task: DesignTask, motion: Motion, carriers: Mapping[str, int], starts: tuple[float, ...]) -> tuple[float, ...]:
     """Errors of all targets, in their order."""
     left, found = iter(starts), []
     for target in task.targets:
@@ -253,7 +256,7 @@ def _errors(task: Task, motion: Motion, carriers: Mapping[str, int], starts: tup
     return tuple(found)
 
 
-def _seen(task: Task, motion: Motion, link: int, name: str = "") -> MovingLink:
+def _seen(task: DesignTask, motion: Motion, link: int, name: str = "") -> MovingLink:
     """Motion of a link, with its origin in a named point."""
     poses, rates = motion.poses[:, link], motion.velocities[:, link]
     z, v = poses[:, 0] + 1j * poses[:, 1], rates[:, 0] + 1j * rates[:, 1]
@@ -265,9 +268,7 @@ def _seen(task: Task, motion: Motion, link: int, name: str = "") -> MovingLink:
     return MovingLink(motion.inputs, frames[None], np.stack([v.real, v.imag, rates[:, 2]], axis=-1)[None], period)
 
 
-def _point_error(
-    task: Task, target: PathTarget | PosesTarget, motion: Motion, link: int, start: float
-) -> float:
+def _point_error(task: DesignTask, target: PathTarget | PosesTarget, motion: Motion, link: int, start: float) -> float:
     """Largest distance over the size; of poses also the largest angle, from the line that suits best."""
     own = _seen(task, motion, link, target.point)
     turn = target.turn if isinstance(target, PosesTarget) else None
@@ -285,7 +286,7 @@ def _point_error(
 
 
 def _output(motion: Motion, link: int) -> tuple[Array, Array]:
-    """What a link does over the motion, and its rate: an angle, or of a slider the place along its guide."""
+    """Return what a link does over the motion, and its rate: an angle, or of a slider the place along its guide."""
     mechanism = motion.mechanism
     joint = next((j for j in mechanism.joints if {*j.pair} == {mechanism.frame, link}), None)
     if joint is None or joint.kind != "P":
@@ -298,9 +299,7 @@ def _output(motion: Motion, link: int) -> tuple[Array, Array]:
     return (along * z).real, (along * (motion.velocities[:, link, :2] @ [1.0, 1.0j])).real
 
 
-def _angle_error(
-    task: Task, target: Target, motion: Motion, carriers: Mapping[str, int], start: float
-) -> float:
+def _angle_error(task: DesignTask, target: Target, motion: Motion, carriers: Mapping[str, int], start: float) -> float:
     """Half the spread of the differences from a function; of a dwell half the spread of the output."""
     from scipy.interpolate import CubicHermiteSpline
 
@@ -316,7 +315,10 @@ def _angle_error(
         at, wanted = start + np.array(target.inputs), np.array(target.outputs)
     turns, rest = np.divmod(at, task.span) if task.drive == "rotation" else (0.0 * at, at)
     every = spline(rest) + turns * whole
-    return min(float(0.5 * np.ptp(every - sign * wanted)) for sign in ((1.0, -1.0) if _slides(motion, carriers, target) else (1.0,)))
+    return min(
+        float(0.5 * np.ptp(every - sign * wanted))
+        for sign in ((1.0, -1.0) if _slides(motion, carriers, target) else (1.0,))
+    )
 
 
 def _slides(motion: Motion, carriers: Mapping[str, int], target: FunctionTarget | DwellTarget) -> bool:
@@ -325,8 +327,8 @@ def _slides(motion: Motion, carriers: Mapping[str, int], target: FunctionTarget 
     return any({*joint.pair} == pair and joint.kind == "P" for joint in mechanism.joints)
 
 
-def _swing_error(task: Task, target: SwingTarget, motion: Motion, link: int) -> float:
-    """What the stroke lacks or has too much, and how far the slow stroke is from its time (input)."""
+def _swing_error(task: DesignTask, target: SwingTarget, motion: Motion, link: int) -> float:
+    """Return what the stroke lacks or has too much, and how far the slow stroke is from its time (input)."""
     values, _ = _output(motion, link)
     swing = float(np.ptp(values))
     error = abs(swing - min(max(swing, target.least), target.most))

@@ -1,6 +1,6 @@
 """Levenberg and Marquardt for many candidates at once; the weak are left behind (successive halving).
 
-[Marquardt 1963]; bounds are penalties whose weight grows from stage to stage.
+Bounds are penalties whose weight grows from stage to stage.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.design.task.model import Model
+from graphsynth.design.task.problem import TaskProblem
 
 Array = NDArray[np.float64]
 #: Damping at the start, its factors after a step that was taken and one that was not.
@@ -31,10 +31,10 @@ class Descended(NamedTuple):
     times: list[Array]
 
 
-def descend(model: Model, X: Array, strict: float, iterations: int, times: list[Array] | None = None) -> Descended:
+def descend(problem: TaskProblem, X: Array, strict: float, iterations: int, times: list[Array] | None = None) -> Descended:
     """Take candidates towards their optima, with one weight of the bounds."""
-    X = X.copy()
-    (error, r, J), times = model.linearise(X, times, strict)
+    X, model = X.copy(), problem.model
+    (error, r, J), times = problem.linearise(X, times, strict)
     damping, refused = np.full(len(X), _DAMPING), np.zeros(len(X), dtype=np.intp)
     longest = _STEP * np.where(np.arange(model.size) < model.own_at, model.task.size, 1.0)
     live = np.isfinite(error)
@@ -49,7 +49,7 @@ def descend(model: Model, X: Array, strict: float, iterations: int, times: list[
         H += (damping[at, None] * scale)[:, :, None] * np.eye(model.size)
         step = -np.linalg.solve(H, g[:, :, None])[:, :, 0]
         step /= np.maximum(1.0, np.abs(step / longest).max(axis=1, keepdims=True))
-        (found, q, K), later = model.linearise(X[at] + step, [own[at] for own in times], strict)
+        (found, q, K), later = problem.linearise(X[at] + step, [own[at] for own in times], strict)
         good = found < error[at]
         gained = error[at] ** 2 - found**2 > _GAIN * error[at] ** 2
         taken = at[good]

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 from graphsynth.design.task.targets import PathTarget, PosesTarget
-from graphsynth.design.task.task import Box, Task
+from graphsynth.design.task.task import Box, DesignTask
 
 
-def proof(task: Task) -> str:
+def proof(task: DesignTask) -> str:
     """Return why no mechanism can do the task; empty if nothing here proves it.
 
     >>> from graphsynth.design.task.targets import PathTarget
-    >>> proof(Task(targets=[PathTarget.segment((0, 0), (4, 0))], box=(0, 0, 1, 1)))
+    >>> proof(DesignTask(targets=[PathTarget.segment((0, 0), (4, 0))], box=(0, 0, 1, 1)))
     'point (4, 0) of a path lies outside the box'
     """
     for box, name in ((task.box, "box"), (task.pivot_region, "region of the pivots")):
@@ -37,12 +37,11 @@ def proof(task: Task) -> str:
             return f"{between} and the crank is {task.crank:g}: a larger ratio than {task.length_ratio:g}"
     if len(task.pivots) > max(task.links) // 2:
         return (
-            f"{len(task.pivots)} pivots are given, but no link of a chain of {max(task.links)} links and one freedom has "
-            f"more than {max(task.links) // 2} joints"
+            f"{len(task.pivots)} pivots are given, but no link of a chain of {max(task.links)} links and one "
+            f"freedom has more than {max(task.links) // 2} joints"
         )
-    if task.lengths is not None and task.crank is not None:
-        if not task.lengths[0] <= task.crank <= task.lengths[1]:
-            return f"the crank is {task.crank:g}, but lengths must be {task.lengths[0]:g} to {task.lengths[1]:g}"
+    if task.lengths is not None and task.crank is not None and not task.lengths[0] <= task.crank <= task.lengths[1]:
+        return f"the crank is {task.crank:g}, but lengths must be {task.lengths[0]:g} to {task.lengths[1]:g}"
     return ""
 
 

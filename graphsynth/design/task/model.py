@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.design.task.plans import Plan
-from graphsynth.design.task.task import Task
+from graphsynth.design.task.task import DesignTask
 from graphsynth.kinematics.dimensional.matching import MovingLink, at_times
+from graphsynth.kinematics.dimensional.sketch import layout
 from graphsynth.kinematics.engine.batch import simulate_batch
-from graphsynth.kinematics.engine.gradients import pose_gradients, revolute_dyads
+from graphsynth.kinematics.engine.gradients import revolute_dyads
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.laws import Driver, Linear
 from graphsynth.mechanism.model import Mechanism
@@ -65,8 +66,8 @@ class Rows(NamedTuple):
     """Numbers that shall vanish, sampled: values (sets, d, n), how they change with the poses and the unknowns.
 
     ``loads`` (sets, d, links, 3, n) by x, y, theta of every link, ``direct`` (sets, d, n, size) by the unknowns at
-    unchanged poses.  ``free``: the times are found, so that along the motion the unknowns change nothing.  ``mix`` (m, n)
-    makes m numbers of n samples; the values then are (sets, 1, m).  ``start``: the unknown that shifts the times.
+    unchanged poses.  ``free``: the times are found, so that along the motion nothing changes.  ``mix`` (m, n) makes
+    m numbers of n samples; the values then are (sets, 1, m).  ``start``: the unknown that shifts the times.
     """
 
     times: Array
@@ -79,21 +80,10 @@ class Rows(NamedTuple):
     start: int = -1
 
 
-class Linearised(NamedTuple):
-    """Root mean square of all numbers (infinite: no motion), numbers (sets, m), derivatives (sets, m, size)."""
-
-    error: Array
-    values: Array
-    slopes: Array
-
-
 class Model:
     """Candidates of a plan for one sense of the drive and one choice of assembly modes."""
 
-    def __init__(self, task: Task, plan: Plan, sense: int, random: np.random.Generator) -> None:
-        from graphsynth.design.task.aims import aims_of
-        from graphsynth.kinematics.dimensional.sketch import layout
-
+    def __init__(self, task: DesignTask, plan: Plan, sense: int, random: np.random.Generator) -> None:
         self.task, self.plan, self.sense = task, plan, sense
         design = plan.design
         self.joints, self.links = len(design.kinds), design.graph.links
@@ -103,8 +93,8 @@ class Model:
         tied = [] if plan.pins is None else [plan.pins[0]]
         self.free = np.setdiff1d(np.arange(self.joints), [*self.given, *tied])
         self.angles = [c for c, (k, _) in enumerate(design.numbers) if k not in tied]
-        angles = random.uniform(0.0, math.pi, len(design.numbers))
-        base = design.mechanism(self._tied(self.sketch[None], angles[None])[0][0], self._tied(self.sketch[None], angles[None])[1][0])
+        places, numbers = self.tied(self.sketch[None], random.uniform(0.0, math.pi, (1, len(design.numbers))))
+        base = design.mechanism(places[0], numbers[0])
         driver = Driver(*design.drivers[0], Linear(float(sense)))
         self.base = Mechanism(base.graph, base.joints, (driver,), pose=base.pose)
         rest = simulate(self.base, [0.0], events=False)
@@ -112,15 +102,15 @@ class Model:
         self.iterative = any(step.iterative for step in rest.steps)
         own = [s.group for s in rest.steps if s.group >= 0 and s.has_two_modes and rest.modes[0, s.group] != 0]
         self.modes = {group: int(sign) for group, sign in zip(own, random.choice([-1, 1], len(own)))}
-        self.dyads = revolute_dyads(self.base)
+        self.corners = _corners(self.base, plan, [set(step.links) for step in rest.steps])
         # the vector of unknowns: places, directions, points, what targets add, stroke
         self.points_at = 2 * len(self.free) + len(self.angles)
         self.own_at = self.points_at + 2 * sum(task.names.values())
-        self.aims = aims_of(task, self)
-        self.stroke_at = self.own_at + sum(aim.unknowns for aim in self.aims)
+        self.stroke_at = self.own_at + sum(target.unknowns for target in task.targets)
         self.size = self.stroke_at + task.linear
-        shared = [i for aim in self.aims for i in aim.shared]
-        order = np.sort(np.concatenate([np.linspace(0.0, task.span, _SAMPLES + 1), np.mod(shared, task.span) if task.drive == "rotation" else shared]))
+        shared = [u for target in task.targets for u in target.shared_inputs]
+        shared = np.mod(shared, task.span).tolist() if task.drive == "rotation" else shared
+        order = np.sort(np.concatenate([np.linspace(0.0, task.span, _SAMPLES + 1), shared]))
         self.inputs = order[np.concatenate([[True], np.diff(order) > 1e-9])]
 
     # --- the vector
@@ -152,7 +142,7 @@ class Model:
         places[:, self.given] = [p for _, p in self.plan.given] or np.zeros((0, 2))
         numbers = np.zeros((sets, len(self.plan.design.numbers)))
         numbers[:, self.angles] = X[:, count : self.points_at]
-        places, numbers = self._tied(places, numbers)
+        places, numbers = self.tied(places, numbers)
         points = X[:, self.points_at : self.own_at].reshape(sets, -1, 2)
         stroke = X[:, self.stroke_at] if self.task.linear else np.ones(sets)
         return Unknowns(places, numbers, points, X[:, self.own_at : self.stroke_at], stroke)
@@ -160,10 +150,16 @@ class Model:
     def write(self, u: Unknowns) -> Array:
         """Write vectors: the reverse of `read`."""
         sets = len(u.places)
-        parts = [u.places[:, self.free], u.numbers[:, self.angles], u.points, u.own, u.stroke[:, None][:, : self.task.linear]]
+        parts = [
+            u.places[:, self.free],
+            u.numbers[:, self.angles],
+            u.points,
+            u.own,
+            u.stroke[:, None][:, : self.task.linear],
+        ]
         return np.concatenate([part.reshape(sets, -1) for part in parts], axis=1)
 
-    def _tied(self, places: Array, numbers: Array) -> tuple[Array, Array]:
+    def tied(self, places: Array, numbers: Array) -> tuple[Array, Array]:
         """Put the guide of a cylinder on the line of its two ends."""
         if self.plan.pins is not None:
             own, first, second = self.plan.pins
@@ -186,93 +182,25 @@ class Model:
         if period:
             with np.errstate(invalid="ignore"):
                 complete &= np.abs(motion.frames[:, -1] - motion.frames[:, 0]).max(axis=(1, 2)) < _CLOSED
-        frames, rates = motion.frames, motion.velocities
+        frames, rates = np.ascontiguousarray(motion.frames), motion.velocities
         frames[..., :2] *= scale[..., None]
         rates[..., :2] *= scale[..., None]
         complete &= np.isfinite(rates).all(axis=(1, 2, 3))
         frames[~complete], rates[~complete] = _REST, _SLOW
         return Moved(self.inputs, frames, rates, complete, period)
 
-    # --- errors and derivatives
 
-    def linearise(self, X: Array, times: list[Array] | None, strict: float) -> tuple[Linearised, list[Array]]:
-        """Return errors and derivatives of candidates (sets, size), and the times found, from those given if any.
-
-        ``strict``: weight of the bounds.
-        """
-        from graphsynth.design.task.wishes import direct_wishes, sampled_wishes
-
-        u = self.read(X)
-        moved = self.move(u)
-        if times is None:
-            times = [aim.times(moved, u, None) for aim in self.aims]
-        else:
-            times = [aim.times(moved, u, own) for aim, own in zip(self.aims, times)]
-        every: list[tuple[Rows, Array, Array]] = []
-        for aim, own in zip(self.aims, times):
-            frames, rates = moved.at(own)
-            every.append((aim.rows(own, frames, rates, u), frames, rates))
-        for rows in sampled_wishes(self, moved, u, strict):
-            every.append((rows, *moved.at(rows.times)))
-        values, slopes = self._pulled(every, u)
-        more, steep = direct_wishes(self, u, strict)
-        values, slopes = np.concatenate([values, more], axis=1), np.concatenate([slopes, steep], axis=1)
-        error = np.sqrt((values**2).sum(axis=1))
-        bad = ~moved.complete | ~np.isfinite(slopes).all(axis=(1, 2)) | ~np.isfinite(error)
-        values[bad], slopes[bad] = 0.0, 0.0
-        return Linearised(np.where(bad, np.inf, error), values, slopes), times
-
-    def _pulled(self, every: list[tuple[Rows, Array, Array]], u: Unknowns) -> tuple[Array, Array]:
-        """Take loads on the poses back to the unknowns, all targets in one pass."""
-        sets, scale = len(u.places), u.stroke[:, None, None, None]
-        deep = max(rows.loads.shape[1] for rows, _, _ in every)
-        frames = np.concatenate([frames for _, frames, _ in every], axis=1)
-        frames[..., :2] /= scale
-        loads = np.zeros((sets, deep, self.links, 3, frames.shape[1]))
-        at = np.cumsum([0, *(rows.loads.shape[4] for rows, _, _ in every)])
-        for k, (rows, _, _) in enumerate(every):
-            loads[:, : rows.loads.shape[1], ..., at[k] : at[k + 1]] = rows.loads
-        loads[..., :2, :] *= scale[..., None]
-        table = self.plan.design.dimensions(u.places / scale[:, 0], u.numbers)
-        by = pose_gradients(self.base, table, frames, loads).dimensions
-        pulled = self.plan.design.pulled(by, u.places / scale[:, 0], u.numbers)  # (sets, d, n, 2 joints + numbers)
-        pulled[..., : 2 * self.joints] /= scale
-        slopes = np.zeros((*pulled.shape[:3], self.size))
-        wide = 2 * self.joints
-        places = pulled[..., :wide].reshape(*pulled.shape[:3], self.joints, 2)
-        if self.plan.pins is not None:
-            own, first, second = self.plan.pins
-            way = u.places[:, second] - u.places[:, first]
-            turn = np.stack([-way[:, 1], way[:, 0]], axis=1) / np.maximum((way**2).sum(axis=1), 1e-300)[:, None]
-            column = wide + self.plan.design.numbers.index((own, "angle"))
-            change = pulled[..., column, None] * turn[:, None, None]
-            places[..., second, :] += change
-            places[..., first, :] += places[..., own, :] - change
-        slopes[..., : 2 * len(self.free)] = places[..., self.free, :].reshape(*pulled.shape[:3], -1)
-        slopes[..., 2 * len(self.free) : self.points_at] = pulled[..., wide + np.array(self.angles, dtype=np.intp)]
-        if self.task.linear:  # a longer stroke: a smaller mechanism with stroke 1, seen larger
-            inner = np.einsum("sdlan,snla->sdn", loads[..., :2, :], frames[..., :2])
-            slopes[..., self.stroke_at] = (inner - np.einsum("sdnjk,sjk->sdn", _unpinned(places, u, self), u.places)) / u.stroke[:, None, None]
-        found, slope = [], []
-        for k, (rows, _, rates) in enumerate(every):
-            J = slopes[:, : rows.loads.shape[1], at[k] : at[k + 1]] + rows.direct
-            along = np.einsum("sdlan,snla->sdn", rows.loads, rates)
-            if rows.start >= 0:
-                J[..., rows.start] += along
-            if rows.free:
-                unit = along / np.maximum(np.sqrt((along**2).sum(axis=1, keepdims=True)), 1e-300)
-                J = J - unit[..., None] * (unit[..., None] * J).sum(axis=1, keepdims=True)
-            if rows.mix is not None:
-                J = np.einsum("mn,sdni->sdmi", rows.mix, J)
-            found.append(rows.weight * rows.values.reshape(sets, -1))
-            slope.append(rows.weight * J.reshape(sets, -1, self.size))
-        return np.concatenate(found, axis=1), np.concatenate(slope, axis=1)
-
-
-def _unpinned(places: Array, u: Unknowns, model: Model) -> Array:
-    """Derivatives by the places, without that of a cylinder's guide, which follows its ends."""
-    if model.plan.pins is None:
-        return places
-    rest = places.copy()
-    rest[..., model.plan.pins[0], :] = 0.0
-    return rest
+def _corners(base: Mechanism, plan: Plan, groups: list[set[int]]) -> list[tuple[tuple[int, int], ...]]:
+    """Return three joints, each with a link, between which motion is transmitted: of dyads, of a cylinder's lever."""
+    found = [((A, p), (B, p), (C, q)) for p, q, A, B, C in revolute_dyads(base)]
+    if plan.pins is None:
+        return found
+    joints, pushed = base.joints, {*plan.design.drivers[0]}
+    group = next(own for own in groups if pushed <= own)
+    for far, near in (plan.pins[1:], plan.pins[:0:-1]):
+        (lever,) = {*joints[near].pair} - pushed
+        other = next(iter({*joints[far].pair} - pushed))
+        if group == pushed | {lever}:  # else a larger group, whose transmission is judged at the end
+            pivots = [k for k in plan.design.joints_of(lever) if k != near and not {*joints[k].pair} <= group]
+            found.append(((far, other), (near, lever), (pivots[0], lever)))
+    return found

@@ -9,7 +9,7 @@ from itertools import combinations, permutations, product
 import numpy as np
 
 from graphsynth.design.task.targets import Point
-from graphsynth.design.task.task import Task
+from graphsynth.design.task.task import DesignTask
 from graphsynth.kinematics.dimensional.design import Design, choices
 from graphsynth.structure.assur import find_fault
 from graphsynth.structure.graph import MechanismGraph
@@ -36,7 +36,7 @@ class Plan:
         return f"{self.design.graph.links} links, {sliders} sliders, driven {drive}, carried by {self.carriers}"
 
 
-def plans(task: Task, links: int) -> Iterator[Plan]:
+def plans(task: DesignTask, links: int) -> Iterator[Plan]:
     """Yield every plan with so many links, simple ones first."""
     from graphsynth.synthesis import enumerate_chains
 
@@ -48,20 +48,20 @@ def plans(task: Task, links: int) -> Iterator[Plan]:
                         yield Plan(design, carriers, given, pins)
 
 
-def _driven(task: Task, chain: MechanismGraph) -> Iterator[tuple[MechanismGraph, tuple[int, int]]]:
+def _driven(task: DesignTask, chain: MechanismGraph) -> Iterator[tuple[MechanismGraph, tuple[int, int]]]:
     """Yield frames and drivers."""
     if task.drive != "cylinder":
         yield from ((graph, drivers[0]) for graph, drivers in choices(chain, None))
         return
     for graph in chain.inversions():
         for a, b, _ in graph.joints:
-            binary = graph.degrees[a] == graph.degrees[b] == 2  # noqa: PLR2004  # barrel and rod have two joints each
+            binary = graph.degrees[a] == graph.degrees[b] == 2  # barrel and rod have two joints each
             if graph.frame not in (a, b) and binary and find_fault(graph, ((a, b),)) is None:
                 yield graph, (a, b)
 
 
 def _kinds(
-    task: Task, graph: MechanismGraph, driver: tuple[int, int]
+    task: DesignTask, graph: MechanismGraph, driver: tuple[int, int]
 ) -> Iterator[tuple[Design, tuple[int, int, int] | None]]:
     """Yield designs with all choices of sliders; of a cylinder also its joints."""
     pairs = [(joint.a, joint.b) for joint in graph.joints]
@@ -80,7 +80,7 @@ def _kinds(
                 yield Design(graph, (driver,), kinds), ends
 
 
-def _carriers(task: Task, design: Design) -> Iterator[tuple[int, ...]]:
+def _carriers(task: DesignTask, design: Design) -> Iterator[tuple[int, ...]]:
     """Yield a link for each name: of points no link that turns about a pivot, of outputs one that does."""
     graph, frame = design.graph, design.graph.frame
     assert frame is not None
@@ -91,7 +91,7 @@ def _carriers(task: Task, design: Design) -> Iterator[tuple[int, ...]]:
     yield from product(*(free if of_point else outputs for of_point in task.names.values()))
 
 
-def _given(task: Task, design: Design) -> Iterator[tuple[tuple[int, Point], ...]]:
+def _given(task: DesignTask, design: Design) -> Iterator[tuple[tuple[int, Point], ...]]:
     """Yield the ways in which joints on the frame take the given pivots."""
     assert design.graph.frame is not None
     own = [k for k in design.joints_of(design.graph.frame) if design.kinds[k] == "R"]
@@ -99,7 +99,7 @@ def _given(task: Task, design: Design) -> Iterator[tuple[tuple[int, Point], ...]
         yield tuple(zip(chosen, task.pivots, strict=True))
 
 
-def drawn(task: Task, links: int, count: int, random: np.random.Generator) -> list[Plan]:
+def drawn(task: DesignTask, links: int, count: int, random: np.random.Generator) -> list[Plan]:
     """Return so many plans with so many links in random order, all if there are no more."""
     every = list(plans(task, links))
     order = random.permutation(len(every))[:count]

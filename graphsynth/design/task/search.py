@@ -24,8 +24,9 @@ from graphsynth.design.task.descend import best, descend
 from graphsynth.design.task.impossible import proof
 from graphsynth.design.task.model import Model
 from graphsynth.design.task.plans import Plan, plans
+from graphsynth.design.task.problem import TaskProblem
 from graphsynth.design.task.starts import Starts, own_starts, placed_starts, random_starts
-from graphsynth.design.task.task import Task
+from graphsynth.design.task.task import DesignTask
 
 #: First candidates of a piece; kept at each stage, and iterations there: with bounds weak, then strict.
 _FIRST = 600
@@ -41,7 +42,7 @@ _JUDGED = 3
 class Piece(NamedTuple):
     """A part of the search."""
 
-    task: Task
+    task: DesignTask
     plan: Plan
     number: int
     seed: int
@@ -63,7 +64,7 @@ class Designs(Shown):
 
     Attributes
     ----------
-    task : Task
+    task : DesignTask
     answers : tuple of DesignedMechanism
         Accepted ones, no near copies, ranked; if there are none the nearest that were found.
     rejected : dict of str to int
@@ -77,7 +78,7 @@ class Designs(Shown):
     seed : int
     """
 
-    task: Task
+    task: DesignTask
     answers: tuple[DesignedMechanism, ...]
     rejected: Mapping[str, int]
     impossible: str
@@ -102,7 +103,9 @@ class Designs(Shown):
         for k, a in enumerate(self.answers, 1):
             errors = ", ".join(f"{error:.3g}" for error in a.errors)
             word = "" if a.accepted else f"; {'; '.join(a.reasons)}"
-            rows.append((f"{k}", f"{a.links} links, errors {errors}, transmission {math.degrees(a.transmission):.0f} deg{word}"))
+            rows.append(
+                (f"{k}", f"{a.links} links, errors {errors}, transmission {math.degrees(a.transmission):.0f} deg{word}")
+            )
         return self.statement, rows
 
     def _picture(self) -> str:
@@ -110,7 +113,7 @@ class Designs(Shown):
 
 
 def design(
-    task: Task,
+    task: DesignTask,
     *,
     seconds: float = 60.0,
     seed: int = 0,
@@ -123,7 +126,7 @@ def design(
 
     Parameters
     ----------
-    task : Task
+    task : DesignTask
     seconds : float
         Time limit of the search; it ends before where enough answers were found or all waves are done.  The answers are
         then judged and certified.
@@ -155,13 +158,13 @@ def design(
     Examples
     --------
     >>> from graphsynth.design import PathTarget
-    >>> task = Task(targets=[PathTarget.segment((0, 0), (4, 0), count=12)], links=[4])
+    >>> task = DesignTask(targets=[PathTarget.segment((0, 0), (4, 0), count=12)], links=[4])
     >>> found = design(task, count=1)
     >>> found.accepted, found[0].links, found[0].errors[0] < 0.01
     (True, 4, True)
     """
-    if not isinstance(task, Task):
-        raise GeometryError(f"{type(task).__name__} is not a Task; give one")
+    if not isinstance(task, DesignTask):
+        raise GeometryError(f"{type(task).__name__} is not a DesignTask; give one")
     positive("seconds", seconds)
     whole("count", count, 1, 1000)
     run = _Run(task, seed, count, perf_counter(), seconds, starts)
@@ -177,10 +180,14 @@ def design(
 class _Run:
     """One call: candidates found, those judged, reasons counted."""
 
-    def __init__(
-        self, task: Task, seed: int, count: int, begin: float, seconds: float, starts: Starts | None
-    ) -> None:
-        self.task, self.seed, self.count, self.begin, self.starts = task, whole("seed", seed, 0, 2**63), count, begin, starts
+    def __init__(self, task: DesignTask, seed: int, count: int, begin: float, seconds: float, starts: Starts | None) -> None:
+        self.task, self.seed, self.count, self.begin, self.starts = (
+            task,
+            whole("seed", seed, 0, 2**63),
+            count,
+            begin,
+            starts,
+        )
         self.deadline = begin + seconds
         self.found: list[Candidate] = []
         self.judged: dict[int, DesignedMechanism] = {}
@@ -257,9 +264,7 @@ class _Run:
         for answer in sorted(self.judged.values(), key=lambda a: (not a.accepted, a.score)):
             mark = signature(answer)
             same = any(
-                other.key == answer.key
-                and len(own) == len(mark)
-                and np.abs(own - mark).max() < _ALIKE * self.task.size
+                other.key == answer.key and len(own) == len(mark) and np.abs(own - mark).max() < _ALIKE * self.task.size
                 for other, own in zip(kept, marks)
             )
             if not same:
@@ -310,11 +315,12 @@ def worked(piece: Piece) -> tuple[list[Candidate], dict[str, int]]:
         model = Model(piece.task, piece.plan, sense, random)
         if not model.regular:
             return [], {"the chain cannot be assembled": 1}
+        problem = TaskProblem(model)
         first = random_starts(model, _FIRST, random)
-        X, times = placed_starts(model, first, _STAGES[0][0], random)
+        X, times = placed_starts(problem, first, _STAGES[0][0], random)
         if piece.starts is not None:
             for own in own_starts(model, piece.starts(piece.task, piece.plan, random)):
-                more, later = placed_starts(model, own, 1, random)
+                more, later = placed_starts(problem, own, 1, random)
                 if len(more):
                     X = np.concatenate([more, X])
                     times = [np.concatenate([a, b]) for a, b in zip(later, times)]
@@ -330,12 +336,12 @@ def worked(piece: Piece) -> tuple[list[Candidate], dict[str, int]]:
             X, times = found.X, found.times
         if not len(X):
             return [], reasons
-        found = descend(model, X, strict, iterations, times)
+        found = descend(problem, X, strict, iterations, times)
     assert found is not None
     candidates = []
     for x, error in zip(found.X[:_KEPT], found.error):
         try:
-            mechanism, starts = built(model, x)
+            mechanism, starts = built(problem, x)
         except GraphsynthError:
             continue
         candidates.append(Candidate(float(error), piece.plan, mechanism, starts))

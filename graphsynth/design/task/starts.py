@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from graphsynth.design.task.aims import FunctionAim, PointAim
 from graphsynth.design.task.model import Model, Moved, Unknowns
+from graphsynth.design.task.problem import TaskProblem
 from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted
 
 if TYPE_CHECKING:
     from graphsynth.design.task.plans import Plan
-    from graphsynth.design.task.task import Task
+    from graphsynth.design.task.task import DesignTask
     from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
@@ -32,7 +33,7 @@ _HELD, _TRIED, _TOGETHER = 30.0, 2, 128
 class Starts(Protocol):
     """Where starts come from besides chance: mechanisms with a pose whose named points are those of the task."""
 
-    def __call__(self, task: Task, plan: Plan, random: np.random.Generator) -> Iterable[Mechanism]:
+    def __call__(self, task: DesignTask, plan: Plan, random: np.random.Generator) -> Iterable[Mechanism]:
         """Yield mechanisms of the plan's graph, drivers and kinds of joints; any place and size."""
         ...
 
@@ -55,15 +56,16 @@ def random_starts(model: Model, count: int, random: np.random.Generator) -> Unkn
     for k, name in enumerate(name for name, of_point in model.task.names.items() if of_point):
         own = design.joints_of(model.carrier(name))
         points[:, k] = places[:, own].mean(axis=1) + random.normal(0.0, 1.0, (count, 2))
-    return Unknowns(*model._tied(places, numbers), points, np.zeros((count, model.stroke_at - model.own_at)), stroke)
+    return Unknowns(*model.tied(places, numbers), points, np.zeros((count, model.stroke_at - model.own_at)), stroke)
 
 
-def placed_starts(model: Model, u: Unknowns, keep: int, random: np.random.Generator) -> tuple[Array, list[Array]]:
+def placed_starts(problem: TaskProblem, u: Unknowns, keep: int, random: np.random.Generator) -> tuple[Array, list[Array]]:
     """Place candidates where they suit the first path or poses best; return the best as vectors, and times."""
+    model = problem.model
     moved = model.move(u)
     whole = np.flatnonzero(moved.complete)
     u, moved = _some(u, whole), _moved(moved, whole)
-    first = next((aim for aim in model.aims if isinstance(aim, PointAim)), None)
+    first = next((aim for aim in problem.aims if isinstance(aim, PointAim)), None)
     held = u.places[:, model.given, 0] + 1j * u.places[:, model.given, 1]
     goals = np.array([complex(*p) for _, p in model.plan.given])
     if not len(whole):
@@ -87,16 +89,21 @@ def placed_starts(model: Model, u: Unknowns, keep: int, random: np.random.Genera
     if len(goals):
         place[:, model.given] = goals
     numbers = u.numbers + np.angle(s)
-    u = Unknowns(_pairs(place), numbers, _pairs(p), u.own, u.stroke * np.abs(s[:, 0]) if model.task.linear else u.stroke)
-    return _begun(model, u, {} if first is None or times is None else {id(first): times[order]}, random)
+    u = Unknowns(
+        _pairs(place), numbers, _pairs(p), u.own, u.stroke * np.abs(s[:, 0]) if model.task.linear else u.stroke
+    )
+    return _begun(problem, u, {} if first is None or times is None else {id(first): times[order]}, random)
 
 
-def _begun(model: Model, u: Unknowns, known: dict[int, Array], random: np.random.Generator) -> tuple[Array, list[Array]]:
+def _begun(
+    problem: TaskProblem, u: Unknowns, known: dict[int, Array], random: np.random.Generator
+) -> tuple[Array, list[Array]]:
     """Give the unknowns of single targets their first values; return vectors and times."""
+    model = problem.model
     u = model.read(model.write(u))  # what is given or tied is so
     moved = model.move(u)
     own, times, at = u.own.copy(), [], 0
-    for aim in model.aims:
+    for aim in problem.aims:
         if aim.unknowns:
             start = aim.times(moved, u, None) if id(aim) not in known else known[id(aim)]
             own[:, at : at + aim.unknowns] = aim.begin(start, moved, random)
@@ -121,7 +128,10 @@ def from_mechanism(model: Model, mechanism: Mechanism) -> Unknowns:
         return frames[link][0] + frames[link][1] * complex(*local)
 
     place = np.array([[world(joint.a, joint.at_a) for joint in mechanism.joints]])
-    numbers = [getattr(mechanism.joints[k], "angle_a", 0.0) + frames[mechanism.joints[k].a][2] for k, _ in model.plan.design.numbers]
+    numbers = [
+        getattr(mechanism.joints[k], "angle_a", 0.0) + frames[mechanism.joints[k].a][2]
+        for k, _ in model.plan.design.numbers
+    ]
     named = [mechanism.points[name] for name, of_point in model.task.names.items() if of_point]
     points = np.array([[world(link, at) for link, at in named]], dtype=np.complex128).reshape(1, -1)
     own = np.zeros((1, model.stroke_at - model.own_at))
@@ -179,7 +189,7 @@ def _screened(
 
 
 def _guesses(model: Model, aim: PointAim, own: MovingLink, guess: Complex, wanted: Wanted) -> Array:
-    """Times (sets, guesses, n) at which the points may be passed: as given, or spread by the arc of a curve."""
+    """Return times (sets, guesses, n) at which the points may be passed: as given, or spread by the arc of a curve."""
     sets, span = len(own.frames), model.task.span
     if aim.inputs is not None:
         shifts = np.arange(_PHASES) * (span / _PHASES) if aim.own_start else np.zeros(1)

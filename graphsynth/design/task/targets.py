@@ -45,6 +45,16 @@ class Target:
         positive("tolerance", self.tolerance)
         positive("weight", self.weight)
 
+    @property
+    def unknowns(self) -> int:
+        """How many numbers it adds to those of a mechanism: its start, the zero of its angles."""
+        return 0
+
+    @property
+    def shared_inputs(self) -> Sequence[float]:
+        """Inputs, from the start that all targets share, at which it is looked at."""
+        return ()
+
 
 @dataclass(frozen=True, kw_only=True)
 class TimedTarget(Target):
@@ -60,6 +70,16 @@ class TimedTarget(Target):
 
     inputs: Sequence[float] | None = None
     own_start: bool = False
+
+    @property
+    def unknowns(self) -> int:
+        """One for a start of its own."""
+        return int(self.own_start and self.inputs is not None)
+
+    @property
+    def shared_inputs(self) -> Sequence[float]:
+        """The inputs, unless they have a start of their own."""
+        return () if self.own_start or self.inputs is None else self.inputs
 
     def _time(self, count: int) -> None:
         """Check and keep the inputs of a target with so many values."""
@@ -119,11 +139,11 @@ class PathTarget(TimedTarget):
     def segment(cls, start: Point, end: Point, *, count: int = _COUNT, **more: Any) -> Self:
         """Return a straight segment; with ``inputs`` of its two ends it is passed at a constant velocity."""
         first, last = complex(*point("start", start)), complex(*point("end", end))
-        return cls._drawn(np.linspace(first, last, whole("count", count, 2, MOST)), more)
+        return cls._drawn(first + (last - first) * np.linspace(0.0, 1.0, whole("count", count, 2, MOST)), more)
 
     @classmethod
     def polyline(cls, corners: Sequence[Point], *, count: int = _COUNT, **more: Any) -> Self:
-        """Return a line from corner to corner, in points of equal distance along it; ``closed`` joins last and first."""
+        """Return a line from corner to corner, in points of equal distance along it, ``closed`` or not."""
         z = np.array([complex(*point(f"corners[{k}]", p)) for k, p in enumerate(corners)])
         closed = bool(more.get("closed")) and z[0] != z[-1]
         z = np.append(z, z[0]) if closed else z
@@ -151,8 +171,9 @@ class PathTarget(TimedTarget):
     @classmethod
     def _drawn(cls, z: NDArray[np.complex128], more: dict[str, Any]) -> Self:
         ends = more.get("inputs")
-        if ends is not None and len(ends) == 2:  # noqa: PLR2004  # of both ends
-            more["inputs"] = np.linspace(*angles("inputs", list(ends)), len(z)).tolist()
+        if ends is not None and len(ends) == 2:  # of both ends
+            start, end = angles("inputs", list(ends)).tolist()
+            more["inputs"] = np.linspace(start, end, len(z)).tolist()
         return cls(points=[(p.real, p.imag) for p in z.tolist()], **more)
 
 
@@ -165,18 +186,20 @@ def evenly(z: NDArray[np.complex128], count: int, closed: bool) -> NDArray[np.co
 
 def _read_svg(data: str, fine: int = 64) -> NDArray[np.complex128]:
     """Return the first sub-path of SVG path data as a fine polyline."""
-    from fontTools.pens.recordingPen import DecomposingRecordingPen
+    from fontTools.pens.recordingPen import RecordingPen
     from fontTools.svgLib.path import parse_path
 
-    pen = DecomposingRecordingPen({})
+    pen = RecordingPen()
     try:
         parse_path(data, pen)
     except Exception as error:  # the reader raises whatever its grammar meets
-        raise GeometryError(f"SVG path data {data[:40]!r} cannot be read ({error}); give the text of an attribute d") from None
+        raise GeometryError(
+            f"SVG path data {data[:40]!r} cannot be read ({error}); give the text of an attribute d"
+        ) from None
     z: list[complex] = []
     t = np.linspace(0.0, 1.0, fine + 1)[1:]
     for kind, given in pen.value:
-        if kind == "moveTo" and z or kind in ("closePath", "endPath"):
+        if (kind == "moveTo" and z) or kind in ("closePath", "endPath"):
             z += z[:1] if kind == "closePath" and z[-1] != z[0] else []
             break
         ends = [complex(*p) for p in given]
@@ -186,12 +209,12 @@ def _read_svg(data: str, fine: int = 64) -> NDArray[np.complex128]:
             a, b, c, d = z[-1], *ends
             z += ((1 - t) ** 3 * a + 3 * (1 - t) ** 2 * t * b + 3 * (1 - t) * t * t * c + t**3 * d).tolist()
         else:  # one or more quadratic curves with the points between them implied
-            implied = [(p + q) / 2 for p, q in zip(ends, ends[1:-1])]
+            implied = [(p + q) / 2 for p, q in pairwise(ends[:-1])]
             for b, d in zip(ends[:-1], [*implied, ends[-1]]):
                 z += ((1 - t) ** 2 * z[-1] + 2 * (1 - t) * t * b + t * t * d).tolist()
-    if len(z) < 2:  # noqa: PLR2004  # a curve has two ends
+    if len(z) < 2:  # a curve has two ends
         raise GeometryError(f"SVG path data {data[:40]!r} draws nothing; give M and at least one more command")
-    return np.conj(np.array(z))
+    return np.array([w.conjugate() for w in z])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,6 +242,11 @@ class PosesTarget(TimedTarget):
             raise GeometryError(f"a motion needs 2 to {MOST} poses; it has {len(rows)}")
         object.__setattr__(self, "poses", tuple(rows))
         self._time(len(rows))
+
+    @property
+    def unknowns(self) -> int:
+        """One for the zero of the angles, one for a start of its own."""
+        return 1 + super().unknowns
 
     @property
     def goal(self) -> NDArray[np.complex128]:
@@ -258,6 +286,11 @@ class FunctionTarget(TimedTarget):
         object.__setattr__(self, "outputs", tuple(angles("outputs", list(self.outputs)).tolist()))
         self._time(len(self.outputs))
 
+    @property
+    def unknowns(self) -> int:
+        """One for the zero of the outputs, one for a start of its own."""
+        return 1 + super().unknowns
+
     @classmethod
     def of(
         cls,
@@ -271,6 +304,8 @@ class FunctionTarget(TimedTarget):
     ) -> Self:
         """Return a function y(x) between two x, drawn out over ranges of input and output.
 
+        `GeometryError` for a function that is not finite there, or the same at both ends.
+
         >>> FunctionTarget.of(np.log10, (1, 2), input_range="60 deg", output_range="90 deg", count=3).inputs[1]
         0.5235987755982988
         """
@@ -279,7 +314,11 @@ class FunctionTarget(TimedTarget):
         if not np.isfinite(y).all() or y[0] == y[-1]:
             raise GeometryError(f"the function must be finite and differ at both ends of {between}; choose others")
         span, reach = angle("input_range", input_range), angle("output_range", output_range)
-        return cls(inputs=np.linspace(0.0, span, len(y)).tolist(), outputs=(reach * (y - y[0]) / (y[-1] - y[0])).tolist(), **more)
+        return cls(
+            inputs=np.linspace(0.0, span, len(y)).tolist(),
+            outputs=(reach * (y - y[0]) / (y[-1] - y[0])).tolist(),
+            **more,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -303,10 +342,17 @@ class DwellTarget(Target):
         super().__post_init__()
         span = positive("span", angle("span", self.span))
         if span > math.tau:
-            raise GeometryError(f"span = {span:.6g} is longer than a turn, 2 pi; give the part of it that is to be still")
+            raise GeometryError(
+                f"span = {span:.6g} is longer than a turn, 2 pi; give the part of it that is to be still"
+            )
         object.__setattr__(self, "span", span)
         if self.start is not None:
             object.__setattr__(self, "start", angle("start", self.start))
+
+    @property
+    def unknowns(self) -> int:
+        """One for the output, one for where it begins."""
+        return 1 + (self.start is None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -335,5 +381,10 @@ class SwingTarget(Target):
             raise GeometryError(f"least = {least:.6g} and most = {most:.6g} must be 0 <= least <= most; correct them")
         object.__setattr__(self, "least", least)
         object.__setattr__(self, "most", most)
-        if self.time_ratio is not None and not 1.0 <= finite("time_ratio", self.time_ratio) <= 20.0:  # noqa: PLR2004
+        if self.time_ratio is not None and not 1.0 <= finite("time_ratio", self.time_ratio) <= 20.0:
             raise GeometryError(f"time_ratio = {self.time_ratio} must lie in 1 to 20: slow over quick")
+
+    @property
+    def unknowns(self) -> int:
+        """One for the beginning of the slow stroke."""
+        return int(self.time_ratio is not None)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Literal
 
 from graphsynth.core.angles import angle
@@ -23,7 +24,7 @@ RANKED = {"error": 1.0, "links": 0.05, "size": 0.02, "transmission": 0.1}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Task(Shown):
+class DesignTask(Shown):
     """Targets, all in one set of coordinates, and bounds that every answer keeps.
 
     `GeometryError` for bounds that contradict themselves.
@@ -47,7 +48,8 @@ class Task(Shown):
     pivot_region, box : (x0, y0, x1, y1), optional
         Where all joints on the frame lie; where all joints and named points stay over the whole motion.
     lengths : (float, float), optional
-        Shortest and longest distance of two revolute joints on a link; by default 0.1 and 6 sizes of the task.
+        Shortest and longest distance of two revolute joints on a link; by default 0.1 and 6 sizes of
+        the task.
     crank : float, optional
         Given length of the driven link.
     length_ratio : float
@@ -59,7 +61,7 @@ class Task(Shown):
 
     Examples
     --------
-    >>> task = Task(targets=[PathTarget.segment((0, 0), (4, 0))], pivots=[(1, -3)])
+    >>> task = DesignTask(targets=[PathTarget.segment((0, 0), (4, 0))], pivots=[(1, -3)])
     >>> task.links, task.size
     ((4, 6), 2.0)
     """
@@ -88,7 +90,9 @@ class Task(Shown):
         choice("drive", self.drive, ("rotation", "rocking", "cylinder", "slide"))
         span = 1.0 if self.linear else positive("span", angle("span", self.span))
         if span > math.tau or (self.drive == "rotation" and span < math.tau):
-            raise GeometryError(f"span = {span:.6g} must be at most 2 pi, and a turn for a rotation; use drive 'rocking'")
+            raise GeometryError(
+                f"span = {span:.6g} must be at most 2 pi, and a turn for a rotation; use drive 'rocking'"
+            )
         put(self, "span", span)
         if self.stroke is not None:
             put(self, "stroke", _between("stroke", self.stroke))
@@ -105,7 +109,8 @@ class Task(Shown):
         if self.lengths is not None:
             put(self, "lengths", _between("lengths", self.lengths))
         else:
-            put(self, "lengths", (_SHORT * self.size, _LONG * self.size))
+            sizes = [self.size, *(math.dist(p, q) for p, q in combinations(self.pivots, 2))]
+            put(self, "lengths", (_SHORT * min(sizes), _LONG * max(sizes)))
         if self.crank is not None:
             positive("crank", self.crank)
         if finite("length_ratio", self.length_ratio) < 1.0:
@@ -133,7 +138,7 @@ class Task(Shown):
     def size(self) -> float:
         """Length by which the task is measured: of its largest path, else the distance of given pivots, else 1."""
         sizes = [target.size for target in self.targets if isinstance(target, PathTarget | PosesTarget)]
-        apart = [math.dist(p, q) for p in self.pivots for q in self.pivots]
+        apart = [math.dist(p, q) for p, q in combinations(self.pivots, 2)]
         return max(sizes, default=0.0) or max(apart, default=0.0) or 1.0
 
     @property

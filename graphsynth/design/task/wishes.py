@@ -6,15 +6,11 @@ What depends on the motion is looked at where it is worst; the rest depends on t
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.design.task.model import Moved, Rows, Unknowns
-
-if TYPE_CHECKING:
-    from graphsynth.design.task.model import Model
+from graphsynth.design.task.model import Model, Moved, Rows, Unknowns
 
 Array = NDArray[np.float64]
 #: How much of a bound is asked beyond, and the violation that counts like a tolerance.
@@ -22,35 +18,39 @@ _BEYOND, _SPARE, _UNIT = 1.03, 0.003, 0.01
 
 
 def sampled_wishes(model: Model, moved: Moved, u: Unknowns, strict: float) -> list[Rows]:
-    """Transmission angles of dyads, and the box."""
-    found = [_transmission(model, moved, u, dyad, strict / _UNIT) for dyad in model.dyads]
+    """Return transmission angles of dyads and cylinders, and the box."""
+    found = [_transmission(model, moved, u, corner, strict / _UNIT) for corner in model.corners]
     if model.task.box is not None:
         found.append(_box(model, moved, u, model.task.box, strict / _UNIT))
     return found
 
 
-def _transmission(
-    model: Model, moved: Moved, u: Unknowns, dyad: tuple[int, int, int, int, int], weight: float
-) -> Rows:
-    """What the sine of the angle between both links of a dyad lacks where it is least."""
-    p, q, A, B, C = dyad
-    one, two = u.places[:, B] - u.places[:, A], u.places[:, B] - u.places[:, C]
-    first, second = (moved.link(link).frames for link in (p, q))
-    turn = (second[..., 2] + 1j * second[..., 3]) * (first[..., 2] - 1j * first[..., 3])
-    between = (two[:, 0] + 1j * two[:, 1]) * (one[:, 0] - 1j * one[:, 1])
-    mu = between[:, None] * turn / np.maximum(np.abs(between), 1e-300)[:, None]
+def _transmission(model: Model, moved: Moved, u: Unknowns, corner: tuple[tuple[int, int], ...], weight: float) -> Rows:
+    """Return what the sine of the angle at the middle of three joints (joint, link) lacks where it is least."""
+    arms, at, motions = [], [], moved.frames.view(np.complex128)  # places and directions
+    for joint, link in corner:
+        own = motions[:, :, link]
+        arms.append(own[..., 1] * (u.places[:, joint] @ [1.0, 1.0j])[:, None])
+        at.append(own[..., 0] + arms[-1])
+    one, two = at[1] - at[0], at[1] - at[2]
+    mu = two * np.conj(one) / np.maximum(np.abs(two * one), 1e-300)
     mu = mu * np.where(mu[:, :1].imag < 0.0, -1.0, 1.0)
     worst = mu.imag.argmin(axis=1)
     row, least = np.arange(len(mu)), max(_BEYOND * math.sin(model.task.transmission), 1e-3)
-    short = (least - mu[row, worst].imag) / least
-    slope = np.where(short > 0.0, -mu[row, worst].real / least, 0.0)
+    mu, one, two = mu[row, worst], one[row, worst], two[row, worst]
+    short = (least - mu.imag) / least
+    slope = np.where(short > 0.0, -mu.real / least, 0.0)
+    # directions of both arms: what their angle does when the joints move
+    turns = [1j * slope * way / np.maximum(np.abs(way) ** 2, 1e-300) for way in (one, two)]
     loads, direct = np.zeros((len(mu), 1, model.links, 3, 1)), np.zeros((len(mu), 1, 1, model.size))
-    loads[:, 0, p, 2, 0], loads[:, 0, q, 2, 0] = -slope, slope
-    for arm, sign, end in ((one, -1.0, A), (two, 1.0, C)):
-        normal = sign * slope[:, None] * np.stack([-arm[:, 1], arm[:, 0]], 1) / np.maximum((arm**2).sum(1), 1e-300)[:, None]
-        for joint, way in ((B, normal), (end, -normal)):
-            if (at := model.column(joint)) >= 0:
-                direct[:, 0, 0, at : at + 2] += way
+    for (joint, link), arm, by in zip(corner, arms, (turns[0], turns[1] - turns[0], -turns[1])):
+        loads[:, 0, link, 0, 0] += by.real
+        loads[:, 0, link, 1, 0] += by.imag
+        loads[:, 0, link, 2, 0] += (np.conj(by) * 1j * arm[row, worst]).real
+        if (column := model.column(joint)) >= 0:
+            own = np.conj(by) * motions[row, worst, link, 1]
+            direct[:, 0, 0, column] += own.real
+            direct[:, 0, 0, column + 1] -= own.imag
     return Rows(moved.inputs[worst][:, None], np.maximum(short, 0.0)[:, None, None], loads, direct, weight)
 
 
@@ -69,7 +69,9 @@ def _box(model: Model, moved: Moved, u: Unknowns, box: tuple[float, ...], weight
     sets, row, size = len(x), np.arange(len(x)), model.task.size
     loads, direct = np.zeros((sets, 1, model.links, 3, 4)), np.zeros((sets, 1, 4, model.size))
     values, times = np.zeros((sets, 1, 4)), np.zeros((sets, 4))
-    for side, (z, sign, limit, axis) in enumerate(((x, -1.0, box[0], 0), (y, -1.0, box[1], 1), (x, 1.0, box[2], 0), (y, 1.0, box[3], 1))):
+    for side, (z, sign, limit, axis) in enumerate(
+        ((x, -1.0, box[0], 0), (y, -1.0, box[1], 1), (x, 1.0, box[2], 0), (y, 1.0, box[3], 1))
+    ):
         over = (sign * (z - limit) / size + _SPARE).reshape(sets, -1)
         worst = over.argmax(axis=1)
         sample, place = np.divmod(worst, len(links))

@@ -51,7 +51,7 @@ def at_times(own: MovingLink, times: Array) -> tuple[Array, Array]:
 
 
 def _speed(rate: Array, frames: Array) -> Array:
-    """Derivatives of x, y, cos, sin from rates of x, y, theta."""
+    """Return derivatives of x, y, cos, sin from rates of x, y, theta."""
     found = np.empty_like(frames)
     found[..., :2] = rate[..., :2]
     found[..., 2] = -rate[..., 2] * frames[..., 3]

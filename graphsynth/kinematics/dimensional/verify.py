@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from graphsynth.kinematics.dimensional.goals import FunctionGoal, Goals, LineGoal, PathGoal, PosesGoal
 from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, matched
 from graphsynth.kinematics.simulation import simulate
-from graphsynth.mechanism.joints import Revolute
+from graphsynth.mechanism.joints import JointGeometry, Prismatic, Revolute
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.program import Step
@@ -224,23 +224,34 @@ def _form(mechanism: Mechanism, step: Step, known: set[int]) -> GroupForm:
     plain = GroupForm(step.group, step.has_two_modes, (), (), ())
     if step.has_two_modes or not step.iterative:
         return plain
-    inside, core = set(step.links), set(step.core)
-    driven = {driver.pair for driver in mechanism.drivers}
-    bars = []
+    inside, driven = set(step.links), {frozenset(driver.pair) for driver in mechanism.drivers}
     own = [
         (k, joint)
         for k, joint in enumerate(mechanism.joints)
         if {joint.a, joint.b} & inside and {joint.a, joint.b} <= inside | known
     ]
-    if any(not isinstance(joint, Revolute) or joint.pair in driven for _, joint in own):
+    # a cylinder, a driven slide between two links with one more joint each, is a bar between these
+    cylinders = [joint.pair for _, joint in own if frozenset(joint.pair) in driven and isinstance(joint, Prismatic)]
+    pushed = {link for pair in cylinders for link in pair}
+    if any(mechanism.graph.degrees[link] != 2 or link not in inside for link in pushed):
         return plain
-    for link in sorted(inside - core):
-        ends = [(k, joint.b if joint.a == link else joint.a) for k, joint in own if link in joint.pair]
-        bars.append((ends[0][0], ends[0][1], ends[1][0], ends[1][1]))
+    others = [joint for _, joint in own if joint.pair not in cylinders]
+    if any(not isinstance(joint, Revolute) or frozenset(joint.pair) in driven for joint in others):
+        return plain
+    near = {link for _, joint in own if {*joint.pair} & pushed for link in joint.pair}
+    core = ((set(step.core) | near) - pushed) & inside if pushed else set(step.core)
+    bars = [_bar(own, {link}) for link in sorted(inside - core - pushed)] + [_bar(own, {*pair}) for pair in cylinders]
+    own = [(k, joint) for k, joint in own if not {*joint.pair} & pushed]
     pins = [(k, joint.a, k, joint.b) for k, joint in own if not {joint.a, joint.b} & (inside - core)]
     if not bars or len(bars) + 2 * len(pins) != 3 * len(core):
         return plain
-    return GroupForm(step.group, False, tuple(step.core), tuple(bars), tuple(pins))
+    return GroupForm(step.group, False, tuple(sorted(core)), tuple(bars), tuple(pins))
+
+
+def _bar(own: list[tuple[int, JointGeometry]], links: set[int]) -> tuple[int, int, int, int]:
+    """Joints at both ends of a bar of one link, or of the two of a cylinder, and the links there."""
+    ends = [(k, joint.b if joint.a in links else joint.a) for k, joint in own if len({*joint.pair} & links) == 1]
+    return (*ends[0], *ends[1])
 
 
 def transmission_sines(

@@ -1,0 +1,54 @@
+"""``graphsynth design``."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from graphsynth.cli import console
+from graphsynth.core.errors import SpecError
+from graphsynth.core.wholefiles import replacing
+
+
+def run(options: argparse.Namespace) -> int:
+    """Search, write the report and the mechanisms, print the ranked answers; Ctrl-C ends the search, not the report."""
+    from graphsynth.core.checks import positive
+    from graphsynth.core.ordered import processes
+    from graphsynth.mechanism.model import Mechanism
+    from graphsynth.pipeline.design.tables import DesignTable
+    from graphsynth.pipeline.report import print_summary
+    from graphsynth.pipeline.runner import run as run_scene
+    from graphsynth.pipeline.scene import load_scene
+
+    scene = load_scene(options.scene)
+    if not isinstance(scene.mechanism, DesignTable):
+        raise SpecError(
+            f"{options.scene} is a scene of module {scene.mechanism.module!r}, not 'design'; use graphsynth run"
+        )
+    if options.seconds is not None:
+        scene = replace(
+            scene, mechanism=replace(scene.mechanism, seconds=positive("--seconds", options.seconds, SpecError))
+        )
+    kept = ("records", "tables", "mechanisms")
+    products = (*scene.outputs.products, *(name for name in kept if name not in scene.outputs.products))
+    scene = replace(scene, outputs=replace(scene.outputs, products=products))
+    folder = options.out or Path("graphsynth-out") / scene.name
+    with console.counting() as progress, processes(console.workers_for(options.workers, True)) as executor:
+        report = run_scene(scene, folder, executor, progress)
+    files = []
+    for place, text in enumerate(report["mechanisms"].columns["mechanism"], 1):
+        files.append(folder / f"mechanism-{place}.toml")
+        with replacing(files[-1]) as fresh:
+            fresh.write_text(Mechanism.from_json(text).to_toml(), "utf-8")
+    good = sum(record.good is True for record in report["records"])
+    if options.json:
+        answers = [
+            {"key": record.key, "verdict": record.verdict, "reason": record.reason, "file": str(file)}
+            | {margin.name: margin.value for margin in record.margins}
+            for record, file in zip(report["records"], files)
+        ]
+        console.put_json({"scene": scene.name, "folder": str(report.folder), "accepted": good, "answers": answers})
+    else:
+        print_summary(report, console.screen())
+    return 0

@@ -1,0 +1,1 @@
+"""Scenes from a task to mechanisms that do it."""

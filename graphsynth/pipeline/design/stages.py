@@ -1,0 +1,192 @@
+"""Stages from a task to a report: search, records, tables, pictures."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from graphsynth.core.errors import GeometryError
+from graphsynth.pipeline.display import table
+from graphsynth.pipeline.products import Columns, Finding, Picture, Quantity, Record, Table, exact
+from graphsynth.pipeline.stages import Context
+
+if TYPE_CHECKING:
+    from graphsynth.design.task.answers import DesignedMechanism
+    from graphsynth.design.task.search import Designs, Progress
+    from graphsynth.design.task.targets import Target
+    from graphsynth.drawing.shapes import Shape
+    from graphsynth.pipeline.design.tables import DesignTable
+
+_FRAMES = 90
+_WIDE, _HIGH = 460.0, 400.0
+
+
+def search(context: Context) -> Designs:
+    """Find mechanisms for the task; a `SceneError` if it contradicts itself."""
+    from graphsynth.design.task.search import design
+
+    own: DesignTable = context.scene.mechanism
+    told = context.told
+
+    def progress(p: Progress) -> None:
+        if told is not None:
+            told(f"search: {p.pieces} pieces, best {p.error:.2g} tolerances, {p.accepted} accepted")
+
+    try:
+        return design(
+            own.task(),
+            seconds=own.seconds,
+            count=own.answers,
+            seed=context.scene.scene.seed,
+            executor=context.executor,
+            progress=progress,
+        )
+    except GeometryError as error:
+        raise (context.scene.place / "mechanism").error(f"asks for what cannot be: {error}") from error
+
+
+def records(context: Context, designs: Designs) -> tuple[Record, ...]:
+    """Return a record for every answer, the best first."""
+    found = []
+    for number, answer in enumerate(designs.answers, 1):
+        proof = "its motion is certified" if answer.certified else "its motion is estimated"
+        margins = (
+            *(Quantity(f"error {name}", e) for name, e in zip(_titles(designs), answer.errors)),
+            exact("links", answer.links),
+            Quantity("size", answer.size),
+            Quantity.of_si("transmission angle", answer.transmission, "deg"),
+            Quantity("length ratio", answer.ratio),
+        )
+        words = f"does the task, {proof}" if answer.accepted else "does not do the task"
+        reason = "; ".join(answer.reasons)
+        found.append(
+            Record(number, answer.key, "", verdict=words, good=answer.accepted, margins=margins, reason=reason)
+        )
+    return tuple(found)
+
+
+def tables(context: Context, designs: Designs) -> tuple[Table, ...]:
+    """Return the ranked answers, and why others were rejected."""
+    names = _titles(designs)
+    columns = (
+        "place",
+        "links",
+        "sliders",
+        *(f"error {n} | .3g" for n in names),
+        "transmission [°] | .1f",
+        "size | .4g",
+    )
+    rows = [
+        (
+            str(place),
+            str(a.links),
+            str(sum(joint.kind == "P" for joint in a.mechanism.joints)),
+            *a.errors,
+            a.transmission,
+            a.size,
+            "certified" if a.certified else "estimated",
+            "yes" if a.accepted else "; ".join(a.reasons),
+        )
+        for place, a in enumerate(designs.answers, 1)
+    ]
+    answers = Finding(f"{designs.statement[:1].upper()}{designs.statement[1:]}.", designs.accepted)
+    note = "Errors are the largest over each target: of paths and poses over their size, else radians or lengths."
+    found = [table("Answers", (*columns, "motion", "does the task"), rows, note, answers)]
+    if designs.rejected:
+        reasons = [(reason, str(count)) for reason, count in designs.rejected.items()]
+        found.append(table("Why others were rejected", ("reason", "how often"), reasons))
+    return tuple(found)
+
+
+def _titles(designs: Designs) -> list[str]:
+    """Name every target; numbers tell those of one kind apart."""
+    kinds = [type(target).__name__.removesuffix("Target").lower() for target in designs.task.targets]
+    return [kind if kinds.count(kind) == 1 else f"{kind} {kinds[: k + 1].count(kind)}" for k, kind in enumerate(kinds)]
+
+
+def pictures(context: Context, designs: Designs) -> tuple[Picture, ...]:
+    """Show the answers in motion over their targets."""
+    from graphsynth.drawing.animation import animated_svg
+
+    found = []
+    for place, answer in enumerate(designs.answers, 1):
+        title, behind = f"Place {place}: {answer.links} links", _drawn_targets(designs)
+        svg = animated_svg(answer.motion, frames=_FRAMES, title=title, width=_WIDE, height=_HIGH, behind=behind)
+        found.append(Picture(title, svg, _caption(designs, answer)))
+    return tuple(found)
+
+
+def _caption(designs: Designs, answer: DesignedMechanism) -> str:
+    errors = ", ".join(f"{name} {error:.2g}" for name, error in zip(_titles(designs), answer.errors))
+    degrees = math.degrees(answer.transmission)
+    motion = "certified" if answer.certified else "estimated"
+    return f"Errors: {errors}. Smallest transmission angle {degrees:.1f}°, size {answer.size:.3g}; motion {motion}."
+
+
+def _drawn_targets(designs: Designs) -> tuple[Shape, ...]:
+    """Return the targets that have places, to be drawn behind the mechanism."""
+    from graphsynth.design.task.targets import PathTarget, PosesTarget
+    from graphsynth.drawing.shapes import Path, Style
+
+    found: list[Shape] = []
+    for target in designs.task.targets:
+        if not isinstance(target, PathTarget | PosesTarget):
+            continue
+        z = tuple(target.goal.tolist())
+        closed = isinstance(target, PathTarget) and target.closed
+        found.append(Path((z,), Style("jam", 7.0, round_ends=True, fill_opacity=0.0), closed=closed, layer="trace"))
+        if isinstance(target, PosesTarget):
+            arm = 0.15 * target.size
+            ends = tuple((p, p + arm * complex(math.cos(a), math.sin(a))) for p, (_, _, a) in zip(z, target.poses))
+            found.append(Path(ends, Style("jam", 3.0, round_ends=True), layer="trace"))
+    return tuple(found)
+
+
+def curves(context: Context, designs: Designs) -> tuple[Picture, ...]:
+    """Draw targets and what the best answers make of them."""
+    import numpy as np
+
+    from graphsynth.drawing.plots import Chart, Line
+
+    found = []
+    for name, target in zip(_titles(designs), designs.task.targets):
+        lines = [*_wanted(target)]
+        if not lines:
+            continue
+        point = str(getattr(target, "point", ""))
+        for k, answer in enumerate(designs.answers[:3]):
+            if point:
+                x, y = answer.motion.point(point).position.T
+            else:
+                link = answer.carriers[str(getattr(target, "link", ""))]
+                x, y = np.degrees(answer.motion.inputs), np.degrees(np.unwrap(answer.motion.poses[:, link, 2]))
+                y = y - y[0]
+            lines.append(Line(x, y, f"place {k + 1}", "acd"[k]))
+        labels = ("x", "y") if point else ("input [°]", "output from its start [°]")
+        chart = Chart(lines, *labels, equal=bool(point), size=(5.4, 3.8))
+        found.append(Picture(f"Target and answers: {name}", chart.svg(), "The target in red; the answers over it."))
+    return tuple(found)
+
+
+def _wanted(target: Target) -> list:  # type: ignore[type-arg]
+    """Return the line of a target over its points, or over its inputs; none for strokes and dwells of free start."""
+    import numpy as np
+
+    from graphsynth.design.task.targets import FunctionTarget, PathTarget, PosesTarget
+    from graphsynth.drawing.plots import Line
+
+    if isinstance(target, PathTarget | PosesTarget):
+        z = target.goal
+        z = np.append(z, z[0]) if isinstance(target, PathTarget) and target.closed else z
+        return [Line(z.real, z.imag, "target", "jam", "--")]
+    if isinstance(target, FunctionTarget) and not target.own_start and target.inputs is not None:
+        outputs = np.degrees(np.array(target.outputs))
+        return [Line(np.degrees(np.array(target.inputs)), outputs - outputs[0], "target", "jam", "--")]
+    return []
+
+
+def mechanisms(context: Context, designs: Designs) -> Columns:
+    """Lay out the answers, each in the JSON of ``Mechanism.from_json``."""
+    texts = [answer.mechanism.to_json() for answer in designs.answers]
+    keys = [answer.key for answer in designs.answers]
+    return Columns("mechanisms", {"place": list(range(1, len(texts) + 1)), "key": keys, "mechanism": texts})

@@ -1,0 +1,220 @@
+"""What a scene with ``module = "design"`` says: targets, what is given or bounded, how long to search."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from graphsynth.pipeline.tables import In, require
+from graphsynth.pipeline.units import DEGREE
+
+if TYPE_CHECKING:
+    from graphsynth.design.task.targets import Target
+    from graphsynth.design.task.task import DesignTask
+
+Deg = Annotated[float, In("deg")]
+Point = tuple[float, float]
+Box = tuple[float, float, float, float]
+#: Ways to give a path.
+_SHAPES = ("points", "polyline", "segment", "arc", "svg")
+
+
+@dataclass(frozen=True, slots=True)
+class ArcTable:
+    """An arc of a circle between two directions."""
+
+    centre: Point
+    radius: Annotated[float, In(above=0)]
+    start: Deg
+    end: Deg
+
+
+@dataclass(frozen=True, slots=True)
+class PathTable:
+    """A named point passes points, or draws a line from corner to corner, a segment, an arc, an SVG path.
+
+    ``inputs``: of the drive at the points, or at the two ends of what is drawn: degrees, or parts 0 to 1 of a stroke.
+    """
+
+    points: tuple[Point, ...] = ()
+    polyline: tuple[Point, ...] = ()
+    segment: tuple[Point, ...] = ()
+    arc: ArcTable | None = None
+    svg: str = ""
+    count: Annotated[int, In(least=2, most=400)] = 48
+    inputs: tuple[float, ...] = ()
+    own_start: bool = False
+    closed: bool | None = None
+    point: str = "P"
+    tolerance: Annotated[float, In(above=0)] = 0.01
+    weight: Annotated[float, In(above=0)] = 1.0
+
+    def __post_init__(self) -> None:
+        given = [name for name in _SHAPES if getattr(self, name)]
+        require(len(given) == 1, f"gives {' and '.join(given) or 'no path'}; give one of {', '.join(_SHAPES)}")
+        require(len(self.segment) in (0, 2), "has a segment that has not two ends; give both")
+
+    def target(self, turn: float) -> Target:
+        """Return the target; a number of an input times ``turn`` is the input."""
+        from graphsynth.design.task.targets import PathTarget
+
+        more: dict[str, Any] = {"inputs": [turn * u for u in self.inputs] or None, "own_start": self.own_start}
+        more |= {"point": self.point, "tolerance": self.tolerance, "weight": self.weight}
+        if self.closed is not None:
+            more["closed"] = self.closed
+        if self.points:
+            return PathTarget(points=self.points, **more)
+        if self.polyline:
+            return PathTarget.polyline(self.polyline, count=self.count, **more)
+        if self.segment:
+            return PathTarget.segment(*self.segment, count=self.count, **more)
+        if (arc := self.arc) is not None:
+            return PathTarget.arc(arc.centre, arc.radius, arc.start, arc.end, count=self.count, **more)
+        return PathTarget.svg(self.svg, count=self.count, **more)
+
+
+@dataclass(frozen=True, slots=True)
+class PosesTable:
+    """The link of a named point passes poses: places of the point, and angles."""
+
+    points: tuple[Point, ...]
+    angles: Annotated[tuple[float, ...], In("deg")]
+    inputs: tuple[float, ...] = ()
+    own_start: bool = False
+    point: str = "P"
+    tolerance: Annotated[float, In(above=0)] = 0.01
+    weight: Annotated[float, In(above=0)] = 1.0
+
+    def __post_init__(self) -> None:
+        require(
+            len(self.points) == len(self.angles), f"has {len(self.points)} points and {len(self.angles)} angles_deg"
+        )
+
+    def target(self, turn: float) -> Target:
+        """Return the target."""
+        from graphsynth.design.task.targets import PosesTarget
+
+        return PosesTarget(
+            poses=[(*p, a) for p, a in zip(self.points, self.angles, strict=True)],
+            inputs=[turn * u for u in self.inputs] or None,
+            own_start=self.own_start,
+            point=self.point,
+            tolerance=self.tolerance,
+            weight=self.weight,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionTable:
+    """The angle of a link on the frame is a function of the input: a table, or a formula of x between two x."""
+
+    inputs: tuple[float, ...] = ()
+    outputs: Annotated[tuple[float, ...], In("deg")] = ()
+    formula: str = ""
+    between: tuple[float, float] = (0.0, 1.0)
+    input_range: float = 90.0
+    output_range: Deg = 90.0 * DEGREE
+    own_start: bool = False
+    link: str = "output"
+    tolerance: Deg = 0.5 * DEGREE
+    weight: Annotated[float, In(above=0)] = 1.0
+
+    def __post_init__(self) -> None:
+        table = bool(self.inputs or self.outputs)
+        require(table != bool(self.formula), "needs either inputs and outputs_deg or a formula")
+
+    def target(self, turn: float) -> Target:
+        """Return the target."""
+        from graphsynth.design.task.formulas import formula
+        from graphsynth.design.task.targets import FunctionTarget
+
+        more: dict[str, Any] = {"own_start": self.own_start, "link": self.link}
+        more |= {"tolerance": self.tolerance, "weight": self.weight}
+        if not self.formula:
+            return FunctionTarget(inputs=[turn * u for u in self.inputs], outputs=self.outputs, **more)
+        more |= {"input_range": turn * self.input_range, "output_range": self.output_range}
+        return FunctionTarget.of(formula(self.formula), self.between, **more)
+
+
+@dataclass(frozen=True, slots=True)
+class DwellTable:
+    """A link stands still for a part of the input; the tolerance says how still."""
+
+    span: float
+    start: float | None = None
+    link: str = "output"
+    tolerance: Deg = 0.5 * DEGREE
+    weight: Annotated[float, In(above=0)] = 1.0
+
+    def target(self, turn: float) -> Target:
+        """Return the target."""
+        from graphsynth.design.task.targets import DwellTarget
+
+        start = None if self.start is None else turn * self.start
+        more = {"tolerance": self.tolerance, "weight": self.weight}
+        return DwellTarget(span=turn * self.span, start=start, link=self.link, **more)
+
+
+@dataclass(frozen=True, slots=True)
+class SwingTable:
+    """A link swings: limits of its stroke, time of the slow stroke over that of the quick one."""
+
+    least: Deg = 0.0
+    most: Annotated[float | None, In("deg", above=0)] = None
+    time_ratio: Annotated[float | None, In(least=1, most=20)] = None
+    link: str = "output"
+    tolerance: Deg = 0.5 * DEGREE
+    weight: Annotated[float, In(above=0)] = 1.0
+
+    def target(self, turn: float) -> Target:
+        """Return the target."""
+        from graphsynth.design.task.targets import SwingTarget
+
+        most = math.inf if self.most is None else self.most
+        more = {"tolerance": self.tolerance, "weight": self.weight}
+        return SwingTarget(least=self.least, most=most, time_ratio=self.time_ratio, link=self.link, **more)
+
+
+@dataclass(frozen=True, slots=True)
+class DesignTable:
+    """``[mechanism]`` with ``module = "design"``; lengths are in one unit of your choice.
+
+    Inputs of targets are degrees of a drive that turns, parts 0 to 1 of the stroke of one that pushes.
+    """
+
+    module: Literal["design"]
+    paths: tuple[PathTable, ...] = ()
+    poses: tuple[PosesTable, ...] = ()
+    functions: tuple[FunctionTable, ...] = ()
+    dwells: tuple[DwellTable, ...] = ()
+    swings: tuple[SwingTable, ...] = ()
+    drive: Literal["rotation", "rocking", "cylinder", "slide"] = "rotation"
+    span: Deg = math.tau
+    stroke: tuple[float, float] | None = None
+    links: tuple[int, ...] = (4, 6)
+    sliders: Annotated[int, In(least=0, most=3)] = 0
+    pivots: tuple[Point, ...] = ()
+    pivot_region: Box | None = None
+    box: Box | None = None
+    lengths: tuple[float, float] | None = None
+    crank: Annotated[float | None, In(above=0)] = None
+    length_ratio: Annotated[float, In(least=1)] = 8.0
+    transmission: Annotated[float, In("deg", least=0, below=90)] = 25.0 * DEGREE
+    seconds: Annotated[float, In(above=0)] = 60.0
+    answers: Annotated[int, In(least=1, most=100)] = 5
+
+    def __post_init__(self) -> None:
+        every = [*self.paths, *self.poses, *self.functions, *self.dwells, *self.swings]
+        require(bool(every), "has no target; give [[mechanism.paths]], poses, functions, dwells or swings")
+
+    def task(self) -> DesignTask:
+        """Return the task; a `GeometryError` if it contradicts itself."""
+        from graphsynth.design.task.task import DesignTask
+
+        turn = 1.0 if self.drive in ("cylinder", "slide") else DEGREE
+        targets = [table.target(turn) for table in (*self.paths, *self.poses, *self.functions)]
+        targets += [table.target(turn) for table in (*self.dwells, *self.swings)]
+        own = ("drive", "span", "stroke", "links", "sliders", "pivots", "pivot_region", "box", "lengths", "crank")
+        more: dict[str, Any] = {name: getattr(self, name) for name in (*own, "length_ratio", "transmission")}
+        return DesignTask(targets=targets, **more)

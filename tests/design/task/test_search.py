@@ -1,0 +1,236 @@
+"""The search against hidden mechanisms, differences, brute force; the same for any executor."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+
+import graphsynth as gs
+from graphsynth.design import (
+    DesignedMechanism,
+    DwellTarget,
+    FunctionTarget,
+    PathTarget,
+    PosesTarget,
+    SwingTarget,
+    DesignTask,
+    design,
+)
+from graphsynth.design.task.model import Model
+from graphsynth.design.task.plans import plans
+from graphsynth.design.task.problem import TaskProblem
+from graphsynth.design.task.starts import placed_starts, random_starts
+
+POINTS = [(0.0, 0.0), (1.0, 0.5), (2.0, 0.2), (3.0, -0.5)]
+POSES = [(x, y, 0.2 * k) for k, (x, y) in enumerate(POINTS)]
+
+
+def even(count: int, end: float) -> list[float]:
+    return np.linspace(0.0, end, count).tolist()
+
+
+TASKS = {
+    "path": (DesignTask(targets=[PathTarget(points=POINTS, inputs=even(4, 1.5))]), 6),
+    "poses, own start, all bounds": (
+        DesignTask(
+            targets=[PosesTarget(poses=POSES, inputs=even(4, 1.5), own_start=True)],
+            box=(-1, -1, 2, 2),
+            pivot_region=(0, 0, 1, 1),
+            lengths=(0.9, 1.1),
+            crank=1.0,
+            transmission="60 deg",
+            length_ratio=1.5,
+        ),
+        4,
+    ),
+    "function of a slider": (
+        DesignTask(targets=[FunctionTarget(inputs=even(5, 2.0), outputs=[0, 0.1, 0.3, 0.4, 0.5])], sliders=1),
+        4,
+    ),
+    "stroke": (DesignTask(targets=[SwingTarget(least=3.0, most=3.1)]), 6),
+    "dwell": (DesignTask(targets=[DwellTarget(span=1.0)], pivots=[(0, 0)]), 6),
+    "cylinder": (
+        DesignTask(
+            targets=[PosesTarget(poses=POSES, inputs=even(4, 1.0))],
+            drive="cylinder",
+            stroke=(0.2, 0.21),
+            pivots=[(0, 1)],
+        ),
+        6,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_derivatives_are_those_of_differences(name: str) -> None:
+    task, links = TASKS[name]
+    random = np.random.default_rng(4)
+    every = list(plans(task, links))
+    checked = 0
+    for plan in (every[k] for k in random.permutation(len(every))[:3]):
+        model = Model(task, plan, 1, random)
+        problem = TaskProblem(model)
+        X, times = placed_starts(problem, random_starts(model, 300, random), 12, random)
+        if not len(X):
+            continue
+        here, times = problem.linearise(X, times, 2.0)
+        for k in range(model.size):
+            step = 1e-6 * (np.arange(model.size) == k)
+            ahead, back = (problem.linearise(X + sign * step, times, 2.0)[0] for sign in (1, -1))
+            whole = np.isfinite(here.error) & np.isfinite(ahead.error) & np.isfinite(back.error)
+            away = np.abs((ahead.values - back.values) / 2e-6 - here.slopes[:, :, k]).max(axis=1)
+            scale = 1.0 + np.abs(here.slopes).max(axis=(1, 2))
+            # the worst sample of a bound may change within a step: then the difference is that of a corner
+            assert np.median((away / scale)[whole]) < 1e-5, (plan.text, k)
+            checked += int(whole.sum())
+    assert checked > 200
+
+
+def hidden() -> Any:
+    """Return the motion of a crank-rocker with a point off its coupler."""
+    own = gs.Mechanism.four_bar(4.0, 1.5, 3.5, 3.0, coupler_point=(1.6, 1.9))
+    motion = gs.simulate(own, np.linspace(0.0, math.tau, 361))
+    assert motion.completed
+    return motion
+
+
+def brute(found: DesignedMechanism, goal: Any) -> float:
+    """Largest distance of goal points from a fine drawing of the point, simulated here."""
+    motion = gs.simulate(found.mechanism, np.linspace(0.0, math.tau, 20001))
+    z = motion.point("P").position @ [1.0, 1.0j]
+    return max(float(np.abs(z - p).min()) for p in goal)
+
+
+def test_a_hidden_four_bar_is_found_from_its_curve_and_pivots() -> None:
+    """Twenty points without times, both pivots given: curve, lengths and place come back."""
+    motion = hidden()
+    z = motion.point("P").position[:-1:18] @ [1.0, 1.0j]
+    task = DesignTask(
+        targets=[PathTarget(points=[(p.real, p.imag) for p in z], closed=True, tolerance=1e-4)],
+        pivots=[(0, 0), (4, 0)],
+        links=[4],
+        transmission="10 deg",
+    )
+    found = design(task, count=1)
+    assert found.accepted, found
+    best = found[0]
+    assert best.errors[0] < 1e-5 and brute(best, z) < 1e-5 * task.targets[0].size + 1e-3  # of a fine drawing
+    at = best.mechanism
+    crank = next(j for j in at.joints if set(j.pair) == {0, at.drivers[0].link})
+    assert min(np.hypot(*crank.at_a), np.hypot(crank.at_a[0] - 4, crank.at_a[1])) < 1e-12
+    assert best.certified
+
+
+def test_two_targets_at_once_share_one_mechanism() -> None:
+    """A timed path and the rocker's angle of the same hidden four-bar; each alone leaves more freedom."""
+    motion = hidden()
+    at = np.arange(0, 360, 30)
+    z = motion.point("P").position[at]
+    theta = np.unwrap(motion.poses[:, 3, 2])[at]
+    inputs = np.radians(at).tolist()
+    path = PathTarget(points=[tuple(p) for p in z.tolist()], inputs=inputs, tolerance=1e-5)
+    function = FunctionTarget(inputs=inputs, outputs=theta.tolist(), tolerance=1e-5)
+    found = design(DesignTask(targets=[path, function], links=[4], transmission="10 deg"), count=1, seed=1)
+    assert found.accepted, found
+    lengths = sorted(found[0].mechanism.dimensions[:, :6].max(axis=1))
+    assert lengths and max(found[0].errors) < 1e-6
+
+
+def test_a_hidden_cylinder_is_found_from_the_angle_it_gives() -> None:
+    """The law of cosines: a lever of 1 at a foot at distance 2, a cylinder from 1.3 to 2.3."""
+    length = 1.3 + np.linspace(0.0, 1.0, 9)
+    theta = np.arccos((1.0 + 4.0 - length**2) / 4.0)
+    function = FunctionTarget(inputs=even(9, 1.0), outputs=(theta - theta[0]).tolist(), tolerance=1e-4)
+    task = DesignTask(
+        targets=[function],
+        drive="cylinder",
+        links=[4],
+        pivots=[(0, 0), (2, 0)],
+        stroke=(0.99, 1.01),
+        transmission="10 deg",
+    )
+    found = design(task, count=1)
+    assert found.accepted, found
+    law: Any = found[0].mechanism.drivers[0].law
+    assert 0.98 < abs(law.rate) < 1.02 and found[0].errors[0] < 1e-4
+
+
+def test_strokes_and_time_ratios_are_those_of_the_closed_form() -> None:
+    """An offset slider-crank has both in closed form: dead centres where crank and rod are in line."""
+    ratio, least = 1.25, "60 deg"
+    found = design(DesignTask(targets=[SwingTarget(least=least, most=least, time_ratio=ratio)], links=[4]), count=1)
+    assert found.accepted, found
+    mechanism = found[0].mechanism
+    table = {frozenset(j.pair): j for j in mechanism.joints}
+    driven = mechanism.drivers[0].link
+    rocker = next(link for link in range(1, 4) if frozenset((0, link)) in table and link != driven)
+    rod = 6 - driven - rocker
+
+    def length(link: int, a: int, b: int) -> float:
+        ends = [j.at_a if j.a == link else j.at_b for j in (table[frozenset((link, a))], table[frozenset((link, b))])]
+        return math.dist(*ends)
+
+    crank, coupler = length(driven, 0, rod), length(rod, driven, rocker)
+    swing, ground = length(rocker, rod, 0), length(0, driven, rocker)
+
+    def corner(p: float, q: float, opposite: float) -> float:
+        return math.acos((p * p + q * q - opposite * opposite) / (2 * p * q))
+
+    far, near = coupler + crank, coupler - crank
+    stroke = abs(corner(ground, swing, far) - corner(ground, swing, near))
+    apart = abs(corner(ground, far, swing) - corner(ground, near, swing))
+    assert abs(stroke - math.radians(60)) < 0.02
+    assert abs((math.pi + apart) / (math.pi - apart) - ratio) < 0.02
+
+
+def test_a_dwell_stands_still_while_the_crank_turns() -> None:
+    still = math.radians(0.5)
+    task = DesignTask(targets=[DwellTarget(span="50 deg", tolerance=still), SwingTarget(least="25 deg")], links=[6])
+    found = design(task, count=1)
+    assert found.accepted, found
+    link = found[0].carriers["output"]
+    motion = gs.simulate(found[0].mechanism, np.linspace(0.0, 2 * math.tau, 1441))
+    theta = np.unwrap(motion.poses[:, link, 2])
+    window = np.lib.stride_tricks.sliding_window_view(theta, 101)  # 50 degrees of half-degree steps
+    assert np.ptp(window, axis=1).min() < 2 * still * 1.05 and np.ptp(theta) > math.radians(24.9)
+
+
+def test_the_same_answers_for_any_executor_and_none_twice() -> None:
+    task = DesignTask(targets=[PathTarget.segment((0, 0), (4, 0), count=12)], pivots=[(1, -3)], links=[4])
+    one = design(task, count=4, seed=3)
+    with ThreadPoolExecutor(2) as threads:
+        two = design(task, count=4, seed=3, executor=threads)
+    assert [a.mechanism for a in one.answers] == [a.mechanism for a in two.answers]
+    assert one.rejected == two.rejected and len(one) == 4
+    for k, a in enumerate(one.answers):
+        assert a.accepted and a.mechanism.points["P"].link
+        assert min(abs(complex(*j.at_a) - (1 - 3j)) for j in a.mechanism.joints if j.a == 0) < 1e-12
+        for b in one.answers[:k]:
+            assert a.mechanism.dimensions.shape != b.mechanism.dimensions.shape or not np.allclose(
+                np.sort(np.abs(a.mechanism.dimensions), axis=None),
+                np.sort(np.abs(b.mechanism.dimensions), axis=None),
+                0.01,
+            )
+
+
+def test_an_interruption_gives_the_best_so_far() -> None:
+    def stop(progress: Any) -> None:
+        if progress.pieces == 3:
+            raise KeyboardInterrupt
+
+    task = DesignTask(targets=[PathTarget.segment((0, 0), (4, 0), count=12)], links=[4])
+    found = design(task, progress=stop)
+    assert found.pieces == 3 and len(found) and "interrupted" in found.statement
+
+
+def test_a_search_that_finds_nothing_says_only_that() -> None:
+    """A time ratio of ten with a stroke of two thirds of a turn: nothing is near; no claim is made."""
+    task = DesignTask(targets=[SwingTarget(least="250 deg", time_ratio=10)], links=[4], transmission="60 deg")
+    found = design(task, seconds=3, count=1)
+    assert not found.accepted and not found.impossible
+    assert found.statement.startswith("no mechanism was found that does the task, which does not prove")
+    assert found.rejected
