@@ -108,8 +108,8 @@ def magnitudes(found: AnyComplex, harmonics: int) -> Array:
     Running the curve backwards, or reflecting it, exchanges the sizes of k and -k.  The Euclidean distance of two
     curves' sizes is never larger than that of the curves (docs/theory/curve-index.md).
     """
-    half = found.shape[-1] // 2
-    return np.abs(found[..., half - harmonics : half + harmonics])
+    half, odd = divmod(found.shape[-1], 2)
+    return np.abs(found[..., half - harmonics : half + harmonics + odd])
 
 
 class Aligned(NamedTuple):

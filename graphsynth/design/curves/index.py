@@ -2,35 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import finite_array, whole
-from graphsynth.core.errors import FormatError, GeometryError
+from graphsynth.core.checks import whole
+from graphsynth.core.errors import FormatError
 from graphsynth.design.curves.building import build
-from graphsynth.design.curves.fourier import Aligned, aligned, coefficients, magnitudes, unit
-from graphsynth.design.curves.matches import CurveMatch, CurveStart, Entry, Fitted
-from graphsynth.design.curves.stored import ARC, MANIFEST, Shard, digest, opened, unpacked
+from graphsynth.design.curves.fourier import magnitudes
+from graphsynth.design.curves.matches import CurveMatch, CurveStart, Entry
+from graphsynth.design.curves.stored import MANIFEST, digest, opened, unpacked
+from graphsynth.design.curves.wanted import LEADING, TimedCurve, Wanted, WantedCurve, WantedMotion
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-Complex = NDArray[np.complex128]
+    from graphsynth.kinematics.dimensional.design import Design
 
-#: Harmonics of the sizes that are searched, of the final comparison; curves compared at last, over those wanted.
-_LEADING, _FINAL, _SPARE = 8, 64, 3
+#: Mechanisms moved anew, over those wanted; fewest positions of one; rows unpacked at once; no number is larger.
+_SPARE, _FEWEST, _BLOCK, _FAR = 3, 8, 1 << 16, 1e6
 #: Curves whose distance is computed, by default.
 CANDIDATES = 1000
-
-
-#: No number of a row is larger.
-_FAR = 1e6
 
 
 class CurveIndex:
@@ -76,6 +73,7 @@ class CurveIndex:
             )
         self.families = self.shards[0].families
         self._ends = np.cumsum([len(shard) for shard in self.shards])
+        self._trees: dict[tuple[str, bool], tuple[NDArray[np.int64], cKDTree]] = {}
 
     @classmethod
     def build(
@@ -125,7 +123,14 @@ class CurveIndex:
         return Entry(own, row)
 
     def find(
-        self, curve: ArrayLike, count: int = 10, *, closed: bool | None = None, candidates: int = CANDIDATES
+        self,
+        curve: ArrayLike,
+        count: int = 10,
+        *,
+        closed: bool | None = None,
+        timed: bool = False,
+        only: Callable[[Design], bool] | None = None,
+        candidates: int = CANDIDATES,
     ) -> list[CurveMatch]:
         """Find the curves nearest to a wanted one, best first.
 
@@ -137,6 +142,10 @@ class CurveIndex:
             Curves to return.
         closed : bool, optional
             Whether the last point is joined to the first; by default if they are the same.
+        timed : bool
+            The points belong to uniform inputs: of a full rotation if closed, else of the range.
+        only : callable, optional
+            Says of a `Design` (graph, drivers, kinds of joints) whether its mechanisms may be found.
         candidates : int
             Curves whose distance is computed: more miss fewer, see the theory.
 
@@ -148,134 +157,115 @@ class CurveIndex:
         Raises
         ------
         GeometryError
-            Fewer than three points, all at one place, numbers that are not finite.
+            Fewer than three points (five with inputs), all at one place, numbers that are not finite.
         """
-        count, candidates = whole("count", count, 1, 10**5), whole("candidates", candidates, 1, 10**7)
-        points, loop = wanted_curve(curve, closed)
-        at = self._nearest(points, loop, max(candidates, _SPARE * count))[: _SPARE * count]
-        target = _Target.of(points, loop)
-        found = [self._matched(int(number), target) for number in at]
-        return sorted((match for match in found if match is not None), key=lambda match: match.error)[:count]
+        wanted = TimedCurve(curve, closed) if timed else WantedCurve(curve, closed)
+        return self._found(wanted, count, only, candidates)
 
-    def starts(self, curve: ArrayLike, count: int = 10, *, closed: bool | None = None) -> list[CurveStart]:
+    def find_motion(
+        self,
+        poses: ArrayLike,
+        count: int = 10,
+        *,
+        closed: bool | None = None,
+        only: Callable[[Design], bool] | None = None,
+        candidates: int = CANDIDATES,
+    ) -> list[CurveMatch]:
+        """Find the links that move most like a wanted body, best first.
+
+        Parameters
+        ----------
+        poses : array_like, shape (n, 3)
+            Place and angle (x, y, theta) of the body at uniform inputs, of a full rotation or a range.
+        count, closed, only, candidates
+            As of `find`.
+
+        Returns
+        -------
+        list of CurveMatch
+            The point "P" is the one of the link that follows the places best.  ``error`` is the root of the sum of two
+            mean squares: of the distance over the size of the path, and of the angle in radians.
+
+        Raises
+        ------
+        GeometryError
+            Fewer than five poses, all at one place, numbers that are not finite.
+        """
+        return self._found(WantedMotion(poses, closed), count, only, candidates)
+
+    def starts(
+        self,
+        curve: ArrayLike,
+        count: int = 10,
+        *,
+        closed: bool | None = None,
+        only: Callable[[Design], bool] | None = None,
+    ) -> list[CurveStart]:
         """Return mechanisms with which a search for the curve may begin, nearest first.
 
         Parameters, errors: as of `find`.
         """
-        return [match.start for match in self.find(curve, count, closed=closed)]
+        return [match.start for match in self.find(curve, count, closed=closed, only=only)]
 
     # --- the search
 
-    def _nearest(self, points: Complex, closed: bool, candidates: int) -> NDArray[np.int64]:
-        """Rows in the order of the distance of their stored curves, of those with the nearest sizes."""
-        wanted = unit(coefficients(points[None], np.array([closed]), ARC)[0])
-        rows, tree = self._trees[closed]
-        if not len(rows):
-            return rows
-        most = min(candidates, len(rows))
-        near = [
-            tree.query(magnitudes(own, _LEADING), k=np.arange(1, most + 1))[1]
-            for own in ([wanted, wanted[::-1]] if closed else [wanted])
-        ]
+    def _found(
+        self, wanted: Wanted, count: int, only: Callable[[Design], bool] | None, candidates: int
+    ) -> list[CurveMatch]:
+        count, candidates = whole("count", count, 1, 10**5), whole("candidates", candidates, 1, 10**7)
+        near = self._nearest(wanted, max(candidates, _SPARE * count), only)[: _SPARE * count]
+        found = [self._matched(int(number), wanted) for number in near]
+        return sorted((match for match in found if match is not None), key=lambda match: match.error)[:count]
+
+    def _nearest(self, wanted: Wanted, most: int, only: Callable[[Design], bool] | None) -> NDArray[np.int64]:
+        """Rows in the order of the distance of what is stored, of those with the nearest sizes."""
+        rows, tree = self._tree(wanted.column, wanted.closed)
+        if only is None and len(rows):
+            near = [tree.query(own, k=np.arange(1, min(most, len(rows)) + 1))[1] for own in wanted.sizes()]
+        else:
+            allowed = np.array([only is None or bool(only(family.design)) for family in self.families])
+            own = np.flatnonzero(allowed[self._family[rows]])
+            near = []
+            for sizes in wanted.sizes():
+                far = ((tree.data[own] - sizes) ** 2).sum(axis=1)
+                near.append(own[np.argpartition(far, most)[:most] if most < len(own) else slice(None)])
         at = rows[np.unique(np.concatenate(near))]
-        distance = aligned(wanted.astype(np.complex64), self._arcs(at), closed).error
+        distance = wanted.distances({name: self._stored(name, at) for name in wanted.columns})
         return np.asarray(at[np.argsort(distance, kind="stable")])
 
     @cached_property
-    def _trees(self) -> dict[bool, tuple[NDArray[np.int64], cKDTree]]:
-        """Rows of closed and open curves, each with a tree of the sizes of their coefficients."""
-        from scipy.spatial import cKDTree
+    def _family(self) -> NDArray[np.uint16]:
+        return np.concatenate([shard.columns["mechanism"]["family"] for shard in self.shards])
 
-        closed = np.concatenate([shard.columns["mechanism"]["closed"] for shard in self.shards])
-        sizes = np.concatenate(
-            [magnitudes(unpacked(block), _LEADING) for shard in self.shards for block in _blocks(shard)]
-        )
-        found = {}
-        for kind in (False, True):
-            rows = np.flatnonzero(closed == kind)
-            found[kind] = rows, cKDTree(sizes[rows], balanced_tree=False, compact_nodes=False)
-        return found
+    def _tree(self, column: str, closed: bool) -> tuple[NDArray[np.int64], cKDTree]:
+        """Rows of closed or open curves, and a tree of the sizes of their coefficients in a column."""
+        if (column, closed) not in self._trees:
+            from scipy.spatial import cKDTree
 
-    def _arcs(self, rows: NDArray[np.int64]) -> NDArray[np.complex64]:
-        """Return the stored curves of ascending rows."""
+            kinds = np.concatenate([shard.columns["mechanism"]["closed"] for shard in self.shards])
+            rows = np.flatnonzero(kinds == closed)
+            sizes = [
+                magnitudes(self._stored(column, rows[start : start + _BLOCK]), LEADING)
+                for start in range(0, len(rows), _BLOCK)
+            ]
+            every = np.concatenate([np.zeros((0, 2 * LEADING + (column == "turn"))), *sizes])
+            self._trees[column, closed] = rows, cKDTree(every, balanced_tree=False, compact_nodes=False)
+        return self._trees[column, closed]
+
+    def _stored(self, column: str, rows: NDArray[np.int64]) -> NDArray[np.complex64]:
+        """Return the coefficients in ascending rows of a column."""
         own = np.searchsorted(self._ends, rows, side="right")
         parts = [
-            shard.columns["arc"][rows[own == k] - (self._ends[k] - len(shard))] for k, shard in enumerate(self.shards)
+            shard.columns[column][rows[own == k] - (self._ends[k] - len(shard))] for k, shard in enumerate(self.shards)
         ]
         return unpacked(np.concatenate(parts))
 
-    def _matched(self, number: int, target: _Target) -> CurveMatch | None:
-        """Move a mechanism anew and fit its curve; None if it does not move."""
+    def _matched(self, number: int, wanted: Wanted) -> CurveMatch | None:
+        """Move a mechanism anew and fit it; None if it does not move."""
         entry = self.entry(number)
         traced = entry.traced()
-        if len(traced.curve) < 3:
+        if len(traced.curve) < _FEWEST:
             return None
-        curve = np.append(traced.curve[:-1], traced.curve[0]) if target.closed else traced.curve
-        own = _Target.of(curve, target.closed)
-        fit = aligned(target.curve, own.curve[None], target.closed, fine=True)
-        return CurveMatch(
-            float(fit.error[0]),
-            entry.family.key,
-            entry.family.design.graph.links,
-            entry.family.dyadic,
-            number,
-            entry,
-            _placed(target, own, fit, traced.inputs, curve),
-        )
-
-
-class _Target(NamedTuple):
-    """A curve for comparison: unit coefficients, their norm, the centre over the arc length."""
-
-    curve: Complex
-    size: float
-    centre: complex
-    closed: bool
-
-    @classmethod
-    def of(cls, points: Complex, closed: bool) -> _Target:
-        found = coefficients(points[None], np.array([closed]), _FINAL)[0]
-        sides = np.diff(points)
-        middle = 0.5 * (points[1:] + points[:-1])
-        centre = complex((np.abs(sides) * middle).sum() / max(np.abs(sides).sum(), 1e-300))
-        return cls(unit(found), float(np.linalg.norm(found)), centre, closed)
-
-
-def _placed(target: _Target, own: _Target, fit: Aligned, inputs: NDArray[np.float64], curve: Complex) -> Fitted:
-    """How a curve comes to its place, and the input at which the wanted one begins."""
-    factor = complex(fit.factor[0]) * target.size / own.size
-    reflected, backwards = bool(fit.reflected[0]), bool(fit.backwards[0])
-    centre = own.centre.conjugate() if reflected else own.centre
-    along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(curve)))])
-    shift = float(fit.shift[0])
-    if target.closed:
-        share = (-shift if backwards else shift) % 1.0
-        start = float(np.interp(share * along[-1], along, inputs))
-    else:
-        backwards = shift != 0.0
-        start = float(inputs[-1] if backwards else inputs[0])
-    return Fitted(factor, target.centre - factor * centre, reflected, start, backwards)
-
-
-def _blocks(shard: Shard) -> Iterator[NDArray[Any]]:
-    """Parts of the stored curves, so that little of a large index is unpacked at once."""
-    for start in range(0, len(shard), 1 << 16):
-        yield shard.columns["arc"][start : start + (1 << 16)]
-
-
-def wanted_curve(curve: ArrayLike, closed: bool | None) -> tuple[Complex, bool]:
-    """Return points as complex numbers, the first repeated at the end of a closed curve, and whether it is closed.
-
-    `GeometryError` for fewer than three points, all at one place.
-    """
-    values = finite_array("curve", curve)
-    if values.ndim != 2 or values.shape[1] != 2 or len(values) < 3:
-        raise GeometryError(f"curve has shape {values.shape}; give three or more points (x, y)")
-    points = values[:, 0] + 1j * values[:, 1]
-    same = bool(points[0] == points[-1])
-    loop = same if closed is None else bool(closed)
-    if loop and not same:
-        points = np.append(points, points[0])
-    if not np.abs(np.diff(points)).sum() > 0.0:
-        raise GeometryError("all points of the curve are the same; give a curve")
-    return points, loop
+        error, fitted = wanted.fitted(traced)
+        family = entry.family
+        return CurveMatch(error, family.key, family.design.graph.links, family.dyadic, number, entry, fitted)

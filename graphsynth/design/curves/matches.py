@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.design.curves.families import Family
-from graphsynth.design.curves.sampling import TURN, move
+from graphsynth.design.curves.sampling import TURN, move, reach
 from graphsynth.kinematics.dimensional.design import Design, World
 from graphsynth.kinematics.dimensional.goals import Goals
 from graphsynth.kinematics.dimensional.problem import DimensionProblem
@@ -71,7 +71,7 @@ class Entry(NamedTuple):
         first, last = (float(value) for value in self.row["inputs"])
         if self.closed:
             last = math.tau
-        step = (math.tau if self.family.turns else last - first) / (TURN * _FINER)
+        step = reach(self.family) / (TURN * _FINER)
         parts = []
         for end in (first, last):
             if (end < 0.0 and end == first) or (end > 0.0 and end == last):
@@ -162,7 +162,8 @@ class CurveStart:
 class Fitted(NamedTuple):
     """How the curve of an entry comes to where it is wanted: ``factor z + offset``, z conjugate if reflected.
 
-    ``start`` is the input at which the wanted curve begins, ``backwards`` whether it is run against the input.
+    ``start`` is the input at which the wanted curve begins, ``backwards`` whether it is run against the input; ``arm``
+    leads to the point of the link that is meant, in units of its direction.
     """
 
     factor: complex
@@ -170,6 +171,7 @@ class Fitted(NamedTuple):
     reflected: bool
     start: float
     backwards: bool
+    arm: complex = 0j
 
 
 def begun(entry: Entry, fitted: Fitted) -> CurveStart:
@@ -187,6 +189,7 @@ def begun(entry: Entry, fitted: Fitted) -> CurveStart:
     point = origin[link] + turn[link] * entry.point
     if fitted.reflected:
         places, ways, point = np.conj(places), np.conj(ways), np.conj(point)
+    point += fitted.arm * (np.conj(turn[link]) if fitted.reflected else turn[link])
     places, ways = fitted.factor * places + fitted.offset, fitted.factor * ways
     sense = -1.0 if fitted.backwards else 1.0
     size = 1.0

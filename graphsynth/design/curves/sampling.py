@@ -49,6 +49,11 @@ class Drawn(NamedTuple):
     turns: Complex
 
 
+def reach(family: Family) -> float:
+    """Range of a driver: a rotation, or the longest slide."""
+    return math.tau if family.turns else _SLIDE
+
+
 def draw(family: Family, count: int, random: np.random.Generator) -> Drawn:
     """Draw mechanisms and move them; return the curves of those that move, one for every tracing link."""
     places, numbers = _dimensions(family, count, random)
@@ -117,7 +122,7 @@ def _of_modes(
     """Move mechanisms of the same modes; which of those drawn they are, once for every curve, and the curves."""
     design, links = family.design, list(family.tracing)
     n = TURN + 1
-    inputs = np.linspace(0.0, math.tau if family.turns else _SLIDE, n)
+    inputs = np.linspace(0.0, reach(family), n)
     frames = np.zeros((len(places), 2 * TURN + 1, design.graph.links, 4))
     first, last = np.full(len(places), TURN), np.full(len(places), 2 * TURN)
     closed = np.zeros(len(places), dtype=np.bool_)

@@ -114,7 +114,7 @@ def test_every_family_is_there_once_and_larger_groups_too() -> None:
 
 
 def test_bad_questions_are_answered_in_a_sentence(index: CurveIndex) -> None:
-    with pytest.raises(GeometryError, match="three or more points"):
+    with pytest.raises(GeometryError, match="3 or more rows"):
         index.find([(0.0, 0.0), (1.0, 0.0)])
     with pytest.raises(GeometryError, match="the same"):
         index.find([(1.0, 2.0)] * 4)
