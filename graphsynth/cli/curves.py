@@ -17,8 +17,8 @@ from graphsynth.core.textfiles import read_bytes
 from graphsynth.design.curves.building import build
 from graphsynth.design.curves.index import CurveIndex
 
-#: Curves from which all cores work, and the longest file of points.
-_MANY, _LONGEST = 20_000, 10**7
+#: Curves from which all cores work; the longest file of points; numbers of a pose.
+_MANY, _LONGEST, _POSE = 20_000, 10**7, 3
 
 
 def run(options: argparse.Namespace) -> int:
@@ -60,7 +60,11 @@ def _find(options: argparse.Namespace) -> int:
     points = _points(options.curve)
     index = CurveIndex(options.folder)
     begin = time.perf_counter()
-    found = index.find(points, options.count, closed=options.closed or None)
+    closed = options.closed or None
+    if points.shape[1] == _POSE:
+        found = index.find_motion(points, options.count, closed=closed)
+    else:
+        found = index.find(points, options.count, closed=closed, timed=options.timed)
     seconds = round(time.perf_counter() - begin, 3)
     if options.output is not None and found:
         mechanism = found[0].mechanism
@@ -95,21 +99,22 @@ def _find(options: argparse.Namespace) -> int:
 
 
 def _points(path: Path) -> NDArray[np.float64]:
-    """Read x and y from every line; commas, semicolons or blanks stand between."""
+    """Read two numbers from every line, or three; commas, semicolons or blanks stand between."""
     try:
         lines = read_bytes(path, _LONGEST, "a curve").decode("utf-8").splitlines()
     except UnicodeDecodeError:
         raise FormatError("is not a text; give x and y on every line", str(path)) from None
-    rows = []
+    rows: list[list[float]] = []
     for number, line in enumerate(lines, 1):
         parts = line.replace(",", " ").replace(";", " ").split()
         if not parts or parts[0].startswith("#"):
             continue
         try:
-            x, y = map(float, parts)
+            rows.append([float(part) for part in parts])
         except ValueError:
-            raise FormatError("does not hold two numbers; give x and y", f"{path}, line {number}") from None
-        rows.append((x, y))
+            raise FormatError("does not hold numbers; give x and y", f"{path}, line {number}") from None
+        if len(parts) not in (_POSE - 1, _POSE) or len(parts) != len(rows[0]):
+            raise FormatError("does not hold two numbers, or three as all others do", f"{path}, line {number}")
     if not rows:
         raise SpecError(f"{path} holds no points; give x and y on every line")
     return np.array(rows)

@@ -231,9 +231,10 @@ _CURVES_ACTIONS: dict[str, tuple[str, *tuple[Option, ...]]] = {
     "find": (
         "Find mechanisms whose curves are nearest to a wanted one.",
         _INDEX,
-        _option("CURVE", "file of points, x and y on every line", Path, dest="curve"),
+        _option("CURVE", "file of points, x and y on every line, or of poses, x, y and radians", Path, dest="curve"),
         _option("--count N", "mechanisms to find (default 10)", int, default=10),
         _option("--closed", "join the last point to the first"),
+        _option("--timed", "the points belong to uniform inputs; those of poses always do"),
         _option("-o --output FILE", "keep the best mechanism: FILE.toml, .json; or draw it: .svg, .png", Path),
     ),
     "verify": ("Compare the files of an index with their checksums.", _INDEX),

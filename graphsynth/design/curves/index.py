@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from graphsynth.kinematics.dimensional.design import Design
 
-#: Mechanisms moved anew, over those wanted; fewest positions of one; rows unpacked at once; no number is larger.
-_SPARE, _FEWEST, _BLOCK, _FAR = 3, 8, 1 << 16, 1e6
+#: Mechanisms moved anew beyond those wanted; fewest positions of one; rows unpacked at once; no number is larger.
+_SPARE, _FEWEST, _BLOCK, _FAR = 5, 8, 1 << 16, 1e6
 #: Curves whose distance is computed, by default.
 CANDIDATES = 1000
 
@@ -213,7 +213,7 @@ class CurveIndex:
         self, wanted: Wanted, count: int, only: Callable[[Design], bool] | None, candidates: int
     ) -> list[CurveMatch]:
         count, candidates = whole("count", count, 1, 10**5), whole("candidates", candidates, 1, 10**7)
-        near = self._nearest(wanted, max(candidates, _SPARE * count), only)[: _SPARE * count]
+        near = self._nearest(wanted, max(candidates, count + _SPARE), only)[: count + _SPARE]
         found = [self._matched(int(number), wanted) for number in near]
         return sorted((match for match in found if match is not None), key=lambda match: match.error)[:count]
 

@@ -71,11 +71,10 @@ class Entry(NamedTuple):
         first, last = (float(value) for value in self.row["inputs"])
         if self.closed:
             last = math.tau
-        step = reach(self.family) / (TURN * _FINER)
         parts = []
         for end in (first, last):
             if (end < 0.0 and end == first) or (end > 0.0 and end == last):
-                inputs = np.linspace(0.0, end, max(2, round(abs(end) / step) + 1))
+                inputs = _inputs(self.family, end)
                 parts.append((inputs, self.frames(inputs)[:, self.row["link"]]))
         inputs, own = parts[-1]
         if len(parts) > 1:
@@ -83,9 +82,17 @@ class Entry(NamedTuple):
             own = np.concatenate([parts[0][1][:0:-1], own])
         elif last <= 0.0:
             inputs, own = inputs[::-1], own[::-1]
+        step = reach(self.family) / (TURN * _FINER)
         kept = (inputs >= first - 0.5 * step) & (inputs <= last + 0.5 * step) & np.isfinite(own).all(axis=1)
         turn = own[kept, 2] + 1j * own[kept, 3]
         return Traced(inputs[kept], own[kept, 0] + 1j * own[kept, 1] + turn * self.point, turn)
+
+
+def _inputs(family: Family, end: float) -> Array:
+    """Return inputs from 0 to an end, in the finer steps."""
+    if end == 0.0:
+        return np.zeros(1)
+    return np.linspace(0.0, end, max(2, math.ceil(abs(end) / reach(family) * TURN * _FINER - 1e-3) + 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,14 +169,15 @@ class CurveStart:
 class Fitted(NamedTuple):
     """How the curve of an entry comes to where it is wanted: ``factor z + offset``, z conjugate if reflected.
 
-    ``start`` is the input at which the wanted curve begins, ``backwards`` whether it is run against the input; ``arm``
-    leads to the point of the link that is meant, in units of its direction.
+    ``start`` is the input at which the wanted curve begins, ``span`` the range, ``backwards`` says whether it is run
+    against the input; ``arm`` leads to the point of the link that is meant, in units of its direction.
     """
 
     factor: complex
     offset: complex
     reflected: bool
     start: float
+    span: float
     backwards: bool
     arm: complex = 0j
 
@@ -177,10 +185,7 @@ class Fitted(NamedTuple):
 def begun(entry: Entry, fitted: Fitted) -> CurveStart:
     """Place a mechanism of the index, at the pose where the wanted curve begins."""
     design, link = entry.family.design, int(entry.row["link"])
-    first, last = (float(value) for value in entry.row["inputs"])
-    steps = max(2, math.ceil(abs(fitted.start) / (math.tau / TURN)) + 1)
-    inputs = np.linspace(0.0, fitted.start, steps) if fitted.start else np.zeros(1)
-    pose = entry.frames(inputs)[-1]
+    pose = entry.frames(_inputs(entry.family, fitted.start))[-1]
     origin, turn = pose[:, 0] + 1j * pose[:, 1], pose[:, 2] + 1j * pose[:, 3]
     of_b, of_a = (np.array([joint[k] for joint in design.graph.joints]) for k in (1, 0))
     places = origin[of_b] + turn[of_b] * (entry.places @ [1.0, 1.0j])
@@ -204,7 +209,7 @@ def begun(entry: Entry, fitted: Fitted) -> CurveStart:
         np.angle(ways),
         complex(fitted.factor * point + fitted.offset),
         int(sense),
-        math.tau if entry.closed else (last - first) * size,
+        math.tau if entry.closed else fitted.span * size,
         entry.closed,
     )
 
@@ -216,8 +221,8 @@ class CurveMatch:
     Attributes
     ----------
     error : float
-        Root mean square distance of the curves, point by point over the arc length, over the root mean square
-        distance of the wanted curve from its centre.
+        Root mean square distance of the curves, point by point over the arc length (or the input), over the root mean
+        square distance of the wanted curve from its centre; of motions see `CurveIndex.find_motion`.
     key : str
         Canonical key of the graph with its frame.
     links : int

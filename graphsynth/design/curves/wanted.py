@@ -33,7 +33,7 @@ LEADING, _FINAL, _FINAL_TIMED = 8, 64, 24
 #: Fewest points with inputs; beginnings of a motion that are compared; rounds that improve the best, points of each.
 _LEAST, _GRID, _ROUNDS, _FINER = 5, 64, 7, 17
 #: Part of its largest value by which the matrix of a motion's placement is made regular.
-_REGULAR = 1e-9
+_REGULAR = 1e-13
 
 
 class Shape(NamedTuple):
@@ -165,8 +165,8 @@ class WantedMotion(Wanted):
             centre, middle = centre.conjugate(), middle.conjugate()
         offset = self.shape.centre - s * centre - q * middle
         share = np.linspace(0.0, 1.0, len(traced.inputs))
-        start, backwards = _beginning(self.closed, shift, way[1], traced.inputs, share)
-        return math.sqrt(max(error, 0.0)), Fitted(s, offset, way[0], start, backwards, q / s)
+        beginning = _beginning(self.closed, shift, way[1], traced.inputs, share)
+        return math.sqrt(max(error, 0.0)), Fitted(s, offset, way[0], *beginning, q / s)
 
 
 class _Motions(NamedTuple):
@@ -178,9 +178,10 @@ class _Motions(NamedTuple):
     def squares(self, z: AnyComplex, w: AnyComplex, way: tuple[bool, bool], shifts: Array) -> Array:
         """Squared errors (sets, shifts) of unit paths and directions: of the path over its size, and of the angle.
 
-        What the best multiples of path and direction leave of the wanted path, and 2 (1 - rho) of the directions.
+        What the best multiples of path and direction leave of the wanted path, and what a rotation leaves of the
+        directions.
         """
-        z, w = variant(z, *way), variant(w, *way)
+        z, w = (variant(part.astype(np.complex128), *way) for part in (z, w))
         half = self.path.shape[-1] // 2
         still = np.delete(w, half, axis=1)
         waves = np.exp(-2j * math.pi * orders(half)[:, None] * shifts)
@@ -191,7 +192,8 @@ class _Motions(NamedTuple):
         told = (b * np.abs(one) ** 2 + a * np.abs(two) ** 2 - 2.0 * (np.conj(one) * c * two).real) / (
             a * b - np.abs(c) ** 2
         )
-        return np.asarray(np.maximum(1.0 - told, 0.0) + np.maximum(2.0 - 2.0 * rho, 0.0))
+        norms = (np.abs(w) ** 2).sum(axis=1, keepdims=True) + (np.abs(self.turn) ** 2).sum()
+        return np.asarray(np.maximum(1.0 - told, 0.0) + np.maximum(norms - 2.0 * rho, 0.0))
 
     def placed(self, z: Complex, w: Complex, way: tuple[bool, bool], shift: float) -> tuple[complex, complex]:
         """Return the multiples of path and direction that are nearest to the wanted path."""
@@ -216,16 +218,17 @@ def _best(target: Shape, own: Shape, closed: bool, inputs: Array, share: Array) 
     fit = aligned(target.unit, own.unit[None], closed, fine=True)
     factor = complex(fit.factor[0]) * target.size / own.size
     reflected = bool(fit.reflected[0])
-    start, backwards = _beginning(closed, float(fit.shift[0]), bool(fit.backwards[0]), inputs, share)
+    beginning = _beginning(closed, float(fit.shift[0]), bool(fit.backwards[0]), inputs, share)
     centre = own.centre.conjugate() if reflected else own.centre
-    return float(fit.error[0]), Fitted(factor, target.centre - factor * centre, reflected, start, backwards)
+    return float(fit.error[0]), Fitted(factor, target.centre - factor * centre, reflected, *beginning)
 
 
-def _beginning(closed: bool, shift: float, backwards: bool, inputs: Array, share: Array) -> tuple[float, bool]:
-    """Input at which the wanted curve begins, and whether it is run against the input."""
+def _beginning(closed: bool, shift: float, backwards: bool, inputs: Array, share: Array) -> tuple[float, float, bool]:
+    """Input at which the wanted curve begins, the range, and whether it is run against the input."""
+    span = float(inputs[-1] - inputs[0])
     if not closed:
-        return float(inputs[-1] if shift else inputs[0]), shift != 0.0
-    return float(np.interp((-shift if backwards else shift) % 1.0, share, inputs)), backwards
+        return float(inputs[-1] if shift else inputs[0]), span, shift != 0.0
+    return float(np.interp((-shift if backwards else shift) % 1.0, share, inputs)), span, backwards
 
 
 def _complex(rows: Array) -> Complex:

@@ -69,6 +69,56 @@ def test_what_is_found_draws_the_wanted_curve(index: CurveIndex) -> None:
     assert len(seen) >= 4
 
 
+def test_motions_are_found_by_any_point_of_the_link(index: CurveIndex) -> None:
+    random = np.random.default_rng(8)
+    right = 0
+    for number in rows(index, 24, 8):
+        entry = index.entry(number)
+        traced = entry.traced()
+        z, angle = traced.curve + traced.turn * complex(*random.normal(size=2)), np.unwrap(np.angle(traced.turn))
+        if entry.closed:
+            z, angle = (np.roll(part[:-1], 77) for part in (z, angle))
+        if random.random() < 0.5:
+            z, angle = np.conj(z), -angle
+        if random.random() < 0.5:
+            z, angle = z[::-1], angle[::-1]
+        z, angle = (0.3 + 2j) * z + 5.0, angle + np.angle(0.3 + 2j) + 1.0
+        match = index.find_motion(np.column_stack([z.real, z.imag, angle]), 1, closed=entry.closed)[0]
+        assert match.error < 0.02
+        if match.number != number:
+            continue
+        right += 1
+        assert match.error < 1e-4
+        inputs = np.linspace(0.0, match.start.span, len(z) + entry.closed)
+        motion = simulate(match.mechanism, inputs, events=False)
+        drawn = (motion.point("P").position @ [1.0, 1.0j])[: len(z)]
+        assert np.abs(drawn - z).max() < 0.01 * np.abs(z - z.mean()).max()
+        apart = np.exp(1j * (motion.poses[: len(z), match.start.link, 2] - angle))
+        assert np.abs(apart - apart[0]).max() < 0.02
+    assert right >= 18
+
+
+def test_curves_at_uniform_inputs_are_found_with_few_points(index: CurveIndex) -> None:
+    for number in [k for k in rows(index, 30, 9) if index.entry(k).closed][:10]:
+        curve = index.entry(number).traced().curve
+        few = curve[:-1:32]  # sixteen points of a rotation
+        match = index.find(np.column_stack([few.imag, few.real]), 1, closed=True, timed=True)[0]
+        motion = simulate(match.mechanism, np.linspace(0.0, math.tau, 17), events=False)
+        drawn = motion.point("P").position[:16] @ [1.0, 1.0j]
+        size = np.abs(few - few.mean()).max()
+        assert np.abs(drawn - 1j * np.conj(few)).max() < 0.05 * size
+
+
+def test_only_some_mechanisms_are_asked_for(index: CurveIndex) -> None:
+    angles = np.linspace(0.0, math.tau, 100)
+    curve = np.column_stack([2.0 * np.cos(angles), np.sin(angles)])
+    every = index.find(curve, 40, candidates=len(index))
+    wanted = [match.number for match in every if match.links == 6][:5]
+    some = index.find(curve, 5, only=lambda design: design.graph.links == 6, candidates=len(index))
+    assert [match.number for match in some] == wanted
+    assert index.find(curve, 5, only=lambda design: False) == []
+
+
 def test_the_nearest_are_those_of_brute_force(index: CurveIndex) -> None:
     angles = np.linspace(0.0, math.tau, 200)
     for curve in (
@@ -116,6 +166,10 @@ def test_every_family_is_there_once_and_larger_groups_too() -> None:
 def test_bad_questions_are_answered_in_a_sentence(index: CurveIndex) -> None:
     with pytest.raises(GeometryError, match="3 or more rows"):
         index.find([(0.0, 0.0), (1.0, 0.0)])
+    with pytest.raises(GeometryError, match="5 or more rows"):
+        index.find([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], timed=True)
+    with pytest.raises(GeometryError, match=r"rows \(x, y, theta\)"):
+        index.find_motion([(0.0, 0.0)] * 9)
     with pytest.raises(GeometryError, match="the same"):
         index.find([(1.0, 2.0)] * 4)
     with pytest.raises(GeometryError, match="finite"):
