@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.compilation import named
 from graphsynth.design.nine_points.equations import cognates
-from graphsynth.design.nine_points.proof import Mask, ProvedRoots, marks, overlaps, prove
+from graphsynth.design.nine_points.proof import MIRROR, Mask, ProvedRoots, marks, overlaps, prove
 from graphsynth.design.nine_points.task import POINTS, Complex, Task, free_unknowns
 from graphsynth.intervals.balls import Balls
 
@@ -23,6 +23,8 @@ SETTINGS = ((1e-4, 1e-7, 1e-2, 1e-10), (1e-6, 1e-7, 1e-3, 1e-13))
 SAME = 1e-8
 #: How often other paths are tried for roots that are missing.
 _ROUNDS = 3
+#: Random detours for roots that are lost, relative; which part of the roots may be lost for that.
+_DETOURS, _FEW = (3e-3, 1e-2, 3e-2) * 3, 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,25 +70,36 @@ def repeated(z: Complex, pivots: int) -> NDArray[np.int64]:
     return found[overlaps([Balls(mark.mid, SAME * (1e-3 + np.abs(mark.mid))) for mark in sums])]
 
 
-def candidates(task: Task, begin: Start) -> tuple[Complex, int]:
-    """Follow one path to a task; return approximate roots, some perhaps twice, and how many paths were followed.
+def candidates(task: Task, begin: Start, rng: np.random.Generator) -> tuple[Complex, int]:
+    """Follow one path to a task; return approximate roots, real ones once, and how many paths were followed.
 
     Where a path is lost, or two have become one, those of the cognates are tried, which pass elsewhere through large
-    numbers, and small steps.
+    numbers.  What few are left take detours: round a point where a root is infinite they lead to the same end.  The
+    points are real, so the mirror image of a root is one, and most that are missing need not be found themselves.
     """
     z = follow(begin, task.end)
-    paths = len(z)
-    lost: Mask = np.asarray(~np.isfinite(z).all(axis=1))
-    lost[repeated(z, begin.pivots)] = True
-    for k, settings in ((1, SETTINGS[0]), (2, SETTINGS[0]), (0, SETTINGS[1])):
+    paths, pivots = len(z), begin.pivots
+    for k, detour in [*((k, 0.0) for k in range(1, 3 - pivots)), *((0, detour) for detour in _DETOURS)]:
+        lost: Mask = np.asarray(~np.isfinite(z).all(axis=1))
+        lost[repeated(z, pivots)] = True
         left = np.flatnonzero(lost)
-        if left.size and k < 3 - begin.pivots:
-            other = np.stack(cognates(begin.z[left].T)[k], axis=1)
-            z[left] = follow(Start(begin.end, other), task.end, settings)
-            paths += left.size
-            lost[left] = ~np.isfinite(z[left]).all(axis=1)
-            lost[repeated(z, begin.pivots)] = True
-    return z[np.isfinite(z).all(axis=1)], paths
+        if left.size == 0 or (detour and (left.size > _FEW * len(z) or len(_whole(z, pivots)) >= len(z))):
+            break
+        at = Start(begin.end, np.stack(cognates(begin.z[left].T)[k], axis=1))
+        if detour:
+            turn = rng.normal(size=(2, *at.end.shape))
+            middle = 0.5 * (at.end + task.end) * (1.0 + detour * (turn[0] + 1j * turn[1]))
+            at = Start(middle, follow(at, middle, SETTINGS[1]))
+        z[left] = follow(at, task.end, SETTINGS[1 if detour else 0])
+        paths += left.size
+    return _whole(z, pivots), paths
+
+
+def _whole(z: Complex, pivots: int) -> Complex:
+    """Different roots among those given and their mirror images."""
+    z = z[np.isfinite(z).all(axis=1)]
+    z = np.concatenate([z, z[:, MIRROR].conj()])
+    return np.delete(z, repeated(z, pivots)[:, 1], axis=0)
 
 
 def solve(task: Task, seed: int = 0) -> tuple[ProvedRoots, int]:
@@ -96,7 +109,8 @@ def solve(task: Task, seed: int = 0) -> tuple[ProvedRoots, int]:
     scale = np.abs(start.end[: len(task.p) - 1]).mean()
     z, paths = np.empty((0, 8), dtype=np.complex128), 0
     for _ in range(_ROUNDS):
-        found, followed = candidates(task, start.turned(np.exp(2j * np.pi * rng.uniform(size=2)) / scale))
+        begin = start.turned(np.exp(2j * np.pi * rng.uniform(size=2)) / scale)
+        found, followed = candidates(task, begin, rng)
         z, paths = np.concatenate([z, found]), paths + followed
         z = np.delete(z, repeated(z, start.pivots)[:, 1], axis=0)
         roots = prove(z, task)

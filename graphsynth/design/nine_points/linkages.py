@@ -101,6 +101,7 @@ def linkages(roots: ProvedRoots, task: Task) -> tuple[PathLinkage, ...]:
     parts = np.stack([part.mid for part in each[:4]])
     extent = np.abs(np.concatenate([parts, parts[:1] - parts[2:3], parts[:1] - parts[1:2]])).max(axis=0)
     rank = 8.0 * (one & order) + 4.0 * (one & full) + 2.0 * one + 1.0 / (1.0 + extent)
+    rank[np.isinf([part.rad for part in each[:4]]).any(axis=0)] = -1.0
     best = np.argmax(rank, axis=1)
     made = []
     for i in np.argsort(-rank[np.arange(len(best)), best], kind="stable"):
@@ -136,11 +137,12 @@ def _judge(each: _Candidates) -> tuple[Mask, Mask, Mask, Array]:
     g, c, k, r = (_length(part) for part in (frame, each.x - each.a, each.y - each.x, each.y - each.b))
     # the crank passes the direction to the other pivot if near > 0, and the opposite one if far > 0
     near, far = (g - c - r + k) * (g - c + r - k), k + r - g - c
-    full = (near.mid > near.rad) & (far.mid > far.rad)
-    outer = (near.mid < -near.rad) & (far.mid > far.rad)
-    inner = (near.mid > near.rad) & (far.mid < -far.rad)
+    meets, reaches = (near.mid > near.rad, near.mid < -near.rad), (far.mid > far.rad, far.mid < -far.rad)
+    full, outer, inner = meets[0] & reaches[0], meets[1] & reaches[0], meets[0] & reaches[1]
     side = (each.coupler.conj * each.rocker).imag
-    one = (side.mid > side.rad).all(axis=-1) | (side.mid < -side.rad).all(axis=-1)
+    # a crank that passes neither direction swings on one side of the frame
+    aside = meets[1] & reaches[1] & _one_sign((each.crank * frame.conj[..., None]).imag)
+    one = _one_sign(side) & (full | outer | inner | aside)
     sign = np.where(outer, -1.0, 1.0)  # angles are counted from the middle of what is reached
     angle = argument(each.crank * (frame.conj * exact(sign))[..., None])
     after = [np.roll(part, -1, axis=-1) for part in (angle.mid, angle.rad)]
@@ -157,7 +159,12 @@ def _judge(each: _Candidates) -> tuple[Mask, Mask, Mask, Array]:
     onward = np.where((full & backwards)[..., None], -(-step.mid % _TAU), onward)
     turns = np.concatenate([np.zeros((*onward.shape[:-1], 1)), np.cumsum(onward, axis=-1)[..., :-1]], axis=-1)
     turns = np.where((full & ~order)[..., None], turns % _TAU, turns)
-    return full, one & (full | outer | inner), order, turns
+    return full, one, order, turns
+
+
+def _one_sign(values: Balls) -> Mask:
+    """Whether no value changes its sign over the points."""
+    return np.asarray((values.mid > values.rad).all(axis=-1) | (values.mid < -values.rad).all(axis=-1))
 
 
 def _length(vector: Balls) -> Balls:

@@ -54,6 +54,8 @@ class ProvedRoots:
 def prove(z: Complex, task: Task) -> ProvedRoots:
     """Prove what can be proved of approximate roots."""
     check_rounding()
+    z = z.copy()
+    z[:, [k for k in range(8) if k not in task.free]] = task.held.mid.ravel()  # paths end beside them
     mirror = z[:, MIRROR].conj()
     near = np.abs(z - mirror).max(axis=1) < _NEAR_REAL * (1.0 + np.abs(z).max(axis=1))
     centre = np.where(near[:, None], 0.5 * (z + mirror), z)
