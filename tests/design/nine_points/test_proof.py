@@ -50,6 +50,17 @@ def test_roots_lie_in_their_boxes(solved):
             assert bool(gap < flint.arb("1e-100")) == roots.real[k]
 
 
+def test_boxes_hold_the_given_pivots(solved):
+    task, roots = solved
+    beside = roots.box.mid.copy()
+    beside[:, :2] *= 1.0 + 1e-12  # where a path ended
+    box = proof.prove(beside, task).box
+    with precision(200):
+        for at, exact in enumerate(task.ball(task.pivots[0])):
+            for mid, rad in zip(box.mid[:, at], box.rad[:, at]):
+                assert abs(exact - flint.acb(complex(mid))) <= flint.arb(float(rad))
+
+
 def test_many_digits_prove_the_same(solved):
     task, roots = solved
     for k in (0, 1, 2, int(np.flatnonzero(roots.real)[0])):
