@@ -3,7 +3,7 @@ from .curves.matches import CurveMatch as CurveMatch, CurveStart as CurveStart
 from .nine_points.linkages import PathLinkage as PathLinkage
 from .nine_points.proof import ProvedRoots as ProvedRoots
 from .nine_points.solutions import NinePointSolutions as NinePointSolutions, four_bars_through as four_bars_through
-from .poses.cognates import cognates as cognates, stretched as stretched
+from .poses.cognates import Cognate as Cognate, cognates as cognates
 from .poses.curves import (
     BurmesterCurve as BurmesterCurve,
     BurmesterCurves as BurmesterCurves,

@@ -21,10 +21,10 @@ FILE = Path(__file__).with_name("starts.npz")
 SETTINGS = ((1e-4, 1e-7, 1e-2, 1e-10), (1e-6, 1e-7, 1e-3, 1e-13))
 #: Relative distance of marks below which two roots count as one.
 SAME = 1e-8
-#: How often other paths are tried for roots that are missing.
+#: How often other paths are tried for roots that are missing, at most: no more if one try adds nothing.
 _ROUNDS = 3
-#: Random detours for roots that are lost, relative; which part of the roots may be lost for that.
-_DETOURS, _FEW = (3e-3, 1e-2, 3e-2) * 3, 0.02
+#: Random detours for roots that are lost, relative; which part of the roots may be lost for another try.
+_DETOURS, _FEW = (3e-3, 1e-2, 3e-2) * 3, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +74,8 @@ def candidates(task: Task, begin: Start, rng: np.random.Generator) -> tuple[Comp
     """Follow one path to a task; return approximate roots, real ones once, and how many paths were followed.
 
     Where a path is lost, or two have become one, those of the cognates are tried, which pass elsewhere through large
-    numbers.  What few are left take detours: round a point where a root is infinite they lead to the same end.  The
-    points are real, so the mirror image of a root is one, and most that are missing need not be found themselves.
+    numbers, then detours: round a point where a root is infinite they lead to the same end.  Of points in special
+    position many are lost for good.  The points are real, so the mirror image of a root is one, too.
     """
     z = follow(begin, task.end)
     paths, pivots = len(z), begin.pivots
@@ -83,7 +83,7 @@ def candidates(task: Task, begin: Start, rng: np.random.Generator) -> tuple[Comp
         lost: Mask = np.asarray(~np.isfinite(z).all(axis=1))
         lost[repeated(z, pivots)] = True
         left = np.flatnonzero(lost)
-        if left.size == 0 or (detour and (left.size > _FEW * len(z) or len(_whole(z, pivots)) >= len(z))):
+        if left.size == 0 or left.size > _FEW * len(z) or (detour and len(_whole(z, pivots)) >= len(z)):
             break
         at = Start(begin.end, np.stack(cognates(begin.z[left].T)[k], axis=1))
         if detour:
@@ -107,14 +107,15 @@ def solve(task: Task, seed: int = 0) -> tuple[ProvedRoots, int]:
     rng = np.random.default_rng(seed)
     start = shipped(len(task.pivots))
     scale = np.abs(start.end[: len(task.p) - 1]).mean()
-    z, paths = np.empty((0, 8), dtype=np.complex128), 0
+    z, paths, before = np.empty((0, 8), dtype=np.complex128), 0, 0
     for _ in range(_ROUNDS):
         begin = start.turned(np.exp(2j * np.pi * rng.uniform(size=2)) / scale)
         found, followed = candidates(task, begin, rng)
         z, paths = np.concatenate([z, found]), paths + followed
         z = np.delete(z, repeated(z, start.pivots)[:, 1], axis=0)
         roots = prove(z, task)
-        if roots.distinct.sum() >= len(start.z):
-            break
         z = z[roots.distinct]
+        if len(z) in (before, len(start.z)):
+            break
+        before = len(z)
     return roots, paths

@@ -75,9 +75,14 @@ def test_given_pivots(plant, count, pivots, expected):
             )
 
 
-def test_a_crank_rocker_is_found_without_defects(plant):
+@pytest.fixture(scope="module")
+def in_order(plant):
     linkage = plant(3, 9, in_order=True)
-    found = four_bars_through(linkage.points)
+    return linkage, four_bars_through(linkage.points)
+
+
+def test_a_crank_rocker_is_found_without_defects(in_order):
+    linkage, found = in_order
     assert found.complete and linkage.among(found.without_defects)
     for one in found.without_defects:
         steps = np.diff(one.crank_angles)
@@ -87,9 +92,9 @@ def test_a_crank_rocker_is_found_without_defects(plant):
     assert all(farthest(one, found.points) < 1e-10 for one in found.linkages if one.one_branch)
 
 
-def test_branch_and_order_are_those_of_the_sampled_motion(plant):
+def test_branch_and_order_are_those_of_the_sampled_motion(in_order):
     """Linkages with a full turn: every point within reach of both branches of a sampled motion."""
-    found = four_bars_through(plant(3, 9, in_order=True).points)
+    found = in_order[1]
     for one in found.linkages:
         if one.turns_fully:
             motion = one.mechanism.simulate(np.linspace(0.0, 2.0 * np.pi, 1441))

@@ -9,10 +9,15 @@ import pytest
 
 import graphsynth as gs
 from graphsynth.core.errors import GeometryError
-from graphsynth.design import cognates, stretched
+from graphsynth.design import cognates
 from graphsynth.design.poses.cognates import roberts
+from graphsynth.mechanism.model import TracePoint
 
 TURN = np.linspace(0.0, 2 * np.pi, 60)
+
+
+def mechanisms(given, *names, **kinds):
+    return [one.mechanism for one in cognates(given, *names, **kinds)]
 
 
 class Rational:
@@ -75,7 +80,7 @@ def test_the_three_curves_are_one_in_rational_numbers():
 
 def test_equal_sextics_by_elimination():
     linkage = gs.Mechanism.four_bar(2, 1, 2.5, 2.5, coupler_point=(1.5, 0.0))
-    curves = [one.coupler_curve("P").equation.monic() for one in cognates(linkage)]
+    curves = [one.coupler_curve("P").equation.monic() for one in mechanisms(linkage)]
     for other in curves[1:]:
         for exponents, value in curves[0].terms():
             assert float(other.coeff_monomial(exponents)) == pytest.approx(float(value), abs=1e-9)
@@ -83,7 +88,7 @@ def test_equal_sextics_by_elimination():
 
 def test_lambda_linkage_and_chebyshevs_linkage_are_cognates():
     """Published: frame 2, crank 1, coupler 2.5, rocker 2.5 with BM = 2.5; frame 4, arms 5, coupler 2, its middle."""
-    _, same, other = cognates(gs.Mechanism.four_bar(2, 1, 2.5, 2.5, coupler_point=(5, 0)))
+    _, same, other = mechanisms(gs.Mechanism.four_bar(2, 1, 2.5, 2.5, coupler_point=(5, 0)))
 
     def sides(one):
         pose = {k: np.array(p) for k, p in enumerate(one.pose)}
@@ -94,11 +99,99 @@ def test_lambda_linkage_and_chebyshevs_linkage_are_cognates():
             return complex(x, y) + np.exp(1j * t) * complex(*joint.at_a)
 
         O, A, B, Q = (at(pair) for pair in ((0, 1), (1, 2), (2, 3), (0, 3)))
-        x, y, _ = pose[2]
-        return [abs(Q - O), abs(A - O), abs(B - A), abs(Q - B), abs(complex(x, y) - (A + B) / 2)]
+        x, y, t = pose[2]
+        P = complex(x, y) + np.exp(1j * t) * complex(*one.points["P"].at)
+        return [abs(Q - O), abs(A - O), abs(B - A), abs(Q - B), abs(P - (A + B) / 2)]
 
     assert sides(other) == pytest.approx([4, 5, 2, 5, 0], abs=1e-12)
     assert sides(same)[:4] == pytest.approx([2, 1, 2.5, 2.5], abs=1e-12)  # the lambda linkage again, mirrored
+
+
+WATT = [(0, 1), (0, 2), (2, 3), (1, 3), (0, 4), (4, 5), (1, 5)]
+STEPHENSON = [(0, 2), (1, 2), (0, 3), (1, 3), (0, 4), (4, 5), (1, 5)]
+#: Joints, frame, driven link, link of the point: links 0 and 1 are ternary; how many cognates, and their free joints.
+SIX_BARS = {
+    "Watt I, inner link": (WATT, 2, 0, 4, [0, 1]),
+    "Watt I, outer link": (WATT, 2, 0, 5, [0, 0, 0, 0]),
+    "Stephenson I": (STEPHENSON, 2, 0, 4, [0, 0]),
+    "Stephenson II, ternary link": (STEPHENSON, 4, 0, 1, [0, 0, 0]),
+    "Stephenson II, binary link": (STEPHENSON, 4, 0, 2, [0, 0, 0, 0]),
+    "Stephenson III": (STEPHENSON, 0, 2, 5, [0, 0, 0, 0, 0, 0]),
+}
+
+
+def chain(joints, frame, driven, tracer, rng, places=None):
+    """Mechanism that stands in a pose where all angles are zero, its joints at random places."""
+    n = max(map(max, joints)) + 1
+    places = rng.normal(size=(len(joints) + 1, 2)) if places is None else places
+    revolute = [gs.Revolute(a, b, tuple(z), tuple(z)) for (a, b), z in zip(joints, places)]
+    graph = gs.MechanismGraph(n, joints, frame=frame)
+    points = {"P": TracePoint(tracer, tuple(places[-1]))}
+    return gs.Mechanism(graph, tuple(revolute), [gs.Driver(frame, driven)], points, [(0.0, 0.0, 0.0)] * n)
+
+
+def moving(make):
+    """Random mechanisms, with a short motion in which every link turns steadily."""
+    for seed in range(1000):
+        given = make(np.random.default_rng(seed))
+        motion = given.simulate(np.linspace(0.0, 0.05, 12), events=False)
+        steps = np.diff(np.delete(motion.poses[:, :, 2], given.frame, axis=1), axis=0)
+        if motion.completed and (np.abs(steps) > 1e-4).all() and (np.abs(steps) < 0.05).all():
+            yield given, motion
+
+
+def worst(cognate, motion):
+    """Largest distance of the cognate's point from the given one's, over the size of both."""
+    again = cognate.mechanism.simulate(cognate.inputs(motion), events=False)
+    assert again.completed
+    size = max(np.abs(one.poses[0, :, :2]).max() for one in (motion, again))
+    return np.abs(motion.point("P").position - again.point("P").position).max() / size
+
+
+@pytest.mark.parametrize("kind", SIX_BARS)
+def test_six_bars(kind):
+    joints, frame, driven, tracer, free = SIX_BARS[kind]
+    for (given, motion), _ in zip(moving(lambda rng: chain(joints, frame, driven, tracer, rng)), range(5)):
+        found = cognates(given)
+        assert sorted(one.freedom for one in found) == sorted(free)
+        assert found[0].turns == (0, 1, 2, 3, 4, 5) and found[0].timed
+        assert all(worst(one, motion) < 1e-12 for one in found)
+
+
+def test_members_of_a_family():
+    joints, frame, driven, tracer, _ = SIX_BARS["Watt I, inner link"]
+    given, motion = next(moving(lambda rng: chain(joints, frame, driven, tracer, rng)))
+    own, single = cognates(given)
+    assert own.freedom == 1 and single.freedom == 0
+    for at in ((0.3, 0.4), (-2.0, 1.0)):
+        other = own.placed({(0, 1): at})
+        x, y, angle = other.mechanism.pose[0]
+        place = complex(x, y) + np.exp(1j * angle) * complex(*other.mechanism.joint(0, 1).at_a)
+        assert abs(place - complex(*at)) < 1e-12 and worst(other, motion) < 1e-12
+    with pytest.raises(GeometryError, match="1 joints of this cognate are free"):
+        own.placed({(0, 1): (0.0, 0.0), (1, 5): (0.0, 1.0)})
+    with pytest.raises(GeometryError, match="no joint"):
+        own.placed({(2, 5): (0.0, 0.0)})
+
+
+def test_a_watt_six_bar_draws_what_a_stephenson_six_bar_draws():
+    joints, frame, driven, tracer, _ = SIX_BARS["Watt I, inner link"]
+    given, motion = next(moving(lambda rng: chain(joints, frame, driven, tracer, rng)))
+    (other,) = cognates(given, graph=gs.MechanismGraph(6, STEPHENSON, frame=4))
+    assert other.freedom == 0 and worst(other, motion) < 1e-12
+
+
+def test_the_whole_motion_of_a_link_is_kept():
+    """A four-bar's coupler has no other; a Stephenson III six-bar's last dyad may hang on any of Roberts' four-bars."""
+    assert len(cognates(chain([(0, 1), (1, 2), (2, 3), (0, 3)], 0, 1, 2, np.random.default_rng(1)), links=(2,))) == 1
+    joints, frame, driven, tracer, _ = SIX_BARS["Stephenson III"]
+    given, motion = next(moving(lambda rng: chain(joints, frame, driven, tracer, rng)))
+    found = cognates(given, links=(tracer,))
+    assert len(found) == 3
+    for one in found:
+        again = one.mechanism.simulate(one.inputs(motion), events=False)
+        turned = again.poses[:, tracer, 2] - motion.poses[:, tracer, 2]
+        assert np.abs(turned).max() < 1e-12 and worst(one, motion) < 1e-12
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -109,62 +202,80 @@ def test_random_four_bars_draw_the_same_curve(seed):
     motion = linkage.simulate(TURN)
     path = motion.point("P").position
     first, same, turned = cognates(linkage)
-    assert first is linkage
-    moved = same.simulate(TURN)
+    assert (first.turns, same.turns, turned.turns) == ((0, 1, 2, 3), (0, 1, 3, 2), (0, 2, 1, 3))
+    moved = same.mechanism.simulate(TURN)
     assert moved.completed and np.abs(moved.point("P").position - path).max() < 1e-12
-    coupler = motion.poses[:, 2, 2]
-    steady = np.abs(np.diff(np.sign(np.diff(coupler)))).nonzero()[0]
+    # until its driver, the coupler of the given one, turns back
+    steady = np.abs(np.diff(np.sign(np.diff(motion.poses[:, 2, 2])))).nonzero()[0]
     stop = int(steady[0]) + 1 if len(steady) else len(TURN)
     if stop > 3:
-        again = turned.simulate(coupler[:stop])
+        again = turned.mechanism.simulate(turned.inputs(motion)[:stop])
         assert np.abs(again.point("P").position - path[:stop]).max() < 1e-10
-    # angles are shared: the driver by the first, that of the other link by the second
-    assert np.allclose(moved.poses[:, 1, 2], motion.poses[:, 1, 2])
-    assert np.allclose(np.diff(moved.poses[:, 3, 2]), np.diff(coupler), atol=1e-9)
-    assert np.allclose(np.diff(moved.poses[:, 2, 2]), np.diff(motion.poses[:, 3, 2]), atol=1e-9)
+    for k, link in enumerate(same.turns):
+        assert np.allclose(np.exp(1j * moved.poses[:, k, 2]), np.exp(1j * motion.poses[:, link, 2]), atol=1e-9)
 
 
-def test_a_stephenson_six_bar_keeps_its_output():
+def test_those_of_four_bars_are_roberts():
+    linkage = gs.Mechanism.four_bar(2, 0.8, 2.4, 2.2, coupler_point=(0.7, 1.1))
+    O, A, B, Q, P = (complex(x, y) for x, y in placed(linkage))
+    left, right = roberts(O, A, B, Q, P)
+    _, same, turned = cognates(linkage)
+    found = [[complex(x, y) for x, y in placed(one.mechanism)[:4]] for one in (same, turned)]
+    assert np.abs(np.array(found[0]) - right[::-1]).max() < 1e-12 or np.abs(np.array(found[0]) - right).max() < 1e-12
+    assert np.abs(np.array(found[1]) - left).max() < 1e-12
+
+
+def placed(linkage):
+    """Joints and point of a four-bar in its pose."""
+    places = []
+    for a, at in [(j.a, j.at_a) for j in map(linkage.joint, (0, 1, 2, 0), (1, 2, 3, 3))] + [linkage.points["P"]]:
+        x, y, angle = linkage.pose[a]
+        z = complex(x, y) + np.exp(1j * angle) * complex(*at)
+        places.append((z.real, z.imag))
+    return places
+
+
+def test_a_function_is_kept():
     six = gs.Mechanism.six_bar("stephenson", (4, 1, 4, 3), joint=(2, 1), link=3, output=4.5, pivot=(7, 0))
-    _, same, turned = cognates(six)
-    motion, moved = six.simulate(TURN), same.simulate(TURN)
-    assert motion.completed and moved.completed
-    assert np.abs(motion.poses[:, 4:] - moved.poses[:, 4:]).max() < 1e-11
-    assert np.abs(motion.poses[:, 3, 2] - moved.poses[:, 3, 2]).max() > 1e-3
-    at = turned.simulate([motion.poses[5, 2, 2]], start=None)
-    assert turned.graph == six.graph and at.residual < 1e-9
-
-
-def test_a_watt_six_bar_is_stretched():
-    watt = gs.Mechanism.six_bar("watt", (4, 1, 4, 3), joint=(2, 1), link=3, output=3, pivot=(7, 0))
-    other = stretched(watt, [0, 1, 2, 3], (0, 3), 0.7 - 0.9j)
-    motion, moved = watt.simulate(TURN[:20]), other.simulate(TURN[:20])
-    assert motion.completed and np.abs(motion.poses[:, :, 2] - moved.poses[:, :, 2]).max() < 1e-11
-    assert np.abs(motion.poses[:, 4:] - moved.poses[:, 4:]).max() < 1e-11
-    assert np.abs(motion.poses[:, 1, :2] - moved.poses[:, 1, :2]).max() > 1.0
-    second = stretched(watt, [0, 3, 4, 5], (0, 3), 2.0)
-    moved = second.simulate(TURN[:20])
+    motion = six.simulate(TURN)
+    own, same, turned = cognates(six, None, links=(5,))
+    moved = same.mechanism.simulate(TURN)
+    assert own.timed and same.timed and not turned.timed and moved.completed
     assert np.abs(motion.poses[:, 5, 2] - moved.poses[:, 5, 2]).max() < 1e-11
+    assert np.abs(motion.poses[:, 3, 2] - moved.poses[:, 3, 2]).max() > 1e-3
+    # a loop of Watt's six-bar may be stretched and turned about the joint that it shares with the other
+    watt = gs.Mechanism.six_bar("watt", (4, 1, 4, 3), joint=(2, 1), link=3, output=3, pivot=(7, 0))
+    motion = watt.simulate(TURN[:20])
+    own = cognates(watt, None, links=(5,))[0].placed({(0, 1): (-3.0, 1.0)})
+    moved = own.mechanism.simulate(TURN[:20])
+    assert motion.completed and np.abs(motion.poses[:, :, 2] - moved.poses[:, :, 2]).max() < 1e-11
+    assert np.abs(moved.poses[0, 1, :2] - (-3.0, 1.0)).max() < 1e-12
+
+
+def test_eight_links():
+    """One dyad more on a Stephenson III six-bar: its links may be exchanged too."""
+    joints = [*STEPHENSON, (0, 6), (6, 7), (5, 7)]
+    given, motion = next(moving(lambda rng: chain(joints, 0, 2, 7, rng)))
+    found = cognates(given)
+    assert len(found) == 12 and all(worst(one, motion) < 1e-11 for one in found)
 
 
 def test_what_has_no_cognate_is_told():
-    with pytest.raises(GeometryError, match="a named one"):
+    with pytest.raises(GeometryError, match="on no moving link"):
         cognates(gs.Mechanism.four_bar(2, 1, 2.5, 2.5))
-    with pytest.raises(GeometryError, match="no four-bar"):
-        cognates(gs.Mechanism.slider_crank(1.0, 3.0))
+    with pytest.raises(GeometryError, match="not revolute"):
+        cognates(gs.Mechanism.slider_crank(1.0, 3.0), None, links=(2,))
+    with pytest.raises(GeometryError, match="keep nothing"):
+        cognates(gs.Mechanism.four_bar(2, 1, 2.5, 2.5), None)
+    with pytest.raises(GeometryError, match="give one with 4 links"):
+        cognates(gs.Mechanism.four_bar(2, 1, 2.5, 2.5, coupler_point=(1, 1)), graph=gs.MechanismGraph(6, WATT, frame=0))
     with pytest.raises(GeometryError, match="lies on a joint"):
         cognates(gs.Mechanism.four_bar(2, 1, 2.5, 2.5, coupler_point=(0, 0)))
-    watt = gs.Mechanism.six_bar("watt", (4, 1, 4, 3), joint=(2, 1), link=3, output=3, pivot=(7, 0))
-    for loop, about, factor in (
-        ([0, 1, 2], (0, 1), 2), ([0, 1, 2, 3], (1, 3), 2), ([0, 1, 2, 3], (0, 1), 2), ([0, 1, 2, 3], (0, 3), 0)
-    ):  # fmt: skip
-        with pytest.raises(GeometryError):
-            stretched(watt, loop, about, factor)
 
 
 def test_a_mechanism_without_a_pose_is_assembled_first():
     linkage = gs.Mechanism.four_bar(2, 1, 2.5, 2.5, coupler_point=(1, 1))
     bare = gs.Mechanism(linkage.graph, linkage.joints, linkage.drivers, linkage.points)
-    same = cognates(bare)[1]
+    same = cognates(bare)[1].mechanism
     path = bare.simulate([0.5]).point("P").position
     assert np.abs(same.simulate([0.5]).point("P").position - path).max() < 1e-9
