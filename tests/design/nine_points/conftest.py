@@ -45,10 +45,19 @@ def assembled(a, b, c, d, turn, side):
     return c2, c2 + k * (b - c2) / reach * cmath.exp(1j * side * math.acos(cosine))
 
 
-def linkage(rng, count, *, in_order=False):
-    """Random linkage with so many points; in order on one branch of a full turn, or anywhere on the path."""
+def linkage(rng, count, *, in_order=False, extreme=False):
+    """Random linkage with so many points; in order on one branch of a full turn, or anywhere on the path.
+
+    Of extreme ones the links have ratios of up to about 100.
+    """
     while True:
         a, b, c, d, p = rng.normal(size=5) + 1j * rng.normal(size=5)
+        if extreme:
+            c, d, p = (
+                a + (c - a) * 10 ** rng.uniform(-1, 1),
+                b + (d - b) * 10 ** rng.uniform(-1, 1),
+                p * 10 ** rng.uniform(0, 1),
+            )
         if in_order:
             lengths = sorted((abs(b - a), abs(d - c), abs(d - b)))
             if abs(c - a) > lengths[0] or abs(c - a) + lengths[2] > 0.98 * (lengths[0] + lengths[1]):
