@@ -132,8 +132,8 @@ def cognates(
 
     Notes
     -----
-    All exchanges of links are tried, so none of this kind is missed in general; that every cognate is of this kind is
-    not proved [Sherman, Hauenstein & Wampler 2020].
+    All exchanges of links are tried [Sherman et al. 2021].  Six-bars have no other cognates [Sherman et al. 2022]; of
+    more links that is not known.  Estimated: ranks are decided in floating point.
 
     Examples
     --------
