@@ -15,7 +15,7 @@ from graphsynth.design.curves.families import Family
 from graphsynth.design.curves.sampling import TURN, move, reach
 from graphsynth.kinematics.dimensional.design import Design, World
 from graphsynth.kinematics.dimensional.goals import Goals
-from graphsynth.kinematics.dimensional.problem import DimensionProblem
+from graphsynth.kinematics.dimensional.problem import DimensionProblem, own_frame
 from graphsynth.mechanism.laws import Driver, Linear
 from graphsynth.mechanism.model import Mechanism, TracePoint
 
@@ -131,7 +131,7 @@ class CurveStart:
         """The mechanism, with the tracing point "P"; it draws the curve over the inputs 0 to ``span``."""
         design = self.design
         world = [World.read(row) for row in design.dimensions(self.places[None], self.numbers[None])[0]]
-        own = [self._frame(link, world) for link in range(design.graph.links)]
+        own = [own_frame(design, link, world) for link in range(design.graph.links)]
         origin, angle = own[self.link]
         local = (self.point - origin) * cmath.exp(-1j * angle)
         drivers = tuple(
@@ -155,15 +155,6 @@ class CurveStart:
         problem = DimensionProblem(self.design, goals, np.random.default_rng(0), int(self.sense < 0), given)
         extras = problem.bounds()[problem.size - problem.extras :].mean(axis=1)
         return problem, np.concatenate([places[problem.free].ravel(), self.numbers, extras])
-
-    def _frame(self, link: int, world: list[World]) -> tuple[complex, float]:
-        """Origin and angle of a link's own frame: its first joint, the driven one if it has it, towards the second."""
-        if link == self.design.graph.frame:
-            return 0j, 0.0
-        driven = self.design.driver_joints
-        places = [world[k].A for k in sorted(self.design.joints_of(link), key=lambda k: (k not in driven, k))]
-        far = [z for z in places if z != places[0]]
-        return places[0], cmath.phase(far[0] - places[0]) if far else 0.0
 
 
 class Fitted(NamedTuple):
