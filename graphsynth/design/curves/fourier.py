@@ -21,6 +21,8 @@ AnyComplex = NDArray[np.complexfloating[Any, Any]]
 _STEPS = 6
 #: Peaks of the correlation on the grid that may be the highest, over the highest there.
 _RIVAL = 0.9
+#: No peak is flatter.
+_LEAST = 1e-30
 
 
 def orders(harmonics: int) -> NDArray[np.int64]:
@@ -113,17 +115,17 @@ def magnitudes(found: AnyComplex, harmonics: int) -> Array:
 
 
 class Aligned(NamedTuple):
-    """How curves fit on a wanted one: distance (sets,) of unit curves, and the motion that takes them there.
+    """How a curve fits on a wanted one: distance of the unit curves, and the motion that takes it there.
 
-    ``factor`` (sets,) multiplies the unit curve, after reflection (conjugate) where ``reflected`` and reversal where
-    ``backwards``; ``shift`` is the beginning, as part of the period.
+    ``factor`` multiplies the unit curve, after reflection (conjugate) and reversal; ``shift`` is the beginning, as part
+    of the period.
     """
 
-    error: Array
-    factor: Complex
-    shift: Array
-    reflected: NDArray[np.bool_]
-    backwards: NDArray[np.bool_]
+    error: float
+    factor: complex
+    shift: float
+    reflected: bool
+    backwards: bool
 
 
 def variant(found: AnyComplex, reflected: bool, backwards: bool) -> AnyComplex:
@@ -133,71 +135,72 @@ def variant(found: AnyComplex, reflected: bool, backwards: bool) -> AnyComplex:
     return np.conj(found) if reflected else found
 
 
-def aligned(wanted: AnyComplex, found: AnyComplex, closed: bool, fine: bool = False) -> Aligned:
-    """Fit unit curves (sets, 2 harmonics) on a wanted unit curve by rotation, size, beginning, sense and reflection.
+def distances(wanted: AnyComplex, found: AnyComplex, closed: bool) -> Array:
+    """Distances (sets,) of unit curves from a wanted one, from a grid and the parabola through its highest peak."""
+    k = orders(wanted.shape[-1] // 2)
+    best = np.zeros(len(found))
+    for reflected, backwards in _ways(closed):
+        rho, at = _correlation(np.conj(variant(found, reflected, backwards)) * wanted, k, closed)
+        row, peak = np.arange(len(rho)), rho.argmax(axis=1)
+        here = rho[row, peak]
+        if closed:
+            before, after = rho[row, peak - 1], rho[row, (peak + 1) % len(at)]
+            here = here + 0.125 * (before - after) ** 2 / np.maximum(2.0 * here - before - after, _LEAST)
+        best = np.maximum(best, here)
+    return np.asarray(np.sqrt(np.maximum(1.0 - best, 0.0)))
 
-    The distance is ``sqrt(1 - rho^2)`` with rho the largest size of the correlation.  ``fine``: every peak of the
-    correlation that may be the highest is climbed by Newton's method, and the distance is that of the curves.
+
+def aligned(wanted: Complex, found: Complex, closed: bool) -> Aligned:
+    """Fit a unit curve on a wanted one by rotation, size, beginning, sense and reflection.
+
+    Every peak of the correlation that may be the highest is climbed by Newton's method.
     """
-    half = wanted.shape[-1] // 2
-    k = orders(half)
+    k = orders(wanted.shape[-1] // 2)
     best: Aligned | None = None
-    for reflected in (False, True):
-        for backwards in (False, True):
-            if backwards and not closed:  # an open curve backwards begins at its other end: a shift by half a period
-                continue
-            own = variant(found, reflected, backwards)
-            products = np.conj(own) * wanted
-            shift = _shifts(products, k, fine) if closed else _ends(products, k)
-            turned = np.exp(-2j * math.pi * k * shift[:, None])
-            total = (products * turned).sum(axis=1)
-            error = np.sqrt(np.maximum(1.0 - np.abs(total) ** 2, 0.0))
-            if fine:  # without the loss of digits where the curves are nearly the same
-                error = np.linalg.norm(wanted - total[:, None] * own * np.conj(turned), axis=1)
-            fit = Aligned(error, total, shift, np.full(len(error), reflected), np.full(len(error), backwards))
-            if best is not None:
-                better = fit.error < best.error
-                fit = Aligned(*(np.where(better, new, old) for new, old in zip(fit, best)))
-            best = fit
+    for reflected, backwards in _ways(closed):
+        own = variant(found, reflected, backwards)
+        products = np.conj(own) * wanted
+        (rho,), at = _correlation(products[None], k, closed)
+        if closed:
+            peak = (rho >= np.roll(rho, 1)) & (rho >= np.roll(rho, -1)) & (rho >= _RIVAL * rho.max())
+            at = _summit(products, k, at[peak])
+        turned = np.exp(-2j * math.pi * k * at[:, None])
+        heights = turned @ products
+        high = int(np.abs(heights).argmax())
+        total = complex(heights[high])
+        # the distance itself: 1 - rho^2 loses digits where the curves are nearly the same
+        error = float(np.linalg.norm(wanted - total * own * np.conj(turned[high])))
+        if best is None or error < best.error:
+            best = Aligned(error, total, float(at[high]), reflected, backwards)
     assert best is not None
     return best
 
 
-def _ends(products: AnyComplex, k: NDArray[np.int64]) -> Array:
-    """Shift of an open curve: 0, or 1/2, which begins at its other end."""
-    return np.where(np.abs(products @ (-1.0) ** k) > np.abs(products.sum(axis=1)), 0.5, 0.0)
+def _ways(closed: bool) -> list[tuple[bool, bool]]:
+    """Reflected or not, backwards or not; an open curve backwards begins at its other end, half a period later."""
+    return [(reflected, back) for reflected in (False, True) for back in (False, True) if closed or not back]
 
 
-def _shifts(products: AnyComplex, k: NDArray[np.int64], fine: bool) -> Array:
-    """Shifts at which the sums of products are largest, from a grid and the parabola through its highest peak."""
+def _correlation(products: AnyComplex, k: NDArray[np.int64], closed: bool) -> tuple[NDArray[Any], Array]:
+    """Squared sums of products (sets, shifts) at some shifts, and these: a grid, or both ends of an open curve."""
+    if not closed:
+        sums = np.stack([products.sum(axis=1), products @ (1.0 - 2.0 * (k % 2)).astype(products.real.dtype)], axis=1)
+        return sums.real**2 + sums.imag**2, np.array([0.0, 0.5])
     grid = 4 * 2 ** math.ceil(math.log2(len(k) // 2 + 1))
     spread = np.zeros((len(products), grid), dtype=products.dtype)
     spread[:, k % grid] = products
-    rho = np.abs(np.fft.fft(spread, axis=1)) ** 2
-    high = rho.max(axis=1, keepdims=True)
-    if fine:
-        peak = (rho >= np.roll(rho, 1, axis=1)) & (rho >= np.roll(rho, -1, axis=1)) & (rho >= _RIVAL * high)
-        row, at = np.nonzero(peak)
-    else:
-        row, at = np.arange(len(rho)), rho.argmax(axis=1)
-    before, here, after = rho[row, at - 1], rho[row, at], rho[row, (at + 1) % grid]
-    shift = (at + 0.5 * (before - after) / np.minimum(before - 2.0 * here + after, -1e-300)) / grid
-    if not fine:
-        return np.asarray(shift)
-    shift = _summit(products[row], k, shift)
-    height = np.abs((products[row] * np.exp(-2j * math.pi * k * shift[:, None])).sum(axis=1))
-    order = np.lexsort((-height, row))
-    return np.asarray(shift[order][np.searchsorted(row, np.arange(len(rho)))])
+    sums = np.fft.fft(spread, axis=1)
+    return sums.real**2 + sums.imag**2, np.arange(grid) / grid
 
 
-def _summit(products: AnyComplex, k: NDArray[np.int64], tau: Array) -> Array:
-    """Improve the shifts at which the sum of products has its largest size, by Newton's method."""
+def _summit(products: Complex, k: NDArray[np.int64], shift: Array) -> Array:
+    """Improve shifts at which the sum of products has a peak, by Newton's method."""
     w = -2j * math.pi * k
     for _ in range(_STEPS):
-        terms = products * np.exp(w * tau[:, None])
-        f, f1, f2 = terms.sum(axis=1), (w * terms).sum(axis=1), (w * w * terms).sum(axis=1)
+        terms = products * np.exp(w * shift[:, None])
+        f, f1, f2 = terms.sum(axis=1), terms @ w, terms @ w**2
         slope = (np.conj(f) * f1).real
         bend = np.abs(f1) ** 2 + (np.conj(f) * f2).real
         safe = bend < 0.0
-        tau = tau - np.where(safe, slope / np.where(safe, bend, 1.0), 0.0)
-    return tau
+        shift = shift - np.where(safe, slope / np.where(safe, bend, 1.0), 0.0)
+    return shift

@@ -16,6 +16,7 @@ from graphsynth.design.curves.fourier import (
     AnyComplex,
     aligned,
     coefficients,
+    distances,
     magnitudes,
     orders,
     uniform,
@@ -82,7 +83,7 @@ class Wanted(ABC):
 
     def distances(self, rows: Mapping[str, AnyComplex]) -> Array:
         """Distance of stored rows."""
-        return aligned(self.own.astype(np.complex64), rows[self.column], self.closed).error
+        return distances(self.own.astype(np.complex64), rows[self.column], self.closed)
 
     @abstractmethod
     def fitted(self, traced: Traced) -> tuple[float, Fitted]:
@@ -215,12 +216,11 @@ def _matrix(z: AnyComplex, w: AnyComplex) -> tuple[Array, Array, AnyComplex]:
 
 def _best(target: Shape, own: Shape, closed: bool, inputs: Array, share: Array) -> tuple[float, Fitted]:
     """Fit a curve whose samples lie at shares of its period, in steps of its inputs."""
-    fit = aligned(target.unit, own.unit[None], closed, fine=True)
-    factor = complex(fit.factor[0]) * target.size / own.size
-    reflected = bool(fit.reflected[0])
-    beginning = _beginning(closed, float(fit.shift[0]), bool(fit.backwards[0]), inputs, share)
-    centre = own.centre.conjugate() if reflected else own.centre
-    return float(fit.error[0]), Fitted(factor, target.centre - factor * centre, reflected, *beginning)
+    fit = aligned(target.unit, own.unit, closed)
+    factor = fit.factor * target.size / own.size
+    beginning = _beginning(closed, fit.shift, fit.backwards, inputs, share)
+    centre = own.centre.conjugate() if fit.reflected else own.centre
+    return fit.error, Fitted(factor, target.centre - factor * centre, fit.reflected, *beginning)
 
 
 def _beginning(closed: bool, shift: float, backwards: bool, inputs: Array, share: Array) -> tuple[float, float, bool]:
