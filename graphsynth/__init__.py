@@ -34,5 +34,8 @@ _shown.WORK.update(
         "chart line": "graphsynth.drawing.plots:Line",
         "chart band": "graphsynth.drawing.plots:Band",
         "motion picture": "graphsynth.drawing.methods:motion_picture",
+        "parts": "graphsynth.design.parts.api:parts",
+        "draw parts": "graphsynth.drawing.parts_picture:draw_parts",
+        "write parts": "graphsynth.formats.parts_files:write_parts",
     }
 )

@@ -3,6 +3,9 @@ __version__: str
 from .atlas.catalogue import Catalogue as Catalogue
 from .core.angles import degrees as degrees
 from .core.errors import GraphsynthError as GraphsynthError
+from .design.parts.api import parts as parts
+from .design.parts.plan import PartSizes as PartSizes
+from .design.parts.result import Parts as Parts
 from .drawing.methods import Drawing as Drawing
 from .drawing.plots import Chart as Chart
 from .dynamics.elements import Force as Force, Torque as Torque

@@ -28,7 +28,7 @@ from graphsynth.pipeline.runner import run
 CHOSEN = 5  # of the sixteen chains: the one that becomes a mechanism
 CELL, GAP, COLUMNS = 150, 10, 8
 #: Pages whose examples write pictures.
-WITH_EXAMPLES = ("gallery.md", "explanation/jamming-in-space.md")
+WITH_EXAMPLES = ("gallery.md", "explanation/jamming-in-space.md", "how-to/build-it.md")
 #: Pictures of the pages: scene, file, title in the report.
 FROM_SCENES = {
     "antenna": {

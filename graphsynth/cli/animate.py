@@ -73,29 +73,37 @@ def run(options: argparse.Namespace) -> int:
 
 def _from_file(place: Path, options: argparse.Namespace) -> _Found:
     """Move a dimensioned mechanism over the range given, or as far as it goes."""
-    import numpy as np
-
-    from graphsynth.core.textfiles import read_bytes
-    from graphsynth.drawing.frames import motion_over_reach
-    from graphsynth.kinematics.simulation import simulate
-    from graphsynth.mechanism.files import JSON_MAX
-    from graphsynth.mechanism.model import Mechanism
-
     if options.driver:
         raise SpecError("--driver belongs to a graph: a dimensioned mechanism names its drivers in its file")
-    text = read_bytes(place, JSON_MAX, "a mechanism")
-    try:
-        mechanism = Mechanism.from_toml(text) if place.suffix.lower() == ".toml" else Mechanism.from_json(text)
-    except FormatError as error:
-        raise FormatError(str(error), str(place)) from None
-    if options.range is not None:
-        motion = simulate(mechanism, np.linspace(options.range[0], options.range[1], 361))
-    else:
-        motion = motion_over_reach(mechanism)
+    mechanism = read_mechanism(place)
+    motion = moved(mechanism, options.range)
     size = f"{mechanism.graph.links} links, drivers {_drivers(mechanism)}"
     if not motion.assembled.any():
         raise GraphsynthError(f"nothing of the motion is assembled: {motion.reason}")
     return _Found(motion, place.stem, size, {"key": mechanism.graph.key, "text": mechanism.graph.to_text()})
+
+
+def read_mechanism(place: Path) -> Mechanism:
+    """Read a dimensioned mechanism from a .toml or .json file."""
+    from graphsynth.core.textfiles import read_bytes
+    from graphsynth.mechanism.files import JSON_MAX
+    from graphsynth.mechanism.model import Mechanism
+
+    text = read_bytes(place, JSON_MAX, "a mechanism")
+    try:
+        return Mechanism.from_toml(text) if place.suffix.lower() == ".toml" else Mechanism.from_json(text)
+    except FormatError as error:
+        raise FormatError(str(error), str(place)) from None
+
+
+def moved(mechanism: Mechanism, reach: list[float] | None) -> Motion:
+    """Move a mechanism over a range of inputs, or as far as it goes."""
+    import numpy as np
+
+    from graphsynth.drawing.frames import motion_over_reach
+    from graphsynth.kinematics.simulation import simulate
+
+    return simulate(mechanism, np.linspace(reach[0], reach[1], 361)) if reach else motion_over_reach(mechanism)
 
 
 def _from_graph(options: argparse.Namespace) -> _Found:

@@ -30,6 +30,16 @@ def _option(names: str, meaning: str, kind: Callable[[str], Any] | None = None, 
 _SCENE = _option("SCENE", "name of a shipped scene, or a TOML file of a scene or a question", dest="scene")
 _SHARD = _option("--shard I/M", "do only shard I of M (1 <= I <= M)", shard)
 _WORKERS = _option("--workers K", "worker processes (default: one; all for big work)", workers)
+_PROPORTION = "; in proportion by default"
+_SIZES = (
+    _option("--thickness MM", f"thickness of the sheet{_PROPORTION}", float),
+    _option("--pin MM", f"diameter of the pins{_PROPORTION}", float),
+    _option("--hole MM", f"diameter of the holes{_PROPORTION}", float),
+    _option("--wall MM", f"material around a hole{_PROPORTION}", float),
+    _option("--clearance MM", f"least gap between parts of one layer{_PROPORTION}", float),
+    _option("--washer MM", f"thickness of the washers between layers{_PROPORTION}", float),
+)
+_FORMS = ("svg", "dxf", "stl", "step", "csv")
 _WORK = (
     _option("--frame", "choose a frame: mechanisms instead of chains"),
     _option("--assur N", "Assur groups with N moving links instead of chains", int),
@@ -89,6 +99,17 @@ _VERBS: dict[str, tuple[str, *tuple[Option, ...]]] = {
         _option("--frames N", "pictures of one pass (default 120, GIF 60)", int),
         _option("--range", "inputs of MECHANISM.toml, radians or lengths", type=float, nargs=2, metavar=("A", "B")),
         _option("--save FILE", "keep the mechanism found: FILE.toml or .json", Path),
+    ),
+    "parts": (
+        "Make parts of a dimensioned mechanism: layers without collisions, drawings to cut, bill of parts.",
+        _option("MECHANISM", "a dimensioned mechanism (.toml, .json), or the name of a classic one", dest="mechanism"),
+        _option("--out FOLDER", "folder for the files (default parts)", Path, default=Path("parts")),
+        _option("--unit MM", "millimetres of one unit of length (default 1)", float, default=1.0),
+        _option(
+            "--range", "inputs, radians or lengths (default: all it reaches)", type=float, nargs=2, metavar=("A", "B")
+        ),
+        *_SIZES,
+        _option("--form FORM", "what to write, once for each (default svg and csv)", action="append", choices=_FORMS),
     ),
     "run": (
         "Run a scene: from the question to a report.",

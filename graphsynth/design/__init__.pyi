@@ -3,6 +3,10 @@ from .curves.matches import CurveMatch as CurveMatch, CurveStart as CurveStart
 from .nine_points.linkages import PathLinkage as PathLinkage
 from .nine_points.proof import ProvedRoots as ProvedRoots
 from .nine_points.solutions import NinePointSolutions as NinePointSolutions, four_bars_through as four_bars_through
+from .parts.collisions import Collision as Collision
+from .parts.outline import Corner as Corner, Moments as Moments, Rounded as Rounded
+from .parts.plan import PartSizes as PartSizes, PartsPlan as PartsPlan, Pin as Pin, Sizes as Sizes
+from .parts.result import BillRow as BillRow, Parts as Parts
 from .poses.cognates import Cognate as Cognate, cognates as cognates
 from .poses.curves import (
     BurmesterCurve as BurmesterCurve,

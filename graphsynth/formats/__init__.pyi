@@ -14,6 +14,7 @@ from .matrices import (
 )
 from .mjcf import MjcfModel as MjcfModel, MujocoSettings as MujocoSettings, to_mjcf as to_mjcf
 from .mujoco_run import run_mujoco as run_mujoco
+from .parts_files import cut_svg as cut_svg, write_parts as write_parts
 from .registry import (
     FORMATS as FORMATS,
     GRAPHS_MAX as GRAPHS_MAX,

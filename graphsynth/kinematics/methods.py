@@ -235,6 +235,11 @@ class MotionMethods(Shown):
         found: gs.StaticForces = work("static forces")(self, loads, **options)
         return found
 
+    def parts(self, **options: Any) -> gs.Parts:
+        """Make parts of the links, in layers where nothing collides; see :func:`graphsynth.parts`."""
+        found: gs.Parts = work("parts")(self, **options)
+        return found
+
     def _told(self) -> tuple[str, list[tuple[str, str]]]:
         mechanism, u = self.mechanism, self.inputs
         rows = []

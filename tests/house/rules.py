@@ -173,7 +173,7 @@ def repeated_public_names() -> Iterator[str]:
 #: Folders of modules with a line of their own in the budget, beside the systems.
 FOLDERS = {
     "jamming/assembly", "jamming/binding", "jamming/chance", "jamming/margins", "jamming/space",
-    "design/poses", "design/nine_points", "design/curves", "design/task",
+    "design/poses", "design/nine_points", "design/curves", "design/task", "design/parts",
 }  # fmt: skip
 
 

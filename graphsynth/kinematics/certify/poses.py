@@ -115,17 +115,7 @@ def certify(
         raise GeometryError(f"{type(motion).__name__} is not a motion of graphsynth.simulate; give one")
     begin, budget = perf_counter(), Budget(whole("max_boxes", max_boxes, 1, 10**9), positive("seconds", seconds))
     check_rounding()
-    system = MechanismSystem(motion.mechanism)
-    reached = motion.assembled & np.isfinite(motion.poses).all(axis=(1, 2))
-    asked = np.arange(int(np.argmin(np.append(reached, False))))  # up to the first gap: a branch has no holes
-    samples = motion.poses[asked][:, system.moving].reshape(len(asked), system.size)
-    turns = _full_turn(motion) if between and len(asked) == len(motion.inputs) else None
-    u, end = _inputs(motion.inputs[asked], turns)
-    nodes = prove_nodes(system, u, samples)
-    radii = _radii(system, nodes, samples)
-    found = Cover(np.zeros(max(len(asked) - 1, 0), dtype=bool))
-    if between and len(asked) > 1 and all(hasattr(d.law, "at") for d in motion.mechanism.drivers):
-        found = cover(system, nodes, budget, begin)
+    system, asked, turns, end, nodes, radii, found = _proved(motion, between, budget, begin)
     closed = turns is not None and end
     closed = closed and bool(found.covered.all()) and _closes(system, nodes, turns)
     n = len(motion.inputs)
@@ -152,6 +142,64 @@ def certify(
         seconds=perf_counter() - begin,
         statement=_statement(reason, between, int(poses.sum()), n, closed, turns is not None),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Enclosures:
+    """Moving boxes that hold a proved branch: poses ``x + V (u - u_mid)``, each within ``radius``.
+
+    ``u_mid``, ``u_rad`` (N,): inputs; ``x``, ``V``, ``radius`` (N, links, 3): ``(x, y, theta)``.  ``reason`` tells why
+    they do not hold the whole motion; empty if they do.
+    """
+
+    u_mid: Array
+    u_rad: Array
+    x: Array
+    V: Array
+    radius: Array
+    reason: str
+
+
+def enclosures(motion: Motion, *, max_boxes: int = 100_000, seconds: float = 60.0) -> Enclosures:
+    """Return the boxes behind `certify`, for proofs of what depends on the poses between samples too.
+
+    Raises
+    ------
+    GeometryError
+        As `certify`.
+    """
+    check_rounding()
+    system, _, _, _, _, radii, found = _proved(motion, True, Budget(max_boxes, seconds), perf_counter())
+    proved = np.isfinite(radii[2])
+    reason = _reason(motion, True, proved, found.covered & proved[:-1] & proved[1:], found)
+    count = sum(len(boxes.x) for boxes, _ in found.boxes)
+    wide = np.zeros((3, count, motion.mechanism.graph.links, 3))
+    for target, parts in zip(
+        wide,
+        ([b.x for b, _ in found.boxes], [b.V for b, _ in found.boxes], [tight for _, tight in found.boxes]),
+    ):
+        if parts:
+            target[:, system.moving] = np.concatenate(parts).reshape(count, len(system.moving), 3)
+    u = [boxes.u for boxes, _ in found.boxes]
+    mid, rad = (np.concatenate([getattr(ball, name) for ball in u] or [np.zeros(0)]) for name in ("mid", "rad"))
+    return Enclosures(mid, rad, wide[0], wide[1], wide[2], reason)
+
+
+def _proved(
+    motion: Motion, between: bool, budget: Budget, begin: float
+) -> tuple[MechanismSystem, NDArray[np.intp], Fraction | None, bool, Nodes, tuple[Array, Array, Array], Cover]:
+    """Prove nodes and, if asked, moving boxes between; up to the first gap: a branch has no holes."""
+    system = MechanismSystem(motion.mechanism)
+    reached = motion.assembled & np.isfinite(motion.poses).all(axis=(1, 2))
+    asked = np.arange(int(np.argmin(np.append(reached, False))))
+    samples = motion.poses[asked][:, system.moving].reshape(len(asked), system.size)
+    turns = _full_turn(motion) if between and len(asked) == len(motion.inputs) else None
+    u, end = _inputs(motion.inputs[asked], turns)
+    nodes = prove_nodes(system, u, samples)
+    found = Cover(np.zeros(max(len(asked) - 1, 0), dtype=bool))
+    if between and len(asked) > 1 and all(hasattr(d.law, "at") for d in motion.mechanism.drivers):
+        found = cover(system, nodes, budget, begin)
+    return system, asked, turns, end, nodes, _radii(system, nodes, samples), found
 
 
 def _full_turn(motion: Motion) -> Fraction | None:

@@ -1,0 +1,1 @@
+"""Parts that make a mechanism: outlines with holes, layers without collisions, pins, bill of parts."""

@@ -1,0 +1,127 @@
+"""`parts`: the links of a moving mechanism as sheets with holes, in layers where nothing collides."""
+
+from __future__ import annotations
+
+import math
+from time import perf_counter
+
+import numpy as np
+
+from graphsynth.core.checks import positive
+from graphsynth.core.errors import GeometryError
+from graphsynth.design.parts.collisions import Hazards
+from graphsynth.design.parts.gaps import Solid, Tube, proved_travel
+from graphsynth.design.parts.layers import least_layers
+from graphsynth.design.parts.outline import Rounded
+from graphsynth.design.parts.plan import PartSizes, PartsPlan, Travel, plan
+from graphsynth.design.parts.result import Parts
+from graphsynth.kinematics.certify.poses import enclosures
+from graphsynth.kinematics.engine.result import Motion
+from graphsynth.mechanism.joints import PinSlot, Prismatic
+
+
+def parts(
+    motion: Motion,
+    *,
+    unit: float = 1.0,
+    sizes: PartSizes | None = None,
+    prove: bool = True,
+    max_boxes: int = 100_000,
+    seconds: float = 60.0,
+) -> Parts:
+    """Make parts of the links of a moving mechanism, in the least number of layers where nothing collides.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a planar mechanism with revolute and prismatic joints and pins in slots; its links are sheets, the frame is
+        the board below all others.
+    unit : float
+        Millimetres of one unit of length of the mechanism.
+    sizes : PartSizes, optional
+        Thickness, diameters, wall, clearance; in proportion to the mechanism by default.
+    prove : bool
+        Prove by intervals that the parts stay clear of each other over the whole motion; else, and where that fails,
+        it is estimated at the samples.
+    max_boxes, seconds : optional
+        Limits of the proof of the motion, as in `graphsynth.certify`.
+
+    Returns
+    -------
+    Parts
+        Outlines, layers, pins, bill of parts, mass properties.
+
+    Raises
+    ------
+    GeometryError
+        A gear or a cam, a motion that is nowhere assembled, holes that overlap; or no layering without a collision:
+        the message names the parts and the inputs at which they meet.
+
+    Examples
+    --------
+    >>> from graphsynth import gallery, simulate
+    >>> made = parts(simulate(gallery.chebyshev_lambda()), unit=40.0)
+    >>> made.layers, made.certified
+    ((0, 1, 2, 1), True)
+    """
+    if not isinstance(motion, Motion):
+        raise GeometryError(f"{type(motion).__name__} is not a motion of graphsynth.simulate; give one")
+    begin, unit = perf_counter(), positive("unit", unit)
+    reached = motion.poses[motion.assembled] * [unit, unit, 1.0]
+    if len(reached) < 2:
+        raise GeometryError(f"{len(reached)} poses of the motion are assembled; parts need a motion of two or more")
+    tube, reason = _tube(motion, unit, max_boxes, seconds) if prove else (None, "no proof was asked for")
+    given = PartSizes() if sizes is None else sizes
+    travel, mechanism = _travel(motion, unit), motion.mechanism
+    own = plan(mechanism, given, unit, travel)
+    if tube is not None and (short := _short_slot(motion, own, unit, travel, tube)):
+        tube, reason = None, short
+    hazards = Hazards(own, mechanism.frame, reached, motion.inputs[motion.assembled])
+    while True:
+        layers = least_layers(hazards.stacking())
+        if layers is None:
+            raise GeometryError(f"no layers without a collision: {'; '.join(map(str, hazards.impossible()))}")
+        if tube is None or not hazards.refuted(layers, tube):
+            break
+    gap = min((hazards.known[pair].gap for pair in hazards.relied(layers)), default=math.inf)
+    found = tuple(map(hazards.collision, hazards.kept_apart))
+    return Parts(motion, unit, own, layers, not reason, reason, gap, found, perf_counter() - begin)
+
+
+def _tube(motion: Motion, unit: float, max_boxes: int, seconds: float) -> tuple[Tube | None, str]:
+    """Return proved poses over the whole motion in millimetres, or why there are none."""
+    try:
+        found = enclosures(motion, max_boxes=max_boxes, seconds=seconds)
+    except GeometryError as error:
+        return None, str(error)
+    if found.reason:
+        return None, found.reason
+    lengths = np.array([unit, unit, 1.0])
+    return Tube(found.u_mid, found.u_rad, *(array * lengths for array in (found.x, found.V, found.radius))), ""
+
+
+def _travel(motion: Motion, unit: float) -> dict[tuple[int, int], tuple[float, float]]:
+    """Return how far the pins in slots travel at the samples, in millimetres."""
+    found = {}
+    for joint in motion.mechanism.joints:
+        if isinstance(joint, Prismatic | PinSlot):
+            ways = motion.point(joint.b, joint.at_b).position - motion.point(joint.a, joint.at_a).position
+            turn = np.exp(-1j * (motion.poses[:, joint.a, 2] + joint.angle_a))
+            s = ((ways @ [1.0, 1.0j]) * turn).real[motion.assembled] * unit
+            found[joint.pair] = (float(s.min()), float(s.max()))
+    return found
+
+
+def _short_slot(motion: Motion, own: PartsPlan, unit: float, travel: Travel, tube: Tube) -> str:
+    """Return which slot is not proved long enough over the whole motion; empty if all are."""
+    for joint in motion.mechanism.joints:
+        if isinstance(joint, Prismatic | PinSlot):
+            low, high = travel[joint.pair]
+            guide, line = (
+                Solid(k, Rounded((complex(*at) * unit,), 0.0))
+                for k, at in ((joint.b, joint.at_b), (joint.a, joint.at_a))
+            )
+            room = own.sizes.clearance
+            if not proved_travel(guide, line, joint.angle_a, tube, (low - room, high + room)):
+                return f"the slot of joint {joint.a}-{joint.b} is not proved long enough between the samples"
+    return ""

@@ -1,0 +1,246 @@
+"""Links as rounded sheets: outlines, holes, slots, and the pins through them.
+
+A revolute joint is a pin through all links that meet there.  A prismatic joint is a slot in the link that carries the
+line, and two pins of the other link in it; a pin in a slot is one.  Everything here is in millimetres, in the frame of
+the link.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from itertools import combinations
+from typing import NamedTuple
+
+from graphsynth.core.checks import positive
+from graphsynth.core.errors import GeometryError
+from graphsynth.design.parts.outline import Rounded
+from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.model import Mechanism
+
+#: Points of a link nearer than this times its size are one point.
+_SAME = 1e-9
+#: A pin by default: this part of the largest link, at most that part of the shortest way between two holes.
+_OF_LARGEST, _OF_SHORTEST = 40.0, 4.0
+#: The board of the frame reaches this many walls and bosses beyond its holes.
+_BOARD = 2.0
+
+
+@dataclass(frozen=True)
+class PartSizes:
+    """Sizes of parts, in millimetres; those not given follow from the pin, and the pin from the mechanism.
+
+    Attributes
+    ----------
+    thickness : float
+        Of the sheet; 0.8 pins by default.
+    pin, hole : float
+        Diameters; the hole 1.04 pins.
+    wall : float
+        Material around a hole; 0.8 pins.
+    clearance : float
+        Least gap between parts of one layer; 0.2 pins.
+    washer : float
+        Thickness of the washers between neighbouring layers; 0.1 pins.
+    """
+
+    thickness: float | None = None
+    pin: float | None = None
+    hole: float | None = None
+    wall: float | None = None
+    clearance: float | None = None
+    washer: float | None = None
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            if (value := getattr(self, item.name)) is not None:
+                object.__setattr__(self, item.name, positive(item.name, value))
+
+    def filled(self, largest: float, shortest: float) -> Sizes:
+        """Return all sizes, for the largest link and the shortest way between two holes.
+
+        Raises
+        ------
+        GeometryError
+            A hole smaller than the pin.
+        """
+        pin = self.pin or _two_digits(min(largest / _OF_LARGEST, shortest / _OF_SHORTEST))
+        part = {"thickness": 0.8, "hole": 1.04, "wall": 0.8, "clearance": 0.2, "washer": 0.1}
+        own = {name: getattr(self, name) or _two_digits(share * pin, 3) for name, share in part.items()}
+        if own["hole"] < pin:
+            raise GeometryError(f"hole = {own['hole']:g} is smaller than the pin, {pin:g}; give a larger one")
+        return Sizes(pin=pin, **own)
+
+
+class Sizes(NamedTuple):
+    """All sizes, in millimetres; see `PartSizes`."""
+
+    pin: float
+    thickness: float
+    hole: float
+    wall: float
+    clearance: float
+    washer: float
+
+    @property
+    def boss(self) -> float:
+        """Radius of a link around a hole."""
+        return self.hole / 2.0 + self.wall
+
+    @property
+    def spacer(self) -> float:
+        """Radius of washers and spacers."""
+        return (self.hole + self.wall) / 2.0
+
+    @property
+    def pitch(self) -> float:
+        """From one layer to the next."""
+        return self.thickness + self.washer
+
+
+class Pin(NamedTuple):
+    """A pin: the links it goes through, the one that holds it, its place there, and what it is."""
+
+    links: tuple[int, ...]
+    link: int
+    at: complex
+    kind: str  #: "pin", "shaft" of a motor, or "guide" in a slot
+    name: str
+
+    @property
+    def title(self) -> str:
+        """Its kind and its joints."""
+        return f"{self.kind} {self.name}"
+
+
+class PartsPlan(NamedTuple):
+    """Outlines and holes of every link, and pins; millimetres, in the frames of the links."""
+
+    outlines: tuple[Rounded, ...]
+    holes: tuple[tuple[Rounded, ...], ...]
+    pins: tuple[Pin, ...]
+    sizes: Sizes
+
+
+#: Where ``at_b`` travels along the line of a joint, by its pair, millimetres.
+Travel = Mapping[tuple[int, int], tuple[float, float]]
+
+
+def plan(mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel) -> PartsPlan:
+    """Return outlines, holes and pins of a mechanism with revolute and prismatic joints and pins in slots."""
+    for joint in mechanism.joints:
+        if not isinstance(joint, Revolute | Prismatic | PinSlot):
+            raise GeometryError(
+                f"joint {joint.a}-{joint.b} is a {joint.kind}; parts are made for revolute and prismatic "
+                "joints and pins in slots"
+            )
+    meeting = _meeting(mechanism, unit)
+    traced = [(link, complex(*at) * unit) for link, at in mechanism.points.values() if link != mechanism.frame]
+    sizes = given.filled(*_ways(mechanism, meeting, traced, unit))
+    links = range(mechanism.graph.links)
+    places: list[list[complex]] = [[] for _ in links]
+    holes: list[list[tuple[Rounded, str]]] = [[] for _ in links]
+    pins = []
+    for places_of, name in meeting:
+        driver = next((d for d in mechanism.drivers if {d.base, d.link} <= set(places_of)), None)
+        shaft = (
+            driver is not None
+            and mechanism.joint(*driver.pair).kind == "R"
+            and _on(mechanism, driver.pair, places_of, unit)
+        )
+        holder = (
+            driver.link if shaft and driver else mechanism.frame if mechanism.frame in places_of else min(places_of)
+        )
+        pins.append(Pin(tuple(sorted(places_of)), holder, places_of[holder], "shaft" if shaft else "pin", name))
+        for link, at in places_of.items():
+            places[link].append(at)
+            holes[link].append((Rounded((at,), (sizes.pin if link == holder else sizes.hole) / 2.0), name))
+    for joint in mechanism.joints:
+        if not isinstance(joint, Prismatic | PinSlot):
+            continue
+        name, reach = f"{joint.a}-{joint.b}", 0.0
+        A, B = complex(*joint.at_a) * unit, complex(*joint.at_b) * unit
+        along, guides = cmath.exp(1j * joint.angle_a), [B]
+        if isinstance(joint, Prismatic):
+            reach = 2.0 * sizes.boss
+            way = cmath.exp(1j * joint.angle_b) * reach
+            guides = [B - way, B + way]
+        for at in guides:
+            pins.append(Pin(tuple(sorted((joint.a, joint.b))), joint.b, at, "guide", name))
+            holes[joint.b].append((Rounded((at,), sizes.pin / 2.0), name))
+        low, high = travel[joint.pair]
+        reach += sizes.clearance
+        ends = [A + along * (low - reach), A + along * (high + reach)]
+        places[joint.a] += ends
+        places[joint.b] += guides
+        holes[joint.a].append((Rounded.around(ends, sizes.hole / 2.0), name))
+    for link, at in traced:
+        if all(abs(at - own) > _SAME * abs(at) for own in places[link]):
+            places[link].append(at)
+            holes[link].append((Rounded((at,), sizes.pin / 2.0), "point"))
+    _check_holes(holes, sizes)
+    radius = [sizes.boss * (_BOARD if link == mechanism.frame else 1.0) for link in links]
+    outlines = tuple(Rounded.around(own, r) for own, r in zip(places, radius))
+    return PartsPlan(outlines, tuple(tuple(hole for hole, _ in own) for own in holes), tuple(pins), sizes)
+
+
+def _meeting(mechanism: Mechanism, unit: float) -> list[tuple[dict[int, complex], str]]:
+    """Return the points where links meet in revolute joints: place on every link, and the names of the joints."""
+    groups: list[tuple[dict[int, complex], list[str]]] = []
+    for joint in mechanism.joints:
+        if not isinstance(joint, Revolute):
+            continue
+        ends = {joint.a: complex(*joint.at_a) * unit, joint.b: complex(*joint.at_b) * unit}
+        near = [g for g in groups if any(link in g[0] and _near(g[0][link], at) for link, at in ends.items())]
+        merged, names = ends, [f"{joint.a}-{joint.b}"]
+        for group in near:
+            merged, names = group[0] | merged, group[1] + names
+            groups.remove(group)
+        groups.append((merged, names))
+    return [(places, " ".join(names)) for places, names in groups]
+
+
+def _near(a: complex, b: complex) -> bool:
+    return abs(a - b) <= _SAME * max(abs(a), abs(b))
+
+
+def _on(mechanism: Mechanism, pair: tuple[int, int], places: Mapping[int, complex], unit: float) -> bool:
+    """Whether the joint of two links is at these places."""
+    joint = mechanism.joint(*pair)
+    return _near(places[joint.a], complex(*joint.at_a) * unit)
+
+
+def _ways(
+    mechanism: Mechanism,
+    meeting: Sequence[tuple[dict[int, complex], str]],
+    traced: Sequence[tuple[int, complex]],
+    unit: float,
+) -> tuple[float, float]:
+    """Largest and smallest way between two points of a link."""
+    points = [(link, at) for places, _ in meeting for link, at in places.items()] + list(traced)
+    ways = [abs(p - q) for (a, p), (b, q) in combinations(points, 2) if a == b and not _near(p, q)]
+    if not ways:
+        raise GeometryError("no link has two points, so there is no size to go by; give a mechanism with links")
+    return max(ways), min(ways)
+
+
+def _check_holes(holes: Sequence[Sequence[tuple[Rounded, str]]], sizes: Sizes) -> None:
+    """Refuse holes of a link that leave too little between them: washers must not touch, nor slots cut other holes."""
+    from graphsynth.design.parts.gaps import apart
+
+    for link, own in enumerate(holes):
+        for (one, name), (other, second) in combinations(own, 2):
+            slot = len(one.hull) > 1 or len(other.hull) > 1
+            need = sizes.wall / 2.0 + one.radius + other.radius if slot else 2.0 * sizes.spacer
+            found = apart(one.hull, other.hull)
+            if found < need * (1.0 - _SAME):
+                raise GeometryError(
+                    f"holes of joints {name} and {second} in link {link} are {found:.3g} mm apart, and need {need:.3g}"
+                    "; make the pin or the wall smaller, or the unit larger"
+                )
+
+
+def _two_digits(value: float, digits: int = 2) -> float:
+    return float(f"{value:.{digits}g}") if math.isfinite(value) else value

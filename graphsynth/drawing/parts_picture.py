@@ -1,0 +1,102 @@
+"""Parts of a mechanism: put together, seen from above, and drawn apart layer by layer."""
+
+from __future__ import annotations
+
+from pathlib import Path as File
+
+import numpy as np
+
+from graphsynth.design.parts.outline import Rounded
+from graphsynth.design.parts.result import Parts
+from graphsynth.drawing.export import beside, save
+from graphsynth.drawing.methods import Drawing
+from graphsynth.drawing.shapes import Path, Placement, Point, Style, placement
+from graphsynth.drawing.sketch import Sketch
+
+#: Colours of layers, from below.
+_COLOURS = ("fill", "a", "c", "d", "b", "soft")
+#: Arcs become chords at most this part of the picture from them.
+_FINE = 2e-4
+#: The apart view is seen from this height: y and z on the page.
+_FORESHORTENED, _SPREAD = 0.42, 0.34
+
+
+def draw_parts(parts: Parts, path: str | File | None = None, *, width: float = 420.0) -> Drawing:
+    """Work of `Parts.draw`: both views beside each other, at the first pose of the motion."""
+    sketches = [_together(parts, width), _apart(parts, width)]
+    drawing = Drawing(
+        beside([sketch.svg() for sketch in sketches], sketches), lambda file: save(file, sketches, [None, None])
+    )
+    if path is not None:
+        drawing.save(path)
+    return drawing
+
+
+def _pose(parts: Parts) -> Placement:
+    first = parts.motion.poses[int(np.argmax(parts.motion.assembled))]
+    return placement((first * [parts.unit, parts.unit, 1.0]).tolist())
+
+
+def _order(parts: Parts) -> list[int]:
+    return sorted(range(len(parts.layers)), key=lambda link: parts.layers[link])
+
+
+def colour(layer: int) -> str:
+    """Colour of a layer."""
+    return _COLOURS[0] if layer == 0 else _COLOURS[1 + (layer - 1) % (len(_COLOURS) - 1)]
+
+
+def _loops(parts: Parts, link: int, place: Placement) -> list[list[Point]]:
+    """Outline counter-clockwise and holes clockwise, in the fixed frame."""
+    fine = _FINE * max(abs(b - a) for a, b in (shape.box for shape in parts.plan.outlines))
+
+    def loop(shape: Rounded) -> list[Point]:
+        return [place(link, z) for z in shape.flat(fine)]
+
+    return [loop(parts.plan.outlines[link]), *(loop(hole)[::-1] for hole in parts.plan.holes[link])]
+
+
+def _together(parts: Parts, width: float) -> Sketch:
+    place = _pose(parts)
+    loops = {link: _loops(parts, link, place) for link in _order(parts)}
+    sketch = _box([z for own in loops.values() for z in own[0]], width, "Parts put together")
+    for link, own in loops.items():
+        layer = parts.layers[link]
+        style = Style("link", 1.2, colour(layer), fill_opacity=1.0 if layer == 0 else 0.75)
+        sketch.shapes.append(Path(tuple(map(tuple, own)), style, closed=True, layer="bar", part=f"link-{link}"))
+    return sketch
+
+
+def _apart(parts: Parts, width: float) -> Sketch:
+    place = _pose(parts)
+    flat = {link: _loops(parts, link, place) for link in _order(parts)}
+    everything = [z for own in flat.values() for z in own[0]]
+    high = max(z.imag for z in everything) - min(z.imag for z in everything)
+    wide = max(z.real for z in everything) - min(z.real for z in everything)
+    step = _SPREAD * (high * _FORESHORTENED + 0.35 * wide)
+
+    def seen(z: Point, height: float) -> Point:
+        return complex(z.real + 0.25 * z.imag, _FORESHORTENED * z.imag + step * height)
+
+    lifted = {link: [[seen(z, parts.layers[link]) for z in loop] for loop in own] for link, own in flat.items()}
+    sketch = _box([z for own in lifted.values() for z in own[0]], width, "Parts drawn apart, layer by layer")
+    for layer in range(parts.count + 1):
+        for k, pin in enumerate(parts.plan.pins):  # axes behind the sheets of this layer
+            low, top = parts.span(k)
+            if low < layer <= top:
+                at = place(pin.link, pin.at)
+                line = (seen(at, layer - 1), seen(at, layer))
+                sketch.shapes.append(Path((line,), Style("ink", 1.0, dash=(4.0, 3.0)), layer="bar", part=f"pin-{k}"))
+        for link, own in lifted.items():
+            if parts.layers[link] == layer:
+                style = Style("link", 1.2, colour(layer))
+                sketch.shapes.append(Path(tuple(map(tuple, own)), style, closed=True, layer="bar", part=f"link-{link}"))
+    for link, own in lifted.items():
+        rightmost = max(own[0], key=lambda z: z.real)
+        sketch.label(rightmost, str(link), 11 + 0j, size=13.0)
+    return sketch
+
+
+def _box(points: list[Point], width: float, title: str) -> Sketch:
+    x, y = [z.real for z in points], [z.imag for z in points]
+    return Sketch(complex(min(x), min(y)), complex(max(x), max(y)), width, title=title)
