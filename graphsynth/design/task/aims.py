@@ -157,7 +157,7 @@ class Measure:
     def along(self, u: Unknowns) -> Complex:
         """Direction of the guide (sets, 1)."""
         number = self.model.angles[self.guide - 2 * len(self.model.free)]
-        return np.exp(1j * u.numbers[:, number : number + 1])
+        return np.asarray(np.exp(1j * u.numbers[:, number : number + 1]))
 
     def values(self, frames: Array, u: Unknowns) -> Array:
         """Values (sets, n): angles in (-pi, pi]."""
@@ -294,7 +294,7 @@ class RatioAim(Aim):
 
     def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
         """Just before and after both dead centres (sets, 4)."""
-        return self.own(u, 0) + np.array([-_NEAR, _NEAR, self.slow - _NEAR, self.slow + _NEAR])
+        return np.asarray(self.own(u, 0)) + np.array([-_NEAR, _NEAR, self.slow - _NEAR, self.slow + _NEAR])
 
     def begin(self, times: Array, moved: Moved, random: np.random.Generator) -> Array:
         """Begin at a dead centre, the largest or the smallest value."""

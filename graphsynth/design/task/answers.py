@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.shown import Shown
+from graphsynth.design.task.aims import TimedAim
 from graphsynth.design.task.plans import Plan
 from graphsynth.design.task.problem import TaskProblem
 from graphsynth.design.task.targets import DwellTarget, FunctionTarget, PathTarget, PosesTarget, SwingTarget, Target
@@ -70,7 +71,7 @@ def built(problem: TaskProblem, x: Array) -> tuple[Mechanism, tuple[float, ...]]
         Linear(float(model.sense), own[driven][1] - own[base][1]) if turns else Linear(model.sense * float(u.stroke[0]))
     )
     pose = tuple((z.real, z.imag, angle) for z, angle in own)
-    starts = tuple(float(x[aim.start]) for aim in problem.aims if getattr(aim, "start", -1) >= 0)
+    starts = tuple(float(x[aim.start]) for aim in problem.aims if isinstance(aim, TimedAim) and aim.start >= 0)
     return Mechanism(design.graph, design.joints(world, own), (Driver(base, driven, law),), points, pose), starts
 
 
@@ -211,7 +212,8 @@ def _bounds(task: DesignTask, motion: Motion, places: Array) -> dict[str, bool]:
             min(lengths) < task.lengths[0] * (1 - _SLACK) or max(lengths) > task.lengths[1] * (1 + _SLACK)
         )
     if task.linear and task.stroke is not None:
-        stroke = abs(mechanism.drivers[0].law.rate)  # type: ignore[union-attr]
+        law = mechanism.drivers[0].law
+        stroke = abs(law.rate) if isinstance(law, Linear) else math.nan
         broken["the stroke is out of its bounds"] = not (
             task.stroke[0] * (1 - _SLACK) <= stroke <= task.stroke[1] * (1 + _SLACK)
         )
@@ -239,7 +241,9 @@ def signature(answer: DesignedMechanism) -> Array:
 # --- errors of targets, from the new motion
 
 
-def _errors(task: DesignTask, motion: Motion, carriers: Mapping[str, int], starts: tuple[float, ...]) -> tuple[float, ...]:
+def _errors(
+    task: DesignTask, motion: Motion, carriers: Mapping[str, int], starts: tuple[float, ...]
+) -> tuple[float, ...]:
     """Errors of all targets, in their order."""
     left, found = iter(starts), []
     for target in task.targets:

@@ -31,7 +31,9 @@ class Descended(NamedTuple):
     times: list[Array]
 
 
-def descend(problem: TaskProblem, X: Array, strict: float, iterations: int, times: list[Array] | None = None) -> Descended:
+def descend(
+    problem: TaskProblem, X: Array, strict: float, iterations: int, times: list[Array] | None = None
+) -> Descended:
     """Take candidates towards their optima, with one weight of the bounds."""
     X, model = X.copy(), problem.model
     (error, r, J), times = problem.linearise(X, times, strict)

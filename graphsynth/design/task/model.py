@@ -30,6 +30,10 @@ _SAMPLES, _CLOSED = 60, 1e-6
 _REST, _SLOW = np.array([0.0, 0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.1])
 
 
+#: Three joints, each on a link, with the angle in the middle.
+Corner = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
+
+
 class Unknowns(NamedTuple):
     """Unknowns of candidates (sets, ...), read from their vectors.
 
@@ -190,7 +194,7 @@ class Model:
         return Moved(self.inputs, frames, rates, complete, period)
 
 
-def _corners(base: Mechanism, plan: Plan, groups: list[set[int]]) -> list[tuple[tuple[int, int], ...]]:
+def _corners(base: Mechanism, plan: Plan, groups: list[set[int]]) -> list[Corner]:
     """Return three joints, each with a link, between which motion is transmitted: of dyads, of a cylinder's lever."""
     found = [((A, p), (B, p), (C, q)) for p, q, A, B, C in revolute_dyads(base)]
     if plan.pins is None:

@@ -180,7 +180,9 @@ def design(
 class _Run:
     """One call: candidates found, those judged, reasons counted."""
 
-    def __init__(self, task: DesignTask, seed: int, count: int, begin: float, seconds: float, starts: Starts | None) -> None:
+    def __init__(
+        self, task: DesignTask, seed: int, count: int, begin: float, seconds: float, starts: Starts | None
+    ) -> None:
         self.task, self.seed, self.count, self.begin, self.starts = (
             task,
             whole("seed", seed, 0, 2**63),
@@ -200,7 +202,7 @@ class _Run:
         for links in self.task.links:
             every = list(plans(self.task, links))
             random = np.random.default_rng([self.seed, links])
-            random.shuffle(every)  # type: ignore[arg-type]
+            random.shuffle(every)
             for wave in range(_WAVES[links] if every else 0):
                 fits = True
                 self._wave(self._chosen(every, wave), executor, progress)

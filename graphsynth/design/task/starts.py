@@ -59,7 +59,9 @@ def random_starts(model: Model, count: int, random: np.random.Generator) -> Unkn
     return Unknowns(*model.tied(places, numbers), points, np.zeros((count, model.stroke_at - model.own_at)), stroke)
 
 
-def placed_starts(problem: TaskProblem, u: Unknowns, keep: int, random: np.random.Generator) -> tuple[Array, list[Array]]:
+def placed_starts(
+    problem: TaskProblem, u: Unknowns, keep: int, random: np.random.Generator
+) -> tuple[Array, list[Array]]:
     """Place candidates where they suit the first path or poses best; return the best as vectors, and times."""
     model = problem.model
     moved = model.move(u)

@@ -169,7 +169,7 @@ class PathTarget(TimedTarget):
         return cls._drawn(evenly(curve, whole("count", count, 2, MOST), closed and bool(ends)), more)
 
     @classmethod
-    def _drawn(cls, z: NDArray[np.complex128], more: dict[str, Any]) -> Self:
+    def _drawn(cls, z: NDArray[Any], more: dict[str, Any]) -> Self:
         ends = more.get("inputs")
         if ends is not None and len(ends) == 2:  # of both ends
             start, end = angles("inputs", list(ends)).tolist()

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.design.task.model import Model, Moved, Rows, Unknowns
+from graphsynth.design.task.model import Corner, Model, Moved, Rows, Unknowns
 
 Array = NDArray[np.float64]
 #: How much of a bound is asked beyond, and the violation that counts like a tolerance.
@@ -25,7 +25,7 @@ def sampled_wishes(model: Model, moved: Moved, u: Unknowns, strict: float) -> li
     return found
 
 
-def _transmission(model: Model, moved: Moved, u: Unknowns, corner: tuple[tuple[int, int], ...], weight: float) -> Rows:
+def _transmission(model: Model, moved: Moved, u: Unknowns, corner: Corner, weight: float) -> Rows:
     """Return what the sine of the angle at the middle of three joints (joint, link) lacks where it is least."""
     arms, at, motions = [], [], moved.frames.view(np.complex128)  # places and directions
     for joint, link in corner:

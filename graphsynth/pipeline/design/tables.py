@@ -213,8 +213,8 @@ class DesignTable:
         from graphsynth.design.task.task import DesignTask
 
         turn = 1.0 if self.drive in ("cylinder", "slide") else DEGREE
-        targets = [table.target(turn) for table in (*self.paths, *self.poses, *self.functions)]
-        targets += [table.target(turn) for table in (*self.dwells, *self.swings)]
+        tables: tuple[Any, ...] = (*self.paths, *self.poses, *self.functions, *self.dwells, *self.swings)
+        targets: list[Target] = [table.target(turn) for table in tables]
         own = ("drive", "span", "stroke", "links", "sliders", "pivots", "pivot_region", "box", "lengths", "crank")
         more: dict[str, Any] = {name: getattr(self, name) for name in (*own, "length_ratio", "transmission")}
         return DesignTask(targets=targets, **more)
