@@ -294,7 +294,7 @@ class RatioAim(Aim):
 
     def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
         """Just before and after both dead centres (sets, 4)."""
-        return np.asarray(self.own(u, 0)) + np.array([-_NEAR, _NEAR, self.slow - _NEAR, self.slow + _NEAR])
+        return np.asarray(self.own(u, 0) + np.array([-_NEAR, _NEAR, self.slow - _NEAR, self.slow + _NEAR]))
 
     def begin(self, times: Array, moved: Moved, random: np.random.Generator) -> Array:
         """Begin at a dead centre, the largest or the smallest value."""

@@ -38,13 +38,27 @@ _SAMPLES, _SLACK, _RESIDUAL = 720, 1e-6, 1e-9
 _PROVED, _BOXES = 181, 20_000
 
 
+class Origin(NamedTuple):
+    """What a model of candidates is made of: a plan, the number of its first piece, the mechanism it began with."""
+
+    plan: Plan
+    number: int
+    given: Mechanism | None
+
+
 class Candidate(NamedTuple):
-    """What a search found: its error in tolerances, the plan, the mechanism, starts of targets with their own."""
+    """What a search found: its error in tolerances, vector and mechanism; starts of targets with their own."""
 
     error: float
-    plan: Plan
+    origin: Origin
+    x: Array
     mechanism: Mechanism
     starts: tuple[float, ...]
+
+    @property
+    def plan(self) -> Plan:
+        """Its chain."""
+        return self.origin.plan
 
 
 def built(problem: TaskProblem, x: Array) -> tuple[Mechanism, tuple[float, ...]]:

@@ -85,27 +85,34 @@ class Rows(NamedTuple):
 
 
 class Model:
-    """Candidates of a plan for one sense of the drive and one choice of assembly modes."""
+    """Candidates of a plan for one sense of the drive and one choice of assembly modes.
 
-    def __init__(self, task: DesignTask, plan: Plan, sense: int, random: np.random.Generator) -> None:
-        self.task, self.plan, self.sense = task, plan, sense
+    Both are drawn, the sense unless it is not 0, the modes unless a candidate is ``given``, whose modes are taken.
+    """
+
+    def __init__(
+        self, task: DesignTask, plan: Plan, random: np.random.Generator, given: Unknowns | None = None, sense: int = 0
+    ) -> None:
+        self.task, self.plan = task, plan
+        self.sense = sense or int(random.choice([-1, 1]))
         design = plan.design
         self.joints, self.links = len(design.kinds), design.graph.links
         self.names = list(task.names)
-        self.sketch = layout(design.graph).positions + random.normal(0.0, 0.12, (self.joints, 2))
         self.given = np.array([k for k, _ in plan.given], dtype=np.intp)
         tied = [] if plan.pins is None else [plan.pins[0]]
         self.free = np.setdiff1d(np.arange(self.joints), [*self.given, *tied])
         self.angles = [c for c, (k, _) in enumerate(design.numbers) if k not in tied]
-        places, numbers = self.tied(self.sketch[None], random.uniform(0.0, math.pi, (1, len(design.numbers))))
+        self.sketch = layout(design.graph).positions + random.normal(0.0, 0.12, (self.joints, 2))
+        angles = random.uniform(0.0, math.pi, (1, len(design.numbers)))
+        places, numbers = self.tied(self.sketch[None], angles) if given is None else (given.places, given.numbers)
         base = design.mechanism(places[0], numbers[0])
-        driver = Driver(*design.drivers[0], Linear(float(sense)))
+        driver = Driver(*design.drivers[0], Linear(float(self.sense)))
         self.base = Mechanism(base.graph, base.joints, (driver,), pose=base.pose)
         rest = simulate(self.base, [0.0], events=False)
         self.regular = bool(rest.assembled[0])
-        self.iterative = any(step.iterative for step in rest.steps)
         own = [s.group for s in rest.steps if s.group >= 0 and s.has_two_modes and rest.modes[0, s.group] != 0]
-        self.modes = {group: int(sign) for group, sign in zip(own, random.choice([-1, 1], len(own)))}
+        signs = random.choice([-1, 1], len(own)) if given is None else rest.modes[0, own]
+        self.modes = {group: int(sign) for group, sign in zip(own, signs)}
         self.corners = _corners(self.base, plan, [set(step.links) for step in rest.steps])
         # the vector of unknowns: places, directions, points, what targets add, stroke
         self.points_at = 2 * len(self.free) + len(self.angles)

@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, permutations, product
 
-import numpy as np
-
 from graphsynth.design.task.targets import Point
 from graphsynth.design.task.task import DesignTask
 from graphsynth.kinematics.dimensional.design import Design, choices
@@ -42,10 +40,20 @@ def plans(task: DesignTask, links: int) -> Iterator[Plan]:
 
     for chain in enumerate_chains(links):
         for graph, driver in _driven(task, chain):
-            for design, pins in _kinds(task, graph, driver):
-                for carriers in _carriers(task, design):
-                    for given in _given(task, design):
-                        yield Plan(design, carriers, given, pins)
+            for design in _kinds(task, graph, driver):
+                yield from fitting(task, design)
+
+
+def fitting(task: DesignTask, design: Design) -> Iterator[Plan]:
+    """Yield the plans of a design: carriers of names and given pivots in every way."""
+    pins = None
+    if task.drive == "cylinder":
+        (own,) = design.driver_joints
+        first, second = (next(k for k in design.joints_of(link) if k != own) for link in design.drivers[0])
+        pins = own, first, second
+    for carriers in _carriers(task, design):
+        for given in _given(task, design):
+            yield Plan(design, carriers, given, pins)
 
 
 def _driven(task: DesignTask, chain: MechanismGraph) -> Iterator[tuple[MechanismGraph, tuple[int, int]]]:
@@ -60,24 +68,20 @@ def _driven(task: DesignTask, chain: MechanismGraph) -> Iterator[tuple[Mechanism
                 yield graph, (a, b)
 
 
-def _kinds(
-    task: DesignTask, graph: MechanismGraph, driver: tuple[int, int]
-) -> Iterator[tuple[Design, tuple[int, int, int] | None]]:
-    """Yield designs with all choices of sliders; of a cylinder also its joints."""
+def _kinds(task: DesignTask, graph: MechanismGraph, driver: tuple[int, int]) -> Iterator[Design]:
+    """Yield designs with all choices of sliders; the ends of a cylinder turn."""
     pairs = [(joint.a, joint.b) for joint in graph.joints]
     driven = pairs.index((min(driver), max(driver)))
     others = [k for k in range(len(pairs)) if k != driven]
-    ends = None
     if task.drive == "cylinder":
-        first, second = (next(k for k in others if link in pairs[k]) for link in pairs[driven])
-        ends, others = (driven, first, second), [k for k in others if k not in (first, second)]
+        others = [k for k in others if not {*pairs[k]} & {*driver}]
     for count in range(task.sliders + 1):
         for chosen in combinations(others, count):
             sliding = {*chosen, driven} if task.linear else {*chosen}
             blocks = [sum(link in pairs[k] for k in sliding) for link in range(graph.links)]
             if all(n < graph.degrees[link] for link, n in enumerate(blocks)):  # no link is held by guides alone
                 kinds = tuple("P" if k in sliding else "R" for k in range(len(pairs)))
-                yield Design(graph, (driver,), kinds), ends
+                yield Design(graph, (driver,), kinds)
 
 
 def _carriers(task: DesignTask, design: Design) -> Iterator[tuple[int, ...]]:
@@ -97,10 +101,3 @@ def _given(task: DesignTask, design: Design) -> Iterator[tuple[tuple[int, Point]
     own = [k for k in design.joints_of(design.graph.frame) if design.kinds[k] == "R"]
     for chosen in permutations(own, len(task.pivots)):
         yield tuple(zip(chosen, task.pivots, strict=True))
-
-
-def drawn(task: DesignTask, links: int, count: int, random: np.random.Generator) -> list[Plan]:
-    """Return so many plans with so many links in random order, all if there are no more."""
-    every = list(plans(task, links))
-    order = random.permutation(len(every))[:count]
-    return [every[k] for k in order]

@@ -9,30 +9,37 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import chain, cycle, repeat
 from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graphsynth.core.checks import positive, whole
 from graphsynth.core.errors import GeometryError, GraphsynthError
 from graphsynth.core.ordered import in_order
 from graphsynth.core.shown import Shown
-from graphsynth.design.task.answers import Candidate, DesignedMechanism, built, judged, proved, signature
-from graphsynth.design.task.descend import best, descend
+from graphsynth.design.task.answers import Candidate, DesignedMechanism, Origin, built, judged, proved, signature
+from graphsynth.design.task.descend import Descended, best, descend
 from graphsynth.design.task.impossible import proof
 from graphsynth.design.task.model import Model
-from graphsynth.design.task.plans import Plan, plans
+from graphsynth.design.task.plans import plans
 from graphsynth.design.task.problem import TaskProblem
-from graphsynth.design.task.starts import Starts, own_starts, placed_starts, random_starts
+from graphsynth.design.task.starts import Starts, from_mechanism, placed_starts, planned, random_starts, shaken
 from graphsynth.design.task.task import DesignTask
+
+Array = NDArray[np.float64]
 
 #: First candidates of a piece; kept at each stage, and iterations there: with bounds weak, then strict.
 _FIRST = 600
 _STAGES = ((80, 0.2, 8), (25, 0.2, 15), (6, 3.0, 40))
-#: Pieces of a wave, of which so many go to the best plans so far; waves by the number of links.
-_WAVE, _AGAIN, _WAVES = 8, 4, {4: 4, 6: 8, 8: 16, 10: 16}
+#: Copies of a mechanism to begin with, and by how much they are shaken, over the size: powers of ten.
+_COPIES, _SHAKEN = 100, (-2.5, -0.4)
+#: Pieces of a wave, of which so many go on from the best; waves in each round by the number of links.
+_WAVE, _AGAIN, _WAVES = 8, 4, {4: 2, 6: 4, 8: 6, 10: 6}
 #: Candidates of a piece that are kept; lengths that differ by less, over the size, are near copies.
 _KEPT, _ALIKE = 2, 0.02
 #: Candidates judged after each wave, for each answer asked.
@@ -40,13 +47,13 @@ _JUDGED = 3
 
 
 class Piece(NamedTuple):
-    """A part of the search."""
+    """A part of the search: with random candidates, from a mechanism, or from the best so far of another piece."""
 
     task: DesignTask
-    plan: Plan
-    number: int
     seed: int
-    starts: Starts | None
+    number: int
+    origin: Origin
+    parent: Array | None = None
 
 
 class Progress(NamedTuple):
@@ -128,8 +135,7 @@ def design(
     ----------
     task : DesignTask
     seconds : float
-        Time limit of the search; it ends before where enough answers were found or all waves are done.  The answers are
-        then judged and certified.
+        Time limit of the search; it ends before where enough answers were found.  They are then certified.
     seed : int
         Same task and seed, same answers, for any executor, unless the time limit cuts the search short.
     count : int
@@ -137,7 +143,7 @@ def design(
     executor : concurrent.futures.Executor, optional
         Who does the pieces; this process by default.
     starts : callable, optional
-        Mechanisms to begin with besides random ones: see `graphsynth.design.task.starts.Starts`.
+        Mechanisms to begin with, for example from a `CurveIndex`: see `graphsynth.design.task.starts.Starts`.
     progress : callable, optional
         Told a `Progress` after each piece.
 
@@ -197,48 +203,49 @@ class _Run:
         self.pieces, self.stopped = 0, ""
 
     def search(self, executor: Executor | None, progress: Callable[[Progress], None] | None) -> None:
-        """Go through the numbers of links, the smallest first, until there are enough answers."""
-        fits = False
-        for links in self.task.links:
-            every = list(plans(self.task, links))
-            random = np.random.default_rng([self.seed, links])
-            random.shuffle(every)
-            for wave in range(_WAVES[links] if every else 0):
-                fits = True
-                self._wave(self._chosen(every, wave), executor, progress)
-                if self.stopped or self._enough():
-                    return
-        if not fits:
+        """Go round by the numbers of links, the smallest first, until there are enough answers or no time is left."""
+        every = {links: list(plans(self.task, links)) for links in self.task.links}
+        if not any(every.values()):
             raise GeometryError(
                 f"no chain of {' or '.join(map(str, self.task.links))} links fits the task: too many pivots are given, "
                 "or no link is free to carry a named point; allow more links"
             )
+        for links, own in every.items():
+            np.random.default_rng([self.seed, links]).shuffle(own)
+        given = [Origin(plan, k, mechanism) for k, (plan, mechanism) in enumerate(planned(self.task, self.starts))]
+        for k in range(0, len(given), _WAVE):
+            if self._wave([(origin, None) for origin in given[k : k + _WAVE]], executor, progress):
+                return
+        fresh = {links: cycle(own) for links, own in every.items() if own}
+        for links in chain.from_iterable(repeat([n for n in fresh for _ in range(_WAVES[n])])):
+            again = self._best(_AGAIN)
+            new = [Origin(next(fresh[links]), -1, None) for _ in range(_WAVE - len(again))]
+            if self._wave([*((origin, None) for origin in new), *((c.origin, c.x) for c in again)], executor, progress):
+                return
 
-    def _chosen(self, every: Sequence[Plan], wave: int) -> list[Plan]:
-        """Return the plans of a wave: new ones in turn, and those that came nearest so far."""
-        fresh = _WAVE if wave == 0 else _WAVE - _AGAIN
-        begun = 0 if wave == 0 else _WAVE + (wave - 1) * fresh
-        new = [every[k % len(every)] for k in range(begun, begun + fresh)]
-        if wave == 0:
-            return new
-        order: dict[int, None] = {}
-        of_chain = {id(plan) for plan in every}
-        for candidate in sorted(self.found, key=lambda c: c.error):
-            if id(candidate.plan) in of_chain:
-                order.setdefault(id(candidate.plan))
-        by_id = {id(plan): plan for plan in every}
-        good = [by_id[k] for k in order][: _AGAIN // 2] or list(every)
-        return [*new, *(good[k % len(good)] for k in range(_AGAIN))]
+    def _best(self, count: int) -> list[Candidate]:
+        """Return the best candidates so far, of different chains."""
+        found: dict[tuple[str, tuple[int, ...]], Candidate] = {}
+        for candidate in self.found:  # sorted
+            plan = candidate.plan
+            found.setdefault((plan.design.graph.key, plan.carriers), candidate)
+        return list(found.values())[:count]
 
     def _wave(
-        self, chosen: Sequence[Plan], executor: Executor | None, progress: Callable[[Progress], None] | None
-    ) -> None:
-        """Do a piece for every plan, and judge what came of them."""
-        begun = [Piece(self.task, plan, self.pieces + k, self.seed, self.starts) for k, plan in enumerate(chosen)]
+        self,
+        chosen: Sequence[tuple[Origin, Array | None]],
+        executor: Executor | None,
+        progress: Callable[[Progress], None] | None,
+    ) -> bool:
+        """Do a piece for each, judge what came of them, and tell whether that is enough."""
+        begun = []
+        for number, (origin, x) in enumerate(chosen, self.pieces):
+            own = origin if x is not None else origin._replace(number=number)
+            begun.append(Piece(self.task, self.seed, number, own, x))
         results = in_order(executor, worked, begun)
         try:
-            for piece, (found, reasons) in zip(begun, results):
-                self.found += [candidate._replace(plan=piece.plan) for candidate in found]
+            for found, reasons in results:
+                self.found += found
                 self.reasons.update(reasons)
                 self.pieces += 1
                 if progress is not None:
@@ -251,6 +258,7 @@ class _Run:
         finally:
             results.close()
         self._judge()
+        return bool(self.stopped) or sum(answer.accepted for answer in self._ranked()) >= self.count
 
     def _judge(self) -> None:
         """Judge the best candidates that were not judged yet."""
@@ -273,9 +281,6 @@ class _Run:
                 kept.append(answer)
                 marks.append(mark)
         return kept
-
-    def _enough(self) -> bool:
-        return sum(answer.accepted for answer in self._ranked()) >= self.count
 
     def result(self, impossible: str) -> Designs:
         """Rank, certify, and say what was found."""
@@ -311,40 +316,46 @@ class _Run:
 
 def worked(piece: Piece) -> tuple[list[Candidate], dict[str, int]]:
     """Do one piece: begin with many candidates, keep the best, improve them; return the best and what failed."""
-    random = np.random.default_rng([piece.seed, piece.number])
-    sense = int(random.choice([-1, 1]))
+    origin, random = piece.origin, np.random.default_rng([piece.seed, piece.number, 1])
+    of_model = np.random.default_rng([piece.seed, origin.number])
     try:
-        model = Model(piece.task, piece.plan, sense, random)
+        if origin.given is None:
+            model = Model(piece.task, origin.plan, of_model)
+        else:
+            given, sense = from_mechanism(piece.task, origin.plan, origin.given)
+            model = Model(piece.task, origin.plan, of_model, given, sense)
         if not model.regular:
             return [], {"the chain cannot be assembled": 1}
         problem = TaskProblem(model)
-        first = random_starts(model, _FIRST, random)
-        X, times = placed_starts(problem, first, _STAGES[0][0], random)
-        if piece.starts is not None:
-            for own in own_starts(model, piece.starts(piece.task, piece.plan, random)):
-                more, later = placed_starts(problem, own, 1, random)
-                if len(more):
-                    X = np.concatenate([more, X])
-                    times = [np.concatenate([a, b]) for a, b in zip(later, times)]
+        if piece.parent is not None:
+            X, times = _children(problem, piece.parent, random)
+        else:
+            first = random_starts(model, _FIRST, random) if origin.given is None else shaken(given, _COPIES, random)
+            X, times = placed_starts(problem, first, _STAGES[0][0], random)
     except GraphsynthError:
         return [], {"the chain cannot be moved": 1}
-    reasons = {"first candidates: the range is not completed": _FIRST - len(X)} if len(X) < _STAGES[0][0] else {}
-    if not len(X):
-        return [], reasons
-    found = None
+    reasons = {"no candidate completes the range": 1} if not len(X) else {}
+    found = Descended(X, np.zeros(len(X)), times)
     for keep, strict, iterations in _STAGES:
-        if found is not None:
-            found = best(found, keep)
-            X, times = found.X, found.times
-        if not len(X):
-            return [], reasons
-        found = descend(problem, X, strict, iterations, times)
-    assert found is not None
+        found = best(found, keep)
+        if len(found.X):
+            found = descend(problem, found.X, strict, iterations, found.times)
     candidates = []
     for x, error in zip(found.X[:_KEPT], found.error):
-        try:
+        with suppress(GraphsynthError):
             mechanism, starts = built(problem, x)
-        except GraphsynthError:
-            continue
-        candidates.append(Candidate(float(error), piece.plan, mechanism, starts))
+            candidates.append(Candidate(float(error), origin, x, mechanism, starts))
     return candidates, reasons
+
+
+def _children(problem: TaskProblem, parent: Array, random: np.random.Generator) -> tuple[Array, list[Array]]:
+    """Return copies of a candidate, shaken by little and by much, with the times of the candidate."""
+    model = problem.model
+    scale = np.where(np.arange(model.size) < model.own_at, model.task.size, 0.3)
+    amount = 10.0 ** random.uniform(*_SHAKEN, (_COPIES, 1))
+    X = parent + amount * scale * random.normal(0.0, 1.0, (_COPIES, model.size))
+    X[0] = parent
+    if model.task.linear:
+        X[:, model.stroke_at] = parent[model.stroke_at] * np.exp(amount[:, 0] * random.normal(0.0, 1.0, _COPIES))
+    _, times = problem.linearise(parent[None], None, 1.0)
+    return X, [np.repeat(own, _COPIES, axis=0) for own in times]

@@ -7,20 +7,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.design.task.aims import FunctionAim, PointAim
 from graphsynth.design.task.model import Model, Moved, Unknowns
+from graphsynth.design.task.plans import Plan, fitting
 from graphsynth.design.task.problem import TaskProblem
+from graphsynth.design.task.task import DesignTask
+from graphsynth.kinematics.dimensional.design import Design
 from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted
-
-if TYPE_CHECKING:
-    from graphsynth.design.task.plans import Plan
-    from graphsynth.design.task.task import DesignTask
-    from graphsynth.mechanism.model import Mechanism
+from graphsynth.mechanism.joints import Prismatic
+from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -31,11 +32,23 @@ _HELD, _TRIED, _TOGETHER = 30.0, 2, 128
 
 
 class Starts(Protocol):
-    """Where starts come from besides chance: mechanisms with a pose whose named points are those of the task."""
+    """Where a search may begin besides chance: mechanisms with a pose that carry the named points of the task."""
 
-    def __call__(self, task: DesignTask, plan: Plan, random: np.random.Generator) -> Iterable[Mechanism]:
-        """Yield mechanisms of the plan's graph, drivers and kinds of joints; any place and size."""
+    def __call__(self, task: DesignTask) -> Iterable[Mechanism]:
+        """Yield mechanisms in any place and size, the most promising first."""
         ...
+
+
+def planned(task: DesignTask, starts: Starts | None) -> Iterator[tuple[Plan, Mechanism]]:
+    """Yield mechanisms to begin with, each with every plan it fits."""
+    for mechanism in starts(task) if starts is not None else ():
+        kinds = tuple(joint.kind for joint in mechanism.joints)
+        driver = mechanism.drivers[0].pair
+        design = Design(mechanism.graph, (driver,), kinds)
+        named = [mechanism.points[name].link if name in mechanism.points else None for name in task.names]
+        for plan in fitting(task, design):
+            if all(link in (None, carrier) for link, carrier in zip(named, plan.carriers)):
+                yield plan, mechanism
 
 
 def random_starts(model: Model, count: int, random: np.random.Generator) -> Unknowns:
@@ -121,23 +134,42 @@ def _begun(
     return model.write(u._replace(own=own)), times
 
 
-def from_mechanism(model: Model, mechanism: Mechanism) -> Unknowns:
-    """Return one candidate with the places that joints and named points have in the pose of a mechanism."""
-    assert mechanism.pose is not None
+def from_mechanism(task: DesignTask, plan: Plan, mechanism: Mechanism) -> tuple[Unknowns, int]:
+    """Return a candidate with the places of joints and named points in the pose of a mechanism, and its sense."""
+    if mechanism.pose is None:
+        raise GeometryError("a mechanism to begin with has no pose; give it one, or simulate it and take a pose")
     frames = [(complex(x, y), complex(math.cos(a), math.sin(a)), a) for x, y, a in mechanism.pose]
 
     def world(link: int, local: tuple[float, float]) -> complex:
         return frames[link][0] + frames[link][1] * complex(*local)
 
     place = np.array([[world(joint.a, joint.at_a) for joint in mechanism.joints]])
-    numbers = [
-        getattr(mechanism.joints[k], "angle_a", 0.0) + frames[mechanism.joints[k].a][2]
-        for k, _ in model.plan.design.numbers
-    ]
-    named = [mechanism.points[name] for name, of_point in model.task.names.items() if of_point]
-    points = np.array([[world(link, at) for link, at in named]], dtype=np.complex128).reshape(1, -1)
-    own = np.zeros((1, model.stroke_at - model.own_at))
-    return Unknowns(_pairs(place), np.array([numbers]).reshape(1, -1), _pairs(points), own, np.ones(1))
+    guides = [mechanism.joints[k] for k, _ in plan.design.numbers]
+    numbers = np.array([[joint.angle_a + frames[joint.a][2] for joint in guides if isinstance(joint, Prismatic)]])
+    points = []
+    for name, carrier in zip(task.names, plan.carriers):
+        if task.names[name]:
+            own = plan.design.joints_of(carrier)
+            at = mechanism.points.get(name)
+            points.append(world(*at) if at is not None else place[0, own].mean())
+    law = mechanism.drivers[0].law
+    rate = float(law(np.zeros(1))[1][0])
+    stroke = abs(rate) if task.linear else 1.0
+    own = sum(target.unknowns for target in task.targets)
+    u = Unknowns(_pairs(place), numbers, _pairs(np.array([points])), np.zeros((1, own)), np.full(1, stroke))
+    return u, 1 if rate > 0.0 else -1
+
+
+def shaken(u: Unknowns, count: int, random: np.random.Generator) -> Unknowns:
+    """Return copies of one candidate, the first as it is, the others more and more shaken."""
+    size = np.ptp(u.places, axis=1).max()
+    amount = (0.15 * np.arange(count) / count)[:, None]
+    parts = []
+    for part, scale in ((u.places, size), (u.numbers, 1.0), (u.points, size), (u.own, 0.0), (u.stroke, 0.0)):
+        wide = np.repeat(part, count, axis=0)
+        noise = scale * random.normal(0.0, 1.0, wide.shape)
+        parts.append(wide + noise * amount.reshape(count, *(1,) * (wide.ndim - 1)))
+    return Unknowns(*parts)
 
 
 def _some(u: Unknowns, at: NDArray[np.intp]) -> Unknowns:
@@ -243,8 +275,3 @@ def _fitted(
     size = np.abs(c[..., 0, 0])  # a curve drawn by a huge or tiny mechanism is no start
     square = np.where((size > 0.02 * wanted.size) & (size < 50.0 * wanted.size), square / n, np.inf)
     return np.sqrt(square), c[..., 0]
-
-
-def own_starts(model: Model, given: Iterable[Mechanism]) -> Iterator[Unknowns]:
-    """Read mechanisms as candidates."""
-    yield from (from_mechanism(model, mechanism) for mechanism in given)

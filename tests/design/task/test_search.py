@@ -72,7 +72,7 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
     every = list(plans(task, links))
     checked = 0
     for plan in (every[k] for k in random.permutation(len(every))[:3]):
-        model = Model(task, plan, 1, random)
+        model = Model(task, plan, random)
         problem = TaskProblem(model)
         X, times = placed_starts(problem, random_starts(model, 300, random), 12, random)
         if not len(X):
