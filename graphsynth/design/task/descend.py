@@ -44,21 +44,22 @@ def descend(
         at = np.flatnonzero(live)
         if not at.size:
             break
-        H = np.einsum("smi,smj->sij", J[at], J[at])
-        g = np.einsum("smi,sm->si", J[at], r[at])
+        own = J[at]
+        turned = own.transpose(0, 2, 1)
+        H, g = turned @ own, turned @ r[at, :, None]
         scale = np.einsum("sii->si", H)
         scale = np.maximum(scale, 1e-9 * scale.max(axis=1, keepdims=True)) + 1e-300
         H += (damping[at, None] * scale)[:, :, None] * np.eye(model.size)
-        step = -np.linalg.solve(H, g[:, :, None])[:, :, 0]
+        step = -np.linalg.solve(H, g)[:, :, 0]
         step /= np.maximum(1.0, np.abs(step / longest).max(axis=1, keepdims=True))
-        (found, q, K), later = problem.linearise(X[at] + step, [own[at] for own in times], strict)
+        (found, q, K), later = problem.linearise(X[at] + step, [part[at] for part in times], strict)
         good = found < error[at]
         gained = error[at] ** 2 - found**2 > _GAIN * error[at] ** 2
         taken = at[good]
         X[taken] += step[good]
         J[taken], r[taken], error[taken] = K[good], q[good], found[good]
-        for own, new in zip(times, later):
-            own[taken] = new[good]
+        for part, new in zip(times, later):
+            part[taken] = new[good]
         refused[at] = np.where(good & gained, 0, refused[at] + 1)
         damping[at] = np.clip(damping[at] * np.where(good, _BETTER, _WORSE), 1e-12, 1e12)
         live = np.isfinite(error) & (refused < _REFUSED) & (error > NONE)

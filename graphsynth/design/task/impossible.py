@@ -13,7 +13,7 @@ def proof(task: DesignTask) -> str:
 
     >>> from graphsynth.design.task.targets import PathTarget
     >>> proof(DesignTask(targets=[PathTarget.segment((0, 0), (4, 0))], box=(0, 0, 1, 1)))
-    'point (4, 0) of a path lies outside the box'
+    'point (1.02128, 0) of a path lies outside the box'
     """
     for box, name in ((task.box, "box"), (task.pivot_region, "region of the pivots")):
         for p in task.pivots:

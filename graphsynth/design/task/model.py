@@ -16,6 +16,7 @@ from graphsynth.design.task.plans import Plan
 from graphsynth.design.task.task import DesignTask
 from graphsynth.kinematics.dimensional.matching import MovingLink, at_times
 from graphsynth.kinematics.dimensional.sketch import layout
+from graphsynth.kinematics.dimensional.verify import group_forms, transmission_sines
 from graphsynth.kinematics.engine.batch import simulate_batch
 from graphsynth.kinematics.engine.gradients import revolute_dyads
 from graphsynth.kinematics.simulation import simulate
@@ -113,6 +114,7 @@ class Model:
         own = [s.group for s in rest.steps if s.group >= 0 and s.has_two_modes and rest.modes[0, s.group] != 0]
         signs = random.choice([-1, 1], len(own)) if given is None else rest.modes[0, own]
         self.modes = {group: int(sign) for group, sign in zip(own, signs)}
+        self.forms = [form for form in group_forms(self.base, rest.steps) if form.bars]
         self.corners = _corners(self.base, plan, [set(step.links) for step in rest.steps])
         # the vector of unknowns: places, directions, points, what targets add, stroke
         self.points_at = 2 * len(self.free) + len(self.angles)
@@ -199,6 +201,21 @@ class Model:
         complete &= np.isfinite(rates).all(axis=(1, 2, 3))
         frames[~complete], rates[~complete] = _REST, _SLOW
         return Moved(self.inputs, frames, rates, complete, period)
+
+    def untransmitted(self, X: Array) -> Array:
+        """Return what groups larger than dyads lack of the transmission angle (sets,), in hundredths of its sine."""
+        least = math.sin(self.task.transmission)
+        if not self.forms or not len(X) or least == 0.0:
+            return np.zeros(len(X))
+        u = self.read(X)
+        table = self.plan.design.dimensions(u.places / u.stroke[:, None, None], u.numbers)
+        frames = self.move(u).frames
+        frames[..., :2] /= u.stroke[:, None, None, None]
+        forms = [form._replace(group=k) for k, form in enumerate(self.forms)]
+        ends = [(joint.a, joint.b) for joint in self.plan.design.graph.joints]
+        margins = np.zeros((*frames.shape[:2], len(forms)))
+        sines = transmission_sines(forms, table, ends, frames, margins).min(axis=(1, 2))
+        return np.asarray(100.0 * np.maximum(least - np.nan_to_num(sines), 0.0))
 
 
 def _corners(base: Mechanism, plan: Plan, groups: list[set[int]]) -> list[Corner]:

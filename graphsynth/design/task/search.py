@@ -42,8 +42,8 @@ _COPIES, _SHAKEN = 100, (-2.5, -0.4)
 _WAVE, _AGAIN, _WAVES = 8, 4, {4: 2, 6: 4, 8: 6, 10: 6}
 #: Candidates of a piece that are kept; lengths that differ by less, over the size, are near copies.
 _KEPT, _ALIKE = 2, 0.02
-#: Candidates judged after each wave, for each answer asked.
-_JUDGED = 3
+#: Candidates judged after each wave, for each answer asked; at once if their error is less, in tolerances.
+_JUDGED, _NEAR = 3, 2.0
 
 
 class Piece(NamedTuple):
@@ -248,17 +248,23 @@ class _Run:
                 self.found += found
                 self.reasons.update(reasons)
                 self.pieces += 1
+                if found and found[0].error < _NEAR:
+                    self._judge()
                 if progress is not None:
                     least = min((c.error for c in self.found), default=math.inf)
                     good = sum(answer.accepted for answer in self.judged.values())
                     progress(Progress(self.pieces, least, good, perf_counter() - self.begin))
                 if perf_counter() > self.deadline:
                     self.stopped = "the time limit was reached"
-                    break
+                if self.stopped or self._enough():
+                    return True
         finally:
             results.close()
         self._judge()
-        return bool(self.stopped) or sum(answer.accepted for answer in self._ranked()) >= self.count
+        return self._enough()
+
+    def _enough(self) -> bool:
+        return sum(answer.accepted for answer in self._ranked()) >= self.count
 
     def _judge(self) -> None:
         """Judge the best candidates that were not judged yet."""
@@ -341,10 +347,11 @@ def worked(piece: Piece) -> tuple[list[Candidate], dict[str, int]]:
         if len(found.X):
             found = descend(problem, found.X, strict, iterations, found.times)
     candidates = []
-    for x, error in zip(found.X[:_KEPT], found.error):
+    error = found.error + model.untransmitted(found.X)
+    for k in np.argsort(error, kind="stable")[:_KEPT]:
         with suppress(GraphsynthError):
-            mechanism, starts = built(problem, x)
-            candidates.append(Candidate(float(error), origin, x, mechanism, starts))
+            mechanism, starts = built(problem, found.X[k])
+            candidates.append(Candidate(float(error[k]), origin, found.X[k], mechanism, starts))
     return candidates, reasons
 
 

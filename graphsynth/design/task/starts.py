@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
+from graphsynth.design.curves.index import CurveIndex
 from graphsynth.design.task.aims import FunctionAim, PointAim
 from graphsynth.design.task.model import Model, Moved, Unknowns
 from graphsynth.design.task.plans import Plan, fitting
 from graphsynth.design.task.problem import TaskProblem
+from graphsynth.design.task.targets import PathTarget
 from graphsynth.design.task.task import DesignTask
 from graphsynth.kinematics.dimensional.design import Design
 from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted
@@ -37,6 +39,28 @@ class Starts(Protocol):
     def __call__(self, task: DesignTask) -> Iterable[Mechanism]:
         """Yield mechanisms in any place and size, the most promising first."""
         ...
+
+
+def index_starts(index: CurveIndex, count: int = 32) -> Starts:
+    """Begin with the mechanisms of an index of curves whose curves are nearest to the first path without times.
+
+    >>> from graphsynth.design.task.targets import SwingTarget
+    >>> index_starts(None)(DesignTask(targets=[SwingTarget(least=1.0)]))
+    []
+    """
+
+    def starts(task: DesignTask) -> list[Mechanism]:
+        path = next((t for t in task.targets if isinstance(t, PathTarget) and t.inputs is None), None)
+        if path is None:
+            return []
+        found = []
+        for match in index.find(_pairs(path.goal), 8 * count, closed=path.closed):
+            if match.links in task.links and match.turns == (task.drive == "rotation"):
+                own = match.mechanism
+                found.append(Mechanism(own.graph, own.joints, own.drivers, {path.point: own.points["P"]}, own.pose))
+        return found[:count]
+
+    return starts
 
 
 def planned(task: DesignTask, starts: Starts | None) -> Iterator[tuple[Plan, Mechanism]]:
