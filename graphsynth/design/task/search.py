@@ -212,7 +212,8 @@ class _Run:
             )
         for links, own in every.items():
             np.random.default_rng([self.seed, links]).shuffle(own)
-        given = [Origin(plan, k, mechanism) for k, (plan, mechanism) in enumerate(planned(self.task, self.starts))]
+        begun = planned(self.task, self.starts, self.deadline - self.begin)
+        given = [Origin(plan, k, mechanism) for k, (plan, mechanism) in enumerate(begun)]
         for k in range(0, len(given), _WAVE):
             if self._wave([(origin, None) for origin in given[k : k + _WAVE]], executor, progress):
                 return

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import GeometryError
 from graphsynth.design.curves.index import CurveIndex
 from graphsynth.design.task.aims import FunctionAim, PointAim
+from graphsynth.design.task.classical import solutions
 from graphsynth.design.task.model import Model, Moved, Unknowns
 from graphsynth.design.task.plans import Plan, fitting
 from graphsynth.design.task.problem import TaskProblem
@@ -63,9 +64,9 @@ def index_starts(index: CurveIndex, count: int = 32) -> Starts:
     return starts
 
 
-def planned(task: DesignTask, starts: Starts | None) -> Iterator[tuple[Plan, Mechanism]]:
-    """Yield mechanisms to begin with, each with every plan it fits."""
-    for mechanism in starts(task) if starts is not None else ():
+def planned(task: DesignTask, starts: Starts | None, seconds: float) -> Iterator[tuple[Plan, Mechanism]]:
+    """Yield mechanisms to begin with, solutions of classical problems first, each with every plan it fits."""
+    for mechanism in (*solutions(task, seconds), *(starts(task) if starts is not None else ())):
         kinds = tuple(joint.kind for joint in mechanism.joints)
         driver = mechanism.drivers[0].pair
         design = Design(mechanism.graph, (driver,), kinds)

@@ -12,14 +12,15 @@ import pytest
 import graphsynth as gs
 from graphsynth.design import (
     DesignedMechanism,
+    DesignTask,
     DwellTarget,
     FunctionTarget,
     PathTarget,
     PosesTarget,
     SwingTarget,
-    DesignTask,
     design,
 )
+from graphsynth.design.task.classical import solutions
 from graphsynth.design.task.model import Model
 from graphsynth.design.task.plans import plans
 from graphsynth.design.task.problem import TaskProblem
@@ -138,6 +139,33 @@ def test_two_targets_at_once_share_one_mechanism() -> None:
     assert found.accepted, found
     lengths = sorted(found[0].mechanism.dimensions[:, :6].max(axis=1))
     assert lengths and max(found[0].errors) < 1e-6
+
+
+@pytest.mark.parametrize("kind", ["poses", "function", "timed path"])
+def test_classical_problems_begin_with_every_solution_of_algebra(kind: str) -> None:
+    """Five positions of a hidden four-bar: it is among the solutions, and the first pieces find it exactly."""
+    motion, at = hidden(), [0, 60, 130, 200, 290]
+    z = motion.point("P").position[at]
+    inputs = np.radians(at).tolist()
+    theta = np.unwrap(motion.poses[:, 3, 2])
+    targets: dict[str, Any] = {
+        "poses": PosesTarget(poses=[(*p, a) for p, a in zip(z.tolist(), motion.poses[at, 2, 2])], tolerance=1e-5),
+        "function": FunctionTarget(
+            inputs=inputs, outputs=np.unwrap(motion.poses[:, 3, 2])[at].tolist(), tolerance=1e-8
+        ),
+        "timed path": PathTarget(points=z.tolist(), inputs=inputs, tolerance=1e-8),
+    }
+    task = DesignTask(targets=[targets[kind]], links=[4], transmission="5 deg", lengths=(0.1, 100), length_ratio=40)
+    lengths = [
+        sorted(
+            math.dist(*((j.at_a if j.a == link else j.at_b) for j in own.joints if link in j.pair)) for link in range(4)
+        )
+        for own in solutions(task, 1.0)
+    ]
+    scale = [4.0 / 1.5, 3.5 / 1.5, 3.0 / 1.5]
+    assert any(np.allclose(np.array(own[1:]) / own[0], sorted(scale), rtol=1e-6) for own in lengths)
+    found = design(task, count=1)
+    assert found.accepted and found.pieces <= len(lengths)
 
 
 def test_a_hidden_cylinder_is_found_from_the_angle_it_gives() -> None:
