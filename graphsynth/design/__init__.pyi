@@ -22,6 +22,7 @@ from .poses.linkages import (
 )
 from .task.answers import DesignedMechanism as DesignedMechanism
 from .task.search import Designs as Designs, design as design
+from .task.starts import index_starts as index_starts
 from .task.targets import (
     DwellTarget as DwellTarget,
     FunctionTarget as FunctionTarget,

@@ -244,12 +244,12 @@ def _lengths(mechanism: Mechanism) -> list[float]:
 
 
 def signature(answer: DesignedMechanism) -> Array:
-    """Lengths and arms in order of size: near copies, renumbered or moved, have nearly the same."""
+    """Return the logarithms of lengths and arms in order: near copies, renumbered or moved, have nearly the same."""
     mechanism, found = answer.mechanism, _lengths(answer.mechanism)
     for point in mechanism.points.values():
         own = [j.at_a if j.a == point.link else j.at_b for j in mechanism.joints if point.link in j.pair]
         found += [math.dist(point.at, p) for p in own]
-    return np.sort(found)
+    return np.log(np.maximum(np.sort(found), 1e-12))
 
 
 # --- errors of targets, from the new motion

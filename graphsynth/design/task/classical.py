@@ -29,7 +29,7 @@ def solutions(task: DesignTask, seconds: float) -> Iterator[Mechanism]:
     >>> from graphsynth.design.task.task import DesignTask
     >>> poses = [(0, 0, 0), (1, 0.5, 0.4), (2, 0.4, 0.7), (3, 0, 0.8), (3.5, -0.5, 0.7)]
     >>> len(list(solutions(DesignTask(targets=[PosesTarget(poses=poses)], links=[4]), 9.0)))
-    1
+    6
     """
     target = task.targets[0]
     if len(task.targets) > 1 or 4 not in task.links or task.drive != "rotation":  # of a four-bar

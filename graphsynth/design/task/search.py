@@ -40,8 +40,8 @@ _STAGES = ((80, 0.2, 8), (25, 0.2, 15), (6, 3.0, 40))
 _COPIES, _SHAKEN = 100, (-2.5, -0.4)
 #: Pieces of a wave, of which so many go on from the best; waves in each round by the number of links.
 _WAVE, _AGAIN, _WAVES = 8, 4, {4: 2, 6: 4, 8: 6, 10: 6}
-#: Candidates of a piece that are kept; lengths that differ by less, over the size, are near copies.
-_KEPT, _ALIKE = 2, 0.02
+#: Candidates of a piece that are kept; mechanisms whose lengths differ by less, all of them, are near copies.
+_KEPT, _ALIKE = 2, 0.1
 #: Candidates judged after each wave, for each answer asked; at once if their error is less, in tolerances.
 _JUDGED, _NEAR = 3, 2.0
 
@@ -281,7 +281,7 @@ class _Run:
         for answer in sorted(self.judged.values(), key=lambda a: (not a.accepted, a.score)):
             mark = signature(answer)
             same = any(
-                other.key == answer.key and len(own) == len(mark) and np.abs(own - mark).max() < _ALIKE * self.task.size
+                other.key == answer.key and len(own) == len(mark) and np.abs(own - mark).max() < _ALIKE
                 for other, own in zip(kept, marks)
             )
             if not same:

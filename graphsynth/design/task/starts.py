@@ -43,8 +43,21 @@ class Starts(Protocol):
 
 
 def index_starts(index: CurveIndex, count: int = 32) -> Starts:
-    """Begin with the mechanisms of an index of curves whose curves are nearest to the first path without times.
+    """Begin a search with the mechanisms of an index whose curves are nearest to the first path without times.
 
+    Parameters
+    ----------
+    index : CurveIndex
+    count : int
+        Mechanisms at most.
+
+    Returns
+    -------
+    Starts
+        For the argument ``starts`` of `graphsynth.design.design`.
+
+    Examples
+    --------
     >>> from graphsynth.design.task.targets import SwingTarget
     >>> index_starts(None)(DesignTask(targets=[SwingTarget(least=1.0)]))
     []

@@ -150,9 +150,7 @@ def test_classical_problems_begin_with_every_solution_of_algebra(kind: str) -> N
     theta = np.unwrap(motion.poses[:, 3, 2])
     targets: dict[str, Any] = {
         "poses": PosesTarget(poses=[(*p, a) for p, a in zip(z.tolist(), motion.poses[at, 2, 2])], tolerance=1e-5),
-        "function": FunctionTarget(
-            inputs=inputs, outputs=np.unwrap(motion.poses[:, 3, 2])[at].tolist(), tolerance=1e-8
-        ),
+        "function": FunctionTarget(inputs=inputs, outputs=theta[at].tolist(), tolerance=1e-8),
         "timed path": PathTarget(points=z.tolist(), inputs=inputs, tolerance=1e-8),
     }
     task = DesignTask(targets=[targets[kind]], links=[4], transmission="5 deg", lengths=(0.1, 100), length_ratio=40)

@@ -1,0 +1,128 @@
+"""Scenes of a task: what the tables make of the file, what the page and the command give, what is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import graphsynth as gs
+from graphsynth.cli import main
+from graphsynth.core.errors import SceneError
+from graphsynth.design import DwellTarget, FunctionTarget, PathTarget, PosesTarget, SwingTarget
+from graphsynth.pipeline.runner import execute
+from graphsynth.pipeline.scene import Scene, load_scene
+from graphsynth.pipeline.summary import sentences
+
+SEGMENT = {"segment": [[0, 0], [4, 0]], "count": 12}
+
+
+def scene(products: tuple[str, ...] = ("records",), **mechanism: Any) -> Scene:
+    own = {"module": "design", "links": [4], "seconds": 20, "answers": 1, **mechanism}
+    return Scene.from_mapping(
+        {"scene": {"name": "own", "title": "Own"}, "mechanism": own, "outputs": {"products": list(products)}}
+    )
+
+
+def test_tables_make_the_targets_of_the_library() -> None:
+    own = scene(
+        paths=[SEGMENT, {"svg": "M0 0 L1 1", "count": 5, "inputs": [0, 90], "own_start": True, "point": "Q"}],
+        poses=[{"points": [[0, 0], [1, 0]], "angles_deg": [0, 30], "tolerance": 0.2}],
+        functions=[{"formula": "x**2", "between": [0, 1], "input_range": 60, "output_range_deg": 30}],
+        dwells=[{"span": 60, "start": 10, "weight": 3}],
+        swings=[{"least_deg": 40, "time_ratio": 1.2, "link": "ram"}],
+        pivots=[[0, 0]],
+        transmission_deg=30,
+    ).mechanism.task()
+    path, drawn, poses, function, dwell, swing = own.targets
+    assert isinstance(path, PathTarget) and path.inputs is None and len(path.points) == 12
+    assert isinstance(drawn, PathTarget) and drawn.point == "Q" and drawn.own_start
+    assert drawn.inputs == pytest.approx(np.radians([0, 22.5, 45, 67.5, 90]))
+    assert isinstance(poses, PosesTarget) and poses.turn[1] == pytest.approx(math.pi / 6)
+    assert isinstance(function, FunctionTarget) and function.outputs[12] == pytest.approx(math.radians(7.5))
+    assert isinstance(dwell, DwellTarget) and dwell.span == pytest.approx(math.pi / 3) and dwell.weight == 3
+    assert isinstance(swing, SwingTarget) and swing.most == math.inf and swing.link == "ram"
+    assert own.transmission == pytest.approx(math.pi / 6) and own.pivots == ((0.0, 0.0),)
+
+
+def test_inputs_of_a_cylinder_are_parts_of_its_stroke() -> None:
+    table = {"inputs": [0, 0.5, 1], "outputs_deg": [0, 20, 50]}
+    own = scene(functions=[table], drive="cylinder", stroke=[0.5, 1]).mechanism.task()
+    assert own.targets[0].inputs == (0.0, 0.5, 1.0) and own.linear  # type: ignore[attr-defined]
+
+
+def test_the_page_shows_every_answer_over_its_target() -> None:
+    report = execute(scene(("records", "tables", "animations", "plots", "mechanisms"), paths=[SEGMENT], answers=2))
+    assert [record.good for record in report["records"]] == [True, True]
+    answers, *_ = report["tables"]
+    assert len(answers.rows) == 2 and answers.rows[0][-2:] == ("certified", "yes")
+    assert all("<animate" in picture.svg for picture in report["animations"])
+    assert "2 mechanisms do the task" in " ".join(finding.text for finding in sentences(report))
+    (plot,) = report["plots"]
+    assert "target" in plot.svg
+    for text in report["mechanisms"].columns["mechanism"]:
+        mechanism = gs.Mechanism.from_json(text)
+        z = gs.simulate(mechanism, np.linspace(0, math.tau, 7201)).point("P").position @ [1.0, 1.0j]
+        for p in np.linspace(0, 4, 12):
+            assert np.abs(z - p).min() < 0.02 + 2e-3
+
+
+def test_the_command_writes_a_file_of_each_mechanism(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = """
+[scene]
+name = "own"
+title = "Own"
+[mechanism]
+module = "design"
+links = [4]
+answers = 1
+[[mechanism.paths]]
+segment = [[0, 0], [4, 0]]
+[outputs]
+products = ["tables"]
+"""
+    (tmp_path / "own.toml").write_text(text, "utf-8")
+    options = ["--out", str(tmp_path / "report"), "--workers", "1", "--seconds", "20", "--json"]
+    assert main(["design", str(tmp_path / "own.toml"), *options]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["accepted"] == 1 and told["answers"][0]["error path"] < 0.01
+    mechanism = gs.Mechanism.from_toml(Path(told["answers"][0]["file"]).read_text("utf-8"))
+    assert mechanism.graph.key == told["answers"][0]["key"]
+    assert (tmp_path / "report" / "report.html").exists()
+    assert main(["design", "lambda"]) == 2 and "use graphsynth run" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "words"),
+    [
+        ({}, "has no target"),
+        ({"paths": [{}]}, "gives no path"),
+        ({"paths": [{**SEGMENT, "svg": "M0 0 L1 1"}]}, "segment and svg"),
+        ({"paths": [{"segment": [[0, 0]]}]}, "two ends"),
+        ({"paths": [SEGMENT], "links": [5]}, "even numbers"),
+        ({"functions": [{"formula": "import os"}]}, "formula"),
+        ({"functions": [{}]}, "either inputs"),
+        ({"poses": [{"points": [[0, 0]], "angles_deg": []}]}, "1 points and 0 angles"),
+        ({"paths": [SEGMENT], "pivot": [0, 0]}, "did you mean 'pivots'"),
+    ],
+)
+def test_mistakes_are_told_with_their_place(mechanism: dict[str, Any], words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        execute(scene(**mechanism))
+
+
+def test_an_impossible_task_gives_a_report_that_says_why() -> None:
+    report = execute(scene(("records", "tables", "animations", "plots"), paths=[SEGMENT], box=[0, -1, 3, 1]))
+    assert report["records"] == () and not report["animations"]
+    assert any("Impossible" in finding.text for finding in sentences(report))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["windscreen_wiper", "excavator_bucket", "walking_leg"])
+def test_shipped_tasks_are_done(name: str) -> None:
+    report = execute(load_scene(name))
+    assert any(record.good for record in report["records"])
