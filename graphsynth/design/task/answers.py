@@ -249,7 +249,7 @@ def signature(answer: DesignedMechanism) -> Array:
     for point in mechanism.points.values():
         own = [j.at_a if j.a == point.link else j.at_b for j in mechanism.joints if point.link in j.pair]
         found += [math.dist(point.at, p) for p in own]
-    return np.log(np.maximum(np.sort(found), 1e-12))
+    return np.asarray(np.log(np.maximum(np.sort(found), 1e-12)))
 
 
 # --- errors of targets, from the new motion

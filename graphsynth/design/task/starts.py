@@ -193,8 +193,8 @@ def from_mechanism(task: DesignTask, plan: Plan, mechanism: Mechanism) -> tuple[
     law = mechanism.drivers[0].law
     rate = float(law(np.zeros(1))[1][0])
     stroke = abs(rate) if task.linear else 1.0
-    own = sum(target.unknowns for target in task.targets)
-    u = Unknowns(_pairs(place), numbers, _pairs(np.array([points])), np.zeros((1, own)), np.full(1, stroke))
+    more = sum(target.unknowns for target in task.targets)
+    u = Unknowns(_pairs(place), numbers, _pairs(np.array([points])), np.zeros((1, more)), np.full(1, stroke))
     return u, 1 if rate > 0.0 else -1
 
 
