@@ -119,7 +119,7 @@ def _filtered(context: Context) -> Iterator[MechanismGraph]:
         found = enumerate_mechanisms(spec_of(context), symmetry=options.symmetry)
     fixed = options.fixed_moving_links
     for graph in found:
-        if (fixed is None or has_threefold_symmetry(graph, fixed)) and (not options.planar or graph.is_planar):
+        if (fixed is None or threefold_symmetry(graph, fixed)) and (not options.planar or graph.is_planar):
             yield graph
 
 
@@ -144,8 +144,10 @@ def assortment_text(graph: MechanismGraph) -> str:
     return " ".join(f"n{joints}={count}" for joints, count in sorted(graph.assortment.items()) if count)
 
 
-def has_threefold_symmetry(graph: MechanismGraph, fixed_moving_links: int) -> bool:
-    """Return whether an automorphism of order 3 fixes the frame and exactly this many moving links (exact).
+def threefold_symmetry(graph: MechanismGraph, fixed_moving_links: int) -> tuple[int, ...]:
+    """Return an automorphism of order 3 that fixes the frame and exactly this many moving links, or nothing (exact).
+
+    It is given by the image of every link.
 
     Depth-first search: link by link, each either stays or starts a three-cycle, and every joint is checked as soon as
     both of its ends are placed. Exact whatever the automorphism group is, which link orbits alone are not: when 9
@@ -153,8 +155,8 @@ def has_threefold_symmetry(graph: MechanismGraph, fixed_moving_links: int) -> bo
 
     >>> from graphsynth.structure.graph import MechanismGraph
     >>> star = MechanismGraph(5, [(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)], frame=0)
-    >>> has_threefold_symmetry(star, 1), has_threefold_symmetry(star, 0)
-    (True, False)
+    >>> threefold_symmetry(star, 1), threefold_symmetry(star, 0)
+    ((0, 2, 3, 1, 4), ())
     """
     mobility = {(j.a, j.b): j.mobility for j in graph.joints} | {(j.b, j.a): j.mobility for j in graph.joints}
     profile = [sorted(m for (a, _), m in mobility.items() if a == link) for link in range(graph.links)]
@@ -180,15 +182,18 @@ def has_threefold_symmetry(graph: MechanismGraph, fixed_moving_links: int) -> bo
     def place(cycle: tuple[int, ...], free: tuple[int, ...], fixed_left: int) -> bool:
         image.update(zip(cycle, (*cycle[1:], cycle[0]), strict=True))
         found = consistent(cycle) and search(free, fixed_left)
-        for link in cycle:
-            del image[link]
+        if not found:
+            for link in cycle:
+                del image[link]
         return found
 
     frame = graph.frame
     if frame is None or (graph.links - 1 - fixed_moving_links) % 3 or fixed_moving_links > graph.links - 4:
-        return False  # no three-cycle left, or the rest does not fall into three-cycles
+        return ()  # no three-cycle left, or the rest does not fall into three-cycles
     image[frame] = frame
-    return search(tuple(link for link in range(graph.links) if link != frame), fixed_moving_links)
+    if not search(tuple(link for link in range(graph.links) if link != frame), fixed_moving_links):
+        return ()
+    return tuple(image[link] for link in range(graph.links))
 
 
 #: Words, whether they are good news, and margins, from the value of an outcome.

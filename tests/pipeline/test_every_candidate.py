@@ -12,9 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from graphsynth.core.errors import SceneError
+from graphsynth.core.errors import GeometryError, SceneError
+from graphsynth.kinematics.dimensional import embody
+from graphsynth.mechanism.joints import PinSlot
 from graphsynth.pipeline.runner import execute, run
 from graphsynth.pipeline.scene import OutputsTable, Scene, find_scene, load_scene
+from graphsynth.pipeline.steps import threefold_symmetry
+from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.system.spec import StructuralSpec
 from graphsynth.synthesis import count_mechanisms
 from graphsynth.systems.platform.others import as_mechanism
@@ -127,3 +131,35 @@ def test_a_wrong_question_is_told(text: str, tmp_path: Path) -> None:
     (tmp_path / "ten.toml").write_text(text, encoding="utf-8")
     with pytest.raises(SceneError, match=r"ten\.toml.*structure.*question"):
         execute(load_scene(tmp_path / "ten.toml"))
+
+
+def test_dimensions_keep_the_symmetry_of_the_graph() -> None:
+    """At the first input a third of a rotation about the one joint that stays carries every joint into its image."""
+    graph = MechanismGraph.from_text(OTHER)
+    image = threefold_symmetry(graph, 2)
+    assert image and all(image[image[image[link]]] == link for link in range(15))
+    found = embody(graph, symmetry=image, tries=2, effort=0.1).mechanism
+    assert found is not None and found.pose is not None
+    places = {}
+    for joint in found.joints:
+        x, y, angle = found.pose[joint.a]
+        places[joint.pair] = complex(x, y) + complex(*joint.at_a) * np.exp(1j * angle)
+    carried = {pair: tuple(sorted(image[link] for link in pair)) for pair in places}
+    (still,) = [pair for pair in places if carried[pair] == pair]
+    turned = [
+        (places[carried[pair]] - places[still]) / (z - places[still]) for pair, z in places.items() if pair != still
+    ]
+    assert np.abs(np.array(turned) - turned[0]).max() < 1e-9
+    assert abs(turned[0] ** 3 - 1.0) < 1e-9 < abs(turned[0] - 1.0)
+    slots = [joint.angle_a + found.pose[joint.a][2] for joint in found.joints if isinstance(joint, PinSlot)]
+    turns = np.exp(2j * np.diff(slots))  # a slot has no sense
+    assert len(slots) == 3 and np.abs(turns - turned[0] ** 2).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("image", "said"),
+    [((0, 1), "image of every link"), ((1, 0, 2, 3), "the frame its own"), ((0, 2, 1, 3), "same mobility")],
+)
+def test_what_is_no_symmetry_is_told(image: tuple[int, ...], said: str) -> None:
+    with pytest.raises(GeometryError, match=said):
+        embody(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0), symmetry=image)

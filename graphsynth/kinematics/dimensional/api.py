@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -269,6 +269,7 @@ def embody(
     *,
     driver: Drivers | None = None,
     joints: Mapping[tuple[int, int], str] | None = None,
+    symmetry: Sequence[int] = (),
     tries: int = 12,
     seconds: float = math.inf,
     effort: float = 1.0,
@@ -289,6 +290,9 @@ def embody(
     joints : mapping of (a, b) to str, optional
         Kind by pair of links of the graph given: "R" (default) or "P"; "gear", "pin-slot" or "cam" for mobility 2, by
         default a gear where a third link carries both wheels, else a pin in a slot.  Teeth as in "gear 2:1".
+    symmetry : sequence of int, optional
+        Image of every link under an automorphism that keeps the frame: at the first input the mechanism is carried into
+        itself by turning it so. Without a target.
     tries : int
         Searches at most; each takes the next frame and driver of the order of
         :func:`graphsynth.kinematics.dimensional.design.choices`, and starts anew from another sketch.
@@ -331,13 +335,29 @@ def embody(
         positive("seconds", seconds)
     positive("effort", effort)
     order = choices(graph, driver)
+    _check_symmetry(graph, symmetry, wanted)
     run = _Run(wanted, seed, begin, seconds, effort)
     for attempt in range(tries):
         inversion, drivers = order[attempt % len(order)]
-        run.start(Design(inversion, drivers, _kinds(graph, inversion, joints)), attempt, attempt // len(order))
+        kinds = _kinds(graph, inversion, joints)
+        run.start(Design(inversion, drivers, kinds, tuple(symmetry)), attempt, attempt // len(order))
         if run.ended:
             break
     return run.result()
+
+
+def _check_symmetry(graph: MechanismGraph, symmetry: Sequence[int], goals: Goals) -> None:
+    """Refuse what is no automorphism that keeps the frame, and targets, which have no symmetry."""
+    if not symmetry:
+        return
+    if goals.target is not None:
+        raise GeometryError("symmetry is given with a target; leave out one of them")
+    if sorted(symmetry) != list(range(graph.links)) or graph.frame is None or symmetry[graph.frame] != graph.frame:
+        raise GeometryError(f"symmetry = {tuple(symmetry)} must be the image of every link, the frame its own")
+    own = {(joint.a, joint.b): joint.mobility for joint in graph.joints}
+    images = {tuple(sorted((symmetry[a], symmetry[b]))): mobility for (a, b), mobility in own.items()}
+    if images != own:
+        raise GeometryError(f"symmetry = {tuple(symmetry)} does not carry joints into joints of the same mobility")
 
 
 class _Run:

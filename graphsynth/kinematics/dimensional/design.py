@@ -54,12 +54,14 @@ def teeth(kind: str) -> tuple[int, int] | None:
 class Design:
     """A mechanism graph with a frame, drivers (base, link) and kinds of joints: all but the numbers.
 
-    A kind is "R", "P", "pin-slot", "cam" (circular) or "gear", in the order of ``graph.joints``.
+    A kind is "R", "P", "pin-slot", "cam" (circular) or "gear", in the order of ``graph.joints``.  ``symmetry``, if any,
+    is the image of every link under an automorphism that keeps the frame: at the first input the mechanism has it too.
     """
 
     graph: MechanismGraph
     drivers: tuple[tuple[int, int], ...]
     kinds: tuple[str, ...]
+    symmetry: tuple[int, ...] = ()
 
     @cached_property
     def numbers(self) -> tuple[tuple[int, str], ...]:
@@ -94,6 +96,50 @@ class Design:
         own = self.joints_of(self.graph.frame)
         first = [k for k in own if k in self.driver_joints]
         return tuple((first + [k for k in own if k not in first])[:2])
+
+    @cached_property
+    def orbits(self) -> list[list[int]]:
+        """Joints that the symmetry carries into each other, each the image of the one before; those fixed come first.
+
+        `GeometryError` where an image is another kind of joint, or its slot or cam is on the other side.
+        """
+        pairs = {(joint.a, joint.b): k for k, joint in enumerate(self.graph.joints)}
+        left, found = dict.fromkeys([*self.fixed, *range(len(pairs))]), []
+        while left and self.symmetry:
+            orbit = [next(iter(left))]
+            while orbit[-1] in left:
+                k = orbit[-1]
+                del left[k]
+                a, b = (self.symmetry[link] for link in self.graph.joints[k][:2])
+                image = pairs.get((min(a, b), max(a, b)), -1)
+                one_sided = self.kinds[k] in ("pin-slot", "cam") and a > b
+                if image < 0 or one_sided or self.kinds[k] != self.kinds[image]:
+                    raise GeometryError(f"joint {self.graph.joints[k][:2]} has no image of its kind; choose its kind")
+                orbit.append(image)
+            found.append(orbit[:-1])
+        return found
+
+    def symmetric(self, places: Array, numbers: Array) -> tuple[Array, Array]:
+        """Return places and numbers in which every orbit follows its first joint, turned about the centre.
+
+        The centre is the first fixed joint if it stays in place, else the middle of the places.
+        """
+        if not self.symmetry:
+            return places, numbers
+        whole = max(map(len, self.orbits))
+        places, numbers = places.copy(), numbers.copy()
+        still = [orbit[0] for orbit in self.orbits if len(orbit) == 1]
+        z = places @ [1.0, 1.0j]
+        centre = z[:, self.fixed[:1]] if self.fixed[0] in still else z.mean(axis=1, keepdims=True)
+        for orbit in self.orbits:
+            turns = np.arange(len(orbit)) * math.tau / whole
+            at = centre + (z[:, orbit[:1]] - centre) * np.exp(1j * turns) if len(orbit) > 1 else centre
+            places[:, orbit] = np.stack([at.real, at.imag], axis=-1)
+            for column, (k, name) in enumerate(self.numbers):
+                if k in orbit:
+                    first = self.numbers.index((orbit[0], name))
+                    numbers[:, column] = numbers[:, first] + (turns[orbit.index(k)] if name == "angle" else 0.0)
+        return places, numbers
 
     @cached_property
     def cranks(self) -> tuple[tuple[int, list[int]], ...]:

@@ -87,13 +87,15 @@ class DimensionProblem:
             self.fit = PathFit(goals.target)
         self.link = target_link(design, goals.target) if goals.target is not None else -1
         self.ends = [(joint.a, joint.b) for joint in design.graph.joints]
-        self.free = np.setdiff1d(np.arange(len(self.ends)), [*design.fixed, *design.centres])
+        images = [k for orbit in design.orbits for k in (orbit[1:] or orbit)]
+        self.free = np.setdiff1d(np.arange(len(self.ends)), [*design.fixed, *design.centres, *images])
         self.extras = 0 if self.fit is None else len(self.fit.ranges)
         self.size = 2 * len(self.free) + len(design.numbers) + self.extras
         if begin is None:
             self.sketch = self._sketch(random)
             angles = random.uniform(0.0, math.pi, len(design.numbers))
-            self.numbers = np.where([name == "angle" for _, name in design.numbers], angles, 0.0)
+            numbers = np.where([name == "angle" for _, name in design.numbers], angles, 0.0)
+            self.numbers = design.symmetric(self.sketch[None], numbers[None])[1][0]
         else:
             self.sketch, self.numbers = begin
         base = design.mechanism(self.sketch, self.numbers)
@@ -132,7 +134,8 @@ class DimensionProblem:
         for joint, own in self.design.cranks:
             for k in own:
                 places[k] = places[joint] + 0.3 * (places[k] - places[joint])
-        return places
+        found, _ = self.design.symmetric(places[None], np.zeros((1, len(self.design.numbers))))
+        return np.asarray(found[0])
 
     # --- from vectors to motions
 
@@ -141,7 +144,7 @@ class DimensionProblem:
         count, numbers = 2 * len(self.free), len(self.design.numbers)
         places = np.repeat(self.sketch[None], len(X), axis=0)
         places[:, self.free] = X[:, :count].reshape(len(X), -1, 2)
-        return places, X[:, count : count + numbers], X[:, count + numbers :]
+        return *self.design.symmetric(places, X[:, count : count + numbers]), X[:, count + numbers :]
 
     def bounds(self) -> Array:
         """Box of the search, shape (size, 2)."""

@@ -31,13 +31,15 @@ def shares(context: Context, records: tuple[Record, ...]) -> tuple[Table, ...]:
     from graphsynth.synthesis import count_mechanisms
 
     every, drawn = count_mechanisms(spec_of(context)), len(records)
-    rows, moving = [], sum(record.status == "assessed" for record in records)
+    rows: list[tuple[object, ...]] = []
+    moving = sum(record.status == "assessed" for record in records)
     told = Counter(_told(record) for record in records)
     if drawn == every:
         rows = [(name, count, f"{100.0 * count / every:.1f} %") for name, count in told.most_common()]
         said = Finding(f"All {every} mechanisms were examined; {moving} move as asked.")
-        columns = ("what became of it", "mechanisms", "share")
-        return (table("What became of the mechanisms", columns, rows, _SEARCHED, said),)
+        return (
+            table("What became of the mechanisms", ("what became of it", "number", "share"), rows, _SEARCHED, said),
+        )
     for name, count in [("moves", moving), *told.most_common()]:
         low, high = binomtest(count, drawn).proportion_ci(_CONFIDENCE, "exact")
         rows.append(

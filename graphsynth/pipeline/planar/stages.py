@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from graphsynth.mechanism.joints import JointGeometry
     from graphsynth.mechanism.laws import Driver
     from graphsynth.mechanism.model import Mechanism
+    from graphsynth.structure.graph import MechanismGraph
     from graphsynth.tolerances.parts import PartTolerance
 
 
@@ -109,7 +110,9 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
     from graphsynth.kinematics.dimensional.api import embody as search
 
     own = table.embody
-    found = search(design.graph, goals_of(own), context.scene.scene.seed, tries=own.tries, effort=own.effort)
+    goals, symmetry = goals_of(own), _symmetry(context, design.graph) if own.symmetric else ()
+    seed = context.scene.scene.seed
+    found = search(design.graph, goals, seed, symmetry=symmetry, tries=own.tries, effort=own.effort)
     if not found.accepted or found.mechanism is None or found.figures is None:
         causes = [why.removeprefix("result: ") for why in found.reasons if why.startswith("result: ")]
         error = found.figures.goal_error if found.figures is not None else math.nan
@@ -122,6 +125,18 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
         margins.insert(0, Quantity("deviation", found.figures.goal_error))
     mechanism = scaled(found.mechanism, (table.crank or 1.0) / _crank(found.mechanism))
     return Built(f"No. {design.number}", mechanism, tuple(margins))
+
+
+def _symmetry(context: Context, graph: MechanismGraph) -> tuple[int, ...]:
+    """Return the automorphism that ``[structure.generate]`` asks for, if any."""
+    from graphsynth.pipeline.steps import threefold_symmetry
+
+    table = context.scene.structure
+    if table is None or table.generate.symmetry is None:
+        return ()
+    fixed = table.generate.fixed_moving_links
+    every = range(graph.links) if fixed is None else (fixed,)
+    return next(filter(None, (threefold_symmetry(graph, count) for count in every)), ())
 
 
 def goals_of(table: EmbodyTable) -> Goals:

@@ -70,6 +70,7 @@ class EmbodyTable:
     max_length_ratio: float = 6.0
     tries: Annotated[int, In(least=1, most=10_000)] = 12
     effort: Annotated[float, In(above=0, most=100)] = 1.0
+    symmetric: bool = False  # the dimensions keep the symmetry of [structure.generate], where it names one
     line: LineTable | None = None
     path: PathTable | None = None
     poses: PosesTable | None = None
