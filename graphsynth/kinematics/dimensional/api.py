@@ -323,19 +323,13 @@ def embody(
     """
     begin = perf_counter()
     wanted = Goals() if goals is None else Goals(target=goals) if isinstance(goals, Target) else goals
-    if not isinstance(graph, MechanismGraph):
-        raise GraphError(f"{graph!r} is not a MechanismGraph")
-    if not isinstance(wanted, Goals):
-        raise GeometryError(f"goals = {wanted!r} are not Goals")
-    if graph.space != 3 or not graph.is_connected:
-        raise GraphError("embodiment needs a connected graph of space 3 (planar mechanisms)")
+    _check(graph, symmetry, wanted)
     whole("seed", seed, 0, 2**128)
     whole("tries", tries, 1)
     if seconds != math.inf:
         positive("seconds", seconds)
     positive("effort", effort)
     order = choices(graph, driver)
-    _check_symmetry(graph, symmetry, wanted)
     run = _Run(wanted, seed, begin, seconds, effort)
     for attempt in range(tries):
         inversion, drivers = order[attempt % len(order)]
@@ -346,8 +340,14 @@ def embody(
     return run.result()
 
 
-def _check_symmetry(graph: MechanismGraph, symmetry: Sequence[int], goals: Goals) -> None:
-    """Refuse what is no automorphism that keeps the frame, and targets, which have no symmetry."""
+def _check(graph: MechanismGraph, symmetry: Sequence[int], goals: Goals) -> None:
+    """Refuse what is no planar mechanism, no automorphism that keeps the frame, and targets with a symmetry."""
+    if not isinstance(graph, MechanismGraph):
+        raise GraphError(f"{graph!r} is not a MechanismGraph")
+    if not isinstance(goals, Goals):
+        raise GeometryError(f"goals = {goals!r} are not Goals")
+    if graph.space != 3 or not graph.is_connected:
+        raise GraphError("embodiment needs a connected graph of space 3 (planar mechanisms)")
     if not symmetry:
         return
     if goals.target is not None:
