@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from graphsynth.core.errors import GeometryError, SceneError
-from graphsynth.kinematics.dimensional import embody
+from graphsynth.kinematics.dimensional import Goals, embody
 from graphsynth.mechanism.joints import PinSlot
 from graphsynth.pipeline.runner import execute, run
 from graphsynth.pipeline.scene import OutputsTable, Scene, find_scene, load_scene
@@ -138,7 +138,7 @@ def test_dimensions_keep_the_symmetry_of_the_graph() -> None:
     graph = MechanismGraph.from_text(OTHER)
     image = threefold_symmetry(graph, 2)
     assert image and all(image[image[image[link]]] == link for link in range(15))
-    found = embody(graph, symmetry=image, tries=2, effort=0.1).mechanism
+    found = embody(graph, Goals(symmetry=image), tries=2, effort=0.1).mechanism
     assert found is not None and found.pose is not None
     places = {}
     for joint in found.joints:
@@ -162,4 +162,4 @@ def test_dimensions_keep_the_symmetry_of_the_graph() -> None:
 )
 def test_what_is_no_symmetry_is_told(image: tuple[int, ...], said: str) -> None:
     with pytest.raises(GeometryError, match=said):
-        embody(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0), symmetry=image)
+        embody(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0), Goals(symmetry=image))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -269,7 +269,6 @@ def embody(
     *,
     driver: Drivers | None = None,
     joints: Mapping[tuple[int, int], str] | None = None,
-    symmetry: Sequence[int] = (),
     tries: int = 12,
     seconds: float = math.inf,
     effort: float = 1.0,
@@ -290,9 +289,6 @@ def embody(
     joints : mapping of (a, b) to str, optional
         Kind by pair of links of the graph given: "R" (default) or "P"; "gear", "pin-slot" or "cam" for mobility 2, by
         default a gear where a third link carries both wheels, else a pin in a slot.  Teeth as in "gear 2:1".
-    symmetry : sequence of int, optional
-        Image of every link under an automorphism that keeps the frame: at the first input the mechanism is carried into
-        itself by turning it so. Without a target.
     tries : int
         Searches at most; each takes the next frame and driver of the order of
         :func:`graphsynth.kinematics.dimensional.design.choices`, and starts anew from another sketch.
@@ -323,7 +319,7 @@ def embody(
     """
     begin = perf_counter()
     wanted = Goals() if goals is None else Goals(target=goals) if isinstance(goals, Target) else goals
-    _check(graph, symmetry, wanted)
+    _check(graph, wanted)
     whole("seed", seed, 0, 2**128)
     whole("tries", tries, 1)
     if seconds != math.inf:
@@ -334,30 +330,28 @@ def embody(
     for attempt in range(tries):
         inversion, drivers = order[attempt % len(order)]
         kinds = _kinds(graph, inversion, joints)
-        run.start(Design(inversion, drivers, kinds, tuple(symmetry)), attempt, attempt // len(order))
+        run.start(Design(inversion, drivers, kinds, wanted.symmetry), attempt, attempt // len(order))
         if run.ended:
             break
     return run.result()
 
 
-def _check(graph: MechanismGraph, symmetry: Sequence[int], goals: Goals) -> None:
-    """Refuse what is no planar mechanism, no automorphism that keeps the frame, and targets with a symmetry."""
+def _check(graph: MechanismGraph, goals: Goals) -> None:
+    """Refuse what is no planar mechanism, and a symmetry that is no automorphism of it."""
     if not isinstance(graph, MechanismGraph):
         raise GraphError(f"{graph!r} is not a MechanismGraph")
     if not isinstance(goals, Goals):
         raise GeometryError(f"goals = {goals!r} are not Goals")
     if graph.space != 3 or not graph.is_connected:
         raise GraphError("embodiment needs a connected graph of space 3 (planar mechanisms)")
-    if not symmetry:
+    image = goals.symmetry
+    if not image:
         return
-    if goals.target is not None:
-        raise GeometryError("symmetry is given with a target; leave out one of them")
-    if sorted(symmetry) != list(range(graph.links)) or graph.frame is None or symmetry[graph.frame] != graph.frame:
-        raise GeometryError(f"symmetry = {tuple(symmetry)} must be the image of every link, the frame its own")
+    if sorted(image) != list(range(graph.links)) or graph.frame is None or image[graph.frame] != graph.frame:
+        raise GeometryError(f"symmetry = {image} must be the image of every link, the frame its own")
     own = {(joint.a, joint.b): joint.mobility for joint in graph.joints}
-    images = {tuple(sorted((symmetry[a], symmetry[b]))): mobility for (a, b), mobility in own.items()}
-    if images != own:
-        raise GeometryError(f"symmetry = {tuple(symmetry)} does not carry joints into joints of the same mobility")
+    if {tuple(sorted((image[a], image[b]))): mobility for (a, b), mobility in own.items()} != own:
+        raise GeometryError(f"symmetry = {image} does not carry joints into joints of the same mobility")
 
 
 class _Run:

@@ -212,6 +212,9 @@ class Goals:
         Longest over shortest distance of two revolute joints on one link, over all links, the frame included; the
         distances of a tracing point from the joints of its link count among the long ones.
     target : LineGoal, PathGoal, PosesGoal or FunctionGoal, optional
+    symmetry : sequence of int, optional
+        Image of every link under an automorphism that keeps the frame: at the first input a rotation carries the
+        mechanism into itself so.  Without a target.
 
     Examples
     --------
@@ -223,9 +226,13 @@ class Goals:
     min_transmission_angle: float = math.radians(25.0)
     max_length_ratio: float = 6.0
     target: Target | None = None
+    symmetry: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         positive("span", self.span)
+        object.__setattr__(self, "symmetry", _listed("symmetry", self.symmetry))
+        if self.symmetry and self.target is not None:
+            raise GeometryError("symmetry is given with a target; leave out one of them")
         if not 0.0 <= finite("min_transmission_angle", self.min_transmission_angle) < 0.5 * math.pi:
             raise GeometryError(
                 f"min_transmission_angle = {self.min_transmission_angle} must lie in [0, pi/2); give radians"

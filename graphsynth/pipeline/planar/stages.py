@@ -110,9 +110,8 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
     from graphsynth.kinematics.dimensional.api import embody as search
 
     own = table.embody
-    goals, symmetry = goals_of(own), _symmetry(context, design.graph) if own.symmetric else ()
-    seed = context.scene.scene.seed
-    found = search(design.graph, goals, seed, symmetry=symmetry, tries=own.tries, effort=own.effort)
+    goals = replace(goals_of(own), symmetry=_symmetry(context, design.graph) if own.symmetric else ())
+    found = search(design.graph, goals, context.scene.scene.seed, tries=own.tries, effort=own.effort)
     if not found.accepted or found.mechanism is None or found.figures is None:
         causes = [why.removeprefix("result: ") for why in found.reasons if why.startswith("result: ")]
         error = found.figures.goal_error if found.figures is not None else math.nan
