@@ -16,6 +16,7 @@ from graphsynth.core.errors import GeometryError
 if TYPE_CHECKING:
     from graphsynth.jamming.bearing.bearing import Condition
     from graphsynth.jamming.joints.certify import TurnCertificate
+    from graphsynth.jamming.joints.drawing import Tolerances
     from graphsynth.jamming.joints.limits import Misalignment
     from graphsynth.jamming.joints.program import Bearings
     from graphsynth.jamming.joints.scale import DirectionMap, ScaleCertificate, SensitivityTable
@@ -63,6 +64,7 @@ def certified_arcs(
     *,
     model: Model = "small",
     condition: Condition = "A",
+    tolerances: Tolerances = 0.0,
     resolution: float = 1e-3,
     seconds: float = 60.0,
 ) -> TurnCertificate:
@@ -75,6 +77,8 @@ def certified_arcs(
         and the misalignment of the first driver's axis.
     model : {"small", "exact"}
         Proofs in the small-tilt model with bounds of what it neglects, or with every loop closed in space.
+    tolerances : float or iterable of PartTolerance
+        As for `graphsynth.jamming.joints.certify_coupled`; what is proved holds for all members.
     resolution : float
         Width, over the range, below which a piece of the input is left undecided.
     seconds : float
@@ -97,8 +101,8 @@ def certified_arcs(
     >>> arcs.arcs(1)[0][1] < edge < arcs.arcs(-1)[0][0]
     True
     """
-    motion, limits, axes = asked(motion, tilts, bearings)
-    options: Any = {"condition": condition, "resolution": resolution, "seconds": seconds}
+    motion, limits, axes = asked(motion, tilts, bearings, isinstance(tolerances, Iterable))
+    options: Any = {"condition": condition, "tolerances": tolerances, "resolution": resolution, "seconds": seconds}
     if is_exact(model):
         from graphsynth.jamming.space.turn import certify_in_space
 
@@ -115,6 +119,7 @@ def largest_scale(
     *,
     model: Model = "small",
     condition: Condition = "A",
+    tolerances: Tolerances = 0.0,
     relative_gap: float | None = None,
     seconds: float | None = None,
 ) -> ScaleCertificate:
@@ -127,6 +132,8 @@ def largest_scale(
         and the misalignment of the first driver's axis.
     model : {"small", "exact"}
         The bounds are about small tilts (without what these neglect), or about every loop closed in space.
+    tolerances : float or iterable of PartTolerance
+        As for `graphsynth.jamming.joints.certify_coupled`; what is proved holds for all members.
     relative_gap, seconds : optional
         Wanted distance of the bounds, and time: 1e-4 and 20 s with small tilts, 1e-3 and 60 s with exact ones.
 
@@ -144,8 +151,8 @@ def largest_scale(
     >>> exact.low < exact.high and abs(exact.low / small.low - 1.0) < 0.02
     True
     """
-    motion, limits, axes = asked(motion, tilts, bearings)
-    options: Any = {"condition": condition, "relative_gap": relative_gap, "seconds": seconds}
+    motion, limits, axes = asked(motion, tilts, bearings, isinstance(tolerances, Iterable))
+    options: Any = {"condition": condition, "tolerances": tolerances, "relative_gap": relative_gap, "seconds": seconds}
     options = {name: value for name, value in options.items() if value is not None}
     if is_exact(model):
         from graphsynth.jamming.space.scale import largest_scale as exact_scale

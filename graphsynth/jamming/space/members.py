@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from graphsynth.intervals import Interval
 from graphsynth.jamming.assembly import positions
 from graphsynth.jamming.assembly.positions import Positions, points
+from graphsynth.jamming.joints.limits import bounds
 from graphsynth.jamming.joints.program import JointProblem
 from graphsynth.jamming.joints.search import MemberWitness, limits_chosen, lowest, sharp_problem, unclosed_at
 from graphsynth.jamming.space.closure import Closure, closures
@@ -73,9 +74,9 @@ class Members:
         """Closure in floats."""
         return closures(self.model)[0]
 
-    def prove(self, u: float, p: Array) -> PoseProof:
-        """Prove what can be proved of one member at one input."""
-        poses = self.poses(points(np.array([u])), points(p[None]))
+    def prove(self, u: float, p: Interval) -> PoseProof:
+        """Prove what can be proved of the members p (m,) at one input."""
+        poses = self.poses(points(np.array([u])), p.reshape(1, -1))
         if not poses.found[0]:
             return PoseProof.unknown("the plane mechanism is not assembled")
         return prove_pose(self.model, poses.q[0], given=poses.given[0], boxes=_BOXES)
@@ -107,11 +108,28 @@ class Members:
         return MemberPoses(q, np.asarray(given.rad), found)
 
 
+def at_end(given: JointProblem, end: int) -> JointProblem:
+    """Return a problem with all limits at the low (0) or high (1) ends of their ranges."""
+    limits = []
+    for own in given.limits:
+        values: Any = {name: bounds(own, name)[end] for name in (*own.tilts, "axial_clearance")}
+        limits.append(type(own)(**values))
+    return replace(given, limits=tuple(limits))
+
+
 def slopes(model: SpaceModel, found: Optimum) -> Array:
     """Return the derivatives of the least factor by the given coordinates, from the multipliers (estimated)."""
     floats = closures(model)[0]
     J = floats.jacobian(floats.loops(found.q[None]))[0]
     return np.asarray(found.by @ J[:, model.size :])
+
+
+def extreme_member(members: Members, u: float, side: float) -> Array:
+    """Return the member with the largest (``side`` = 1) or smallest (-1) least factor at an input, to first order."""
+    m = members.box.size
+    poses = members.poses(points(np.array([u])), points(np.zeros((1, m))))
+    found = least_scale(members.floats, poses.q[0])
+    return members.box.furthest(side * slopes(members.model, found)[len(poses.given[0]) - m :])
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,11 +174,11 @@ def binding_member(
     own = Members(sharp_problem(motion.mechanism, limits, tilts), motion, box)
     for place in islice(places, _PIECES):
         u, p, scale = _worst(own, place)
-        if not scale > 1.0 or own.prove(u, p).state >= 0:
+        if not scale > 1.0 or own.prove(u, points(p)).state >= 0:
             continue
         mechanism = own.mechanism(p)
         alone = sharp_problem(mechanism, limits, tilts), replace(motion, mechanism=mechanism)
-        if Members(*alone, relative_box(mechanism, 0.0)).prove(u, np.zeros(0)).state < 0:
+        if Members(*alone, relative_box(mechanism, 0.0)).prove(u, points(np.zeros(0))).state < 0:
             named = tuple(zip(box.names, p.tolist())), limits_chosen(given, limits)
             return SpaceWitness(u, 1.0, tilts, limits, mechanism, True, *named, scale)
     return None

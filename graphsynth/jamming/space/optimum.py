@@ -22,7 +22,7 @@ _ROUNDS = 60
 #: Rounds after which Newton's method is tried before the programs come to rest.
 _TRIES = (6, 10, 16, 26, 40)
 _RANK = 1e-11
-_PROJECTIONS, _STEPS = 100, 5
+_PROJECTIONS, _STEPS, _GAUSS = 100, 5, 6
 #: Largest step of an unknown in one round (radians, units).
 _STEP = 0.3
 
@@ -57,7 +57,7 @@ def least_scale(closure: Closure, q: Array) -> Optimum:
     """Find the least factor from a start q (width,), whose given coordinates stay."""
     bounds = closure.model.bounds
     scale, reach, before = 1.0, _STEP, math.inf
-    q, converged = _nearer(closure, q), False
+    q, converged = _all_nearer(closure, q[None])[0], False
     found = _Linear(math.inf, q, np.zeros(len(closure.rows)), math.inf)
     for rounds in range(_ROUNDS):
         radii = np.array([b.chart(scale) / scale for b in bounds])
@@ -83,29 +83,112 @@ def least_scale(closure: Closure, q: Array) -> Optimum:
     return last if last.converged else _general(closure, last)
 
 
-def some_closure(closure: Closure, q: Array) -> Optimum:
-    """Find a closure with some room in its limits, not the most: one program, then steps of least use of room.
+class Several(NamedTuple):
+    """Closures of N poses with some room in their limits, not the most (estimated).
 
-    ``scale`` is what it uses of the limits; infinite if it is none.
+    ``q`` (N, width); ``used`` (N,): what is used of the limits, infinite where it is no closure; ``by`` (N, equations)
+    the multipliers of the least factor with the closure linearised at the plane pose.
     """
+
+    q: Array
+    used: Array
+    by: Array
+
+
+def some_closures(closure: Closure, q: Array) -> Several:
+    """Find closures from starts q (N, width): one program each, all at once, then steps of least use of room."""
     bounds, n = closure.model.bounds, closure.model.size
-    q = _nearer(closure, q)
-    q = _linearised(closure, q, np.array([b.chart(1.0) for b in bounds])).q
+    q = _all_nearer(closure, q)
+    q, by = _all_linearised(closure, q, np.array([b.chart(1.0) for b in bounds]))
     room = np.ones(n)
     for bound in bounds:
         room[list(bound.columns)] = max(bound.chart(1.0), 1e-12)
-    missed = math.inf
+    missed = np.full(len(q), math.inf)
     for _ in range(_STEPS):
-        loops = closure.loops(q[None])
-        value = closure.values(loops)[0]
-        missed = float(np.abs(value).max(initial=0.0))
-        if missed < 1e-13:
+        loops = closure.loops(q)
+        value = closure.values(loops)
+        missed = np.abs(value).max(1, initial=0.0)
+        if not missed.max(initial=0.0) >= 1e-13:
             break
-        J = closure.jacobian(loops)[0][:, :n] * room
-        q[:n] -= room * (np.linalg.pinv(J, rcond=_RANK) @ value)
-    used = max((float(np.linalg.norm(q[list(b.columns)])) / b.chart(1.0) for b in bounds), default=0.0)
-    none = np.zeros(len(closure.rows)), np.zeros(len(bounds))
-    return Optimum(used if missed < 1e-9 else math.inf, q, *none, missed, False)
+        J = closure.jacobian(loops)[:, :, :n] * room
+        q[:, :n] -= room * (np.linalg.pinv(J, rcond=_RANK) @ value[:, :, None])[..., 0]
+    used = np.zeros(len(q))
+    for b in bounds:
+        used = np.maximum(used, np.sqrt((q[:, list(b.columns)] ** 2).sum(1)) / b.chart(1.0))
+    # at the closure the multipliers hold the unknowns without limits again
+    J = closure.jacobian(closure.loops(q))[:, :, _unlimited(closure)].swapaxes(1, 2)
+    by = by - (np.linalg.pinv(J, rcond=_RANK) @ (J @ by[..., None]))[..., 0]
+    return Several(q, np.where(missed < 1e-9, used, math.inf), by)
+
+
+def _all_nearer(closure: Closure, q: Array) -> Array:
+    """Move unknowns without limits of N poses towards a closure, by a few steps of Gauss and Newton."""
+    q = q.copy()
+    free = _unlimited(closure)
+    for _ in range(_GAUSS):
+        loops = closure.loops(q)
+        inverse = np.linalg.pinv(closure.jacobian(loops)[:, :, free], rcond=1e-6)
+        step = (inverse @ closure.values(loops)[:, :, None])[..., 0]
+        size = np.abs(step).max(1, initial=0.0)
+        q[:, free] -= step * np.minimum(1.0, _STEP / np.maximum(size, 1e-300))[:, None]
+        if not size.max(initial=0.0) >= 1e-6:
+            break
+    return q
+
+
+def _unlimited(closure: Closure) -> NDArray[np.bool_]:
+    """Unknowns without limits, (width,)."""
+    free = np.arange(closure.model.width) < closure.model.size
+    for bound in closure.model.bounds:
+        free[list(bound.columns)] = False
+    return free
+
+
+def _all_linearised(closure: Closure, q: Array, radii: Array) -> tuple[Array, Array]:
+    """Solve the programs of N poses with the closure linearised: unknowns, and multipliers (N, equations).
+
+    All of one shape at once; one by one where the columns without limits, or those with, are not independent.
+    """
+    bounds, slack = closure.model.bounds, _unlimited(closure)
+    loops = closure.loops(q)
+    values, J = closure.values(loops), closure.jacobian(loops)
+    found, by = q.copy(), np.zeros_like(values)
+    rank = int(min(J.shape[1], slack.sum()))
+    left, size, _ = np.linalg.svd(J[:, :, slack], full_matrices=True)
+    null = left[:, :, rank:]
+    stacked = np.zeros((len(q), len(bounds), 2, null.shape[2]))
+    work = values.copy()
+    for k, bound in enumerate(bounds):
+        for axis, column in enumerate(bound.columns):
+            stacked[:, k, axis] = radii[k] * (J[:, None, :, column] @ null)[:, 0]
+            work -= J[:, :, column] * q[:, [column]]
+    work = (work[:, None] @ null)[:, 0]
+    unit, weight = np.abs(stacked).max((1, 2, 3), initial=1e-300), np.sqrt((work**2).sum(1))
+    M = stacked / unit[:, None, None, None]
+    regular = size[:, rank - 1] > _RANK * size[:, 0] if rank else np.ones(len(q), dtype=np.bool_)
+    least = np.linalg.svd(M.reshape(len(q), 2 * len(bounds), -1), compute_uv=False)
+    regular &= (least.shape[1] == null.shape[2] > 0) & (least.min(1, initial=1.0) > _RANK) & (weight > 1e-13)
+    rows = np.flatnonzero(regular)
+    if rows.size:
+        M, W = M[rows], work[rows] / weight[rows, None]
+        cones = solve_cones(M, np.zeros((rows.size, 0, M.shape[3])), W)
+        flat = M.reshape(rows.size, -1, M.shape[3])
+        tau = cones.tau.reshape(rows.size, -1, 1)
+        tau = tau - np.linalg.pinv(flat, rcond=1e-13).swapaxes(1, 2) @ (W[..., None] + flat.swapaxes(1, 2) @ tau)
+        x = tau.reshape(rows.size, len(bounds), 2) * (weight / unit)[rows, None, None]
+        by[rows] = (null[rows] @ cones.q[..., None])[..., 0]
+        for k, bound in enumerate(bounds):
+            for axis, column in enumerate(bound.columns):
+                found[rows, column] = radii[k] * x[:, k, axis]
+        change = np.where(slack, 0.0, found - q)[rows]
+        off = values[rows] + (J[rows] @ change[..., None])[..., 0]
+        found[np.ix_(rows, slack)] -= (np.linalg.pinv(J[rows][:, :, slack], rcond=_RANK) @ off[..., None])[..., 0]
+    for row in np.flatnonzero(~regular):
+        own = _linearised(closure, q[row], radii)
+        found[row], by[row] = own.q, own.by
+    load = (by[:, None] @ J)[:, 0]  # all loads times limits are 1: then the multipliers are slopes of the factor
+    total = sum(radii[k] * np.sqrt((load[:, list(b.columns)] ** 2).sum(1)) for k, b in enumerate(bounds))
+    return found, by / np.maximum(total, 1e-300)[:, None]
 
 
 def _general(closure: Closure, found: Optimum) -> Optimum:
@@ -169,22 +252,6 @@ def _finished(closure: Closure, q: Array, scale: float, by: Array, converged: bo
         if inside > radius * (1.0 - (1e-6 if converged else 1e-2)):
             weight[k] = max(0.0, -float(slope[columns] @ q[columns]) / (2.0 * radius**2))
     return _polished(closure, Optimum(scale, q, by, weight, missed, converged))
-
-
-def _nearer(closure: Closure, q: Array) -> Array:
-    """Move unknowns without limits towards a closure, by a few steps of Gauss and Newton."""
-    q = q.copy()
-    free = np.arange(len(q)) < closure.model.size
-    for bound in closure.model.bounds:
-        free[list(bound.columns)] = False
-    for _ in range(6):
-        loops = closure.loops(q[None])
-        step = np.linalg.lstsq(closure.jacobian(loops)[0][:, free], closure.values(loops)[0], rcond=1e-6)[0]
-        size = float(np.abs(step).max(initial=0.0))
-        q[free] -= step * min(1.0, _STEP / max(size, 1e-300))
-        if size < 1e-6:
-            break
-    return q
 
 
 def _linearised(closure: Closure, q: Array, radii: Array) -> _Linear:

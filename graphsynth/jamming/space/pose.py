@@ -13,8 +13,17 @@ from graphsynth.jamming.space.binding import binds, body_box, multipliers
 from graphsynth.jamming.space.bodies import Bodies, stands_apart
 from graphsynth.jamming.space.closure import Closure, closures
 from graphsynth.jamming.space.model import SHIFT_X, TURN, SpaceModel
-from graphsynth.jamming.space.optimum import Optimum, least_scale, some_closure
-from graphsynth.jamming.space.proof import Box, Certificate, branch_box, certificates, closes, contract, lower_bounds
+from graphsynth.jamming.space.optimum import Optimum, least_scale, some_closures
+from graphsynth.jamming.space.proof import (
+    Box,
+    Certificate,
+    branch_box,
+    certificates,
+    closes,
+    closings,
+    contract,
+    lower_bounds,
+)
 
 Array = NDArray[np.float64]
 #: Half widths of the box of a branch in unlimited turns (radians) and travels (units); the last one is LEAST, or more.
@@ -68,12 +77,44 @@ def prove_pose(
         limits within ``reach`` of the reference.
     """
     check_rounding()
-    floats, enclosed = closures(model)
     given = np.zeros(model.width - model.size) if given is None else given
     if not boxes:
-        found = some_closure(floats, q)
-        if found.scale < 1.0 and closes(enclosed, found.q, rates(floats, found.q), given):
-            return PoseProof(1, found.scale, math.inf, "closes within all limits", found)
+        found = free_poses(model, q[None], given[None])[0]
+        if found.state > 0:
+            return found
+    return settle_pose(model, q, given, boxes, reaches)
+
+
+def free_poses(model: SpaceModel, q: Array, given: Array) -> list[PoseProof]:
+    """Prove which of N poses are free, with references q (N, width) and half widths of given coordinates (certified).
+
+    The closures are some with room in the limits, not those with the most.  What is not proved free is undecided, and
+    its optimum is that of the closure linearised at the plane pose.
+    """
+    floats, enclosed = closures(model)
+    found = some_closures(floats, q)
+    good = np.flatnonzero(found.used < 1.0)
+    free = np.zeros(len(q), dtype=np.bool_)
+    free[good] = closings(enclosed, found.q[good], all_rates(floats, found.q[good]), given[good])
+    proofs, none = [], np.zeros(len(model.bounds))
+    for k, own in enumerate(found.q):
+        missed = 0.0 if found.used[k] < math.inf else math.inf
+        optimum = Optimum(float(found.used[k]), own, found.by[k], none, missed, False)
+        if free[k]:
+            proofs.append(PoseProof(1, float(found.used[k]), math.inf, "closes within all limits", optimum))
+        else:
+            reason = (
+                "a closure is found, but not proved"
+                if found.used[k] < 1.0
+                else "no closure within the limits was found"
+            )
+            proofs.append(PoseProof(0, float(found.used[k]), 0.0, reason, optimum))
+    return proofs
+
+
+def settle_pose(model: SpaceModel, q: Array, given: Array, boxes: int, reaches: tuple[float, ...]) -> PoseProof:
+    """Prove what can be proved about one pose from its least factor (certified); arguments as of `prove_pose`."""
+    floats, enclosed = closures(model)
     found = least_scale(floats, q)
     if found.scale < 1.0 and found.missed < 1e-9:
         free = closes(enclosed, found.q, rates(floats, found.q), given)
@@ -139,19 +180,24 @@ def _reaches(model: SpaceModel, q: Array, found: Optimum, reaches: tuple[float, 
 
 
 def rates(floats: Closure, q: Array, free: bool = False) -> Array:
-    """Change of the unknowns with the given coordinates, the least by what their limits leave, (size, drivers).
+    """Change of the unknowns with the given coordinates, the least by what their limits leave, (size, given).
 
     With ``free`` only of unknowns without limits.
     """
+    return np.asarray(all_rates(floats, q[None], free)[0])
+
+
+def all_rates(floats: Closure, q: Array, free: bool = False) -> Array:
+    """Return the `rates` of N closures q (N, width), (N, size, given)."""
     model = floats.model
-    J = floats.jacobian(floats.loops(q[None]))[0]
-    room = np.ones(model.size)
+    J = floats.jacobian(floats.loops(q))
+    room = np.ones((len(q), model.size))
     for bound in model.bounds:
         columns = list(bound.columns)
-        left = bound.chart(1.0) - float(np.linalg.norm(q[columns]))
-        room[columns] = 0.0 if free else min(1.0, max(left, 1e-9))
-    first = J[:, : model.size] * room
-    return np.asarray(-room[:, None] * (np.linalg.pinv(first, rcond=1e-11) @ J[:, model.size :]))
+        left = bound.chart(1.0) - np.sqrt((q[:, columns] ** 2).sum(1))
+        room[:, columns] = 0.0 if free else np.clip(left, 1e-9, 1.0)[:, None]
+    first = J[:, :, : model.size] * room[:, None]
+    return np.asarray(-room[:, :, None] * (np.linalg.pinv(first, rcond=1e-11) @ J[:, :, model.size :]))
 
 
 def _cut(enclosed: Closure, proof: Certificate, first: Box, most: int) -> bool:

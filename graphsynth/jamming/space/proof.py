@@ -27,6 +27,7 @@ from graphsynth.jamming.space.optimum import Optimum
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 #: More than what rounding loses in sums of fewer than a thousand nonnegative numbers.
 _UP = 1.0 + 1e-12
 _FREE_STEPS = 6
@@ -40,49 +41,77 @@ def closes(closure: Closure, at: Array, rate: Array, given: Array) -> bool:
     """Whether the mechanism is proved to close within its limits for all given coordinates within a box (certified).
 
     ``at`` (width,) is near a closure with room in all limits, its given coordinates the middle of the box; ``given``
-    (drivers,) are the half widths of the box; ``rate`` (size, drivers) the change of the unknowns.
+    (given coordinates,) are the half widths of the box; ``rate`` (size, given) the change of the unknowns.
     """
-    model = closure.model
-    along = np.concatenate([rate, np.eye(len(given))])
-    still = (np.abs(along) @ given) * _UP
+    return bool(closings(closure, at[None], rate[None], given[None])[0])
+
+
+def closings(closure: Closure, at: Array, rate: Array, given: Array) -> Mask:
+    """Tell of N boxes whether the mechanism is proved to close within its limits, as `closes` (certified)."""
+    model, count = closure.model, len(at)
+    eye = np.broadcast_to(np.eye(given.shape[1]), (count, given.shape[1], given.shape[1]))
+    along = np.concatenate([rate, eye], 1)
+    still = _sides(np.abs(along), given)
     if not closure.rows:
         return _within(model, at, still)
-    loops = closure.loops(exact(at[None]))
+    loops = closure.loops(exact(at))
     value, J = closure.values(loops), closure.jacobian(loops)
-    basic = _basic(model, at, J.mid[0])
-    if len(basic) < len(closure.rows):
-        return False
-    inverse = exact(np.linalg.pinv(J.mid[:, :, basic]))
-    start = times(inverse, value[..., None])[0, :, 0].size
-    start = start + times(inverse, times(J, exact(along[None])))[0].size @ given
-    rest = (exact(np.eye(len(basic))) - times(inverse, J[:, :, basic])[0]).size
+    basic, fine = _basics(model, at, J.mid)
+    each = np.arange(count)[:, None]
+    own = Balls(*(part[each, :, basic].swapaxes(1, 2) for part in (J.mid, J.rad)))
+    inverse = exact(np.linalg.pinv(np.where(fine[:, None, None], own.mid, 0.0)))
+    start = times(inverse, value[..., None])[..., 0].size
+    start = start + _sides(times(inverse, times(J, exact(along))).size, given)
+    rest = (exact(np.eye(len(closure.rows))) - times(inverse, own)).size
     reach = 2.0 * start + 1e-15
+    proved, live = np.zeros(count, dtype=np.bool_), np.flatnonzero(fine)
     for _ in range(_FREE_STEPS):
-        whole = still.copy()
-        whole[basic] += reach
-        around = closure.loops(Balls(at[None], whole[None]))
-        H = closure.hessian(around, inverse)[0]
-        turned = times(H, exact(along[None]))
-        bend = (times(exact(along.T[None]), turned).size @ given) @ given  # of the given coordinates alone
-        bend = bend + 2.0 * (turned.size[:, basic] @ given) @ reach
-        bend = bend + ((H.size[:, basic][:, :, basic]) @ reach) @ reach
-        image = (start + rest @ reach + 0.5 * bend) * _UP
-        if (image < reach).all():
-            return _identity(around) and _within(model, at, whole)
-        reach = np.maximum(1.5 * image, reach) + 1e-300
-        if not np.isfinite(reach).all() or reach.max() > 1.0:
-            return False
-    return False
+        live = live[np.isfinite(reach[live]).all(1) & (reach[live].max(1) <= 1.0)]
+        if live.size == 0:
+            break
+        whole, gamma, columns = still[live], given[live], basic[live]
+        rows = np.arange(live.size)[:, None]
+        whole[rows, columns] += reach[live]
+        around = closure.loops(Balls(at[live], whole))
+        H = closure.hessian(around, inverse[live])
+        turned = times(H, exact(along[live][:, None]))
+        # of the given coordinates alone, of both kinds, of the basic ones alone
+        both = times(exact(along[live].swapaxes(1, 2)[:, None]), turned).size
+        bend = _sides(_sides(both, gamma[:, None]), gamma)
+        mixed = _sides(turned.size, gamma[:, None])[rows, :, columns].swapaxes(1, 2)
+        square = H.size[rows[..., None], :, columns[:, :, None], columns[:, None, :]]
+        square = _sides(square.transpose(0, 3, 1, 2), reach[live][:, None])
+        bend = bend + 2.0 * _sides(mixed, reach[live]) + _sides(square, reach[live])
+        image = (start[live] + _sides(rest[live], reach[live]) + 0.5 * bend) * _UP
+        inside = (image < reach[live]).all(1)
+        proved[live[inside]] = (_identity(around) & _within(model, at[live], whole))[inside]
+        reach[live] = np.maximum(1.5 * image, reach[live]) + 1e-300
+        live = live[~inside]
+    return proved
 
 
-def _basic(model: SpaceModel, at: Array, J: Array) -> Ints:
-    """Unknowns to solve for: as many as equations, those with most room in their limits first."""
-    room = np.ones(model.size)
+def _sides(A: Array, x: Array) -> Array:
+    """Products of nonnegative matrices (..., n, k) with vectors (..., k), rounded up."""
+    return np.asarray((A @ x[..., None])[..., 0] * _UP)
+
+
+def _basics(model: SpaceModel, at: Array, J: Array) -> tuple[Ints, Mask]:
+    """Unknowns to solve for at N points: as many as equations, those with most room in their limits first.
+
+    False where there are not so many independent ones.
+    """
+    room = np.ones((len(at), model.size))
     for bound in model.bounds:
         columns = list(bound.columns)
-        left = bound.chart(1.0) - float(np.linalg.norm(at[columns]))
-        room[columns] = min(1.0, max(left, 1e-12))
-    return _pivots(J[:, : model.size], room)
+        left = bound.chart(1.0) - np.sqrt((at[:, columns] ** 2).sum(1))
+        room[:, columns] = np.clip(left, 1e-12, 1.0)[:, None]
+    basic, fine = np.zeros((len(at), J.shape[1]), dtype=np.intp), np.zeros(len(at), dtype=np.bool_)
+    for k in range(len(at)):
+        found = _pivots(J[k, :, : model.size], room[k])
+        fine[k] = len(found) == J.shape[1]
+        if fine[k]:
+            basic[k] = found
+    return basic, fine
 
 
 def _pivots(J: Array, weight: Array) -> Ints:
@@ -93,23 +122,23 @@ def _pivots(J: Array, weight: Array) -> Ints:
     return np.asarray(np.sort(order[:rank]))
 
 
-def _within(model: SpaceModel, at: Array, radius: Array) -> bool:
-    """Whether all unknowns within a box obey their limits."""
+def _within(model: SpaceModel, at: Array, radius: Array) -> Mask:
+    """Whether all unknowns within boxes (N, width) obey their limits."""
+    inside = np.ones(len(at), dtype=np.bool_)
     for bound, limit in zip(model.bounds, model.limit_bounds[0]):
         columns = list(bound.columns)
-        size = (np.abs(at[columns]) + radius[columns]) * _UP
-        if not math.sqrt(float((size**2).sum())) * _UP < limit:
-            return False
-    return True
+        size = (np.abs(at[:, columns]) + radius[:, columns]) * _UP
+        inside &= np.sqrt((size**2).sum(1) * _UP) * _UP < limit
+    return inside
 
 
-def _identity(loops: list[Loop]) -> bool:
-    """Whether a symmetric rotation of every loop is the identity: no half turn is within the box."""
+def _identity(loops: list[Loop]) -> Mask:
+    """Whether a symmetric rotation of every loop is the identity, for N boxes: no half turn is within them."""
+    fine = np.ones(len(loops[0].t.mid), dtype=np.bool_)
     for loop in loops:
         trace = loop.R[..., 0, 0] + loop.R[..., 1, 1] + loop.R[..., 2, 2]
-        if not (trace.mid - trace.rad > -0.99).all():
-            return False
-    return True
+        fine &= trace.mid - trace.rad > -0.99
+    return fine
 
 
 class Box(NamedTuple):

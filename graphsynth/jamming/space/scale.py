@@ -20,18 +20,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.jamming.bearing.bearing import Condition
+from graphsynth.jamming.joints.drawing import Tolerances, drawn
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.pieces import check_range
-from graphsynth.jamming.joints.program import Bearings, problem
+from graphsynth.jamming.joints.program import Bearings, JointProblem, problem
 from graphsynth.jamming.joints.scale import ScaleCertificate
-from graphsynth.jamming.space.along import NOTHING, Along, Change, arguments, changed
+from graphsynth.jamming.joints.search import limits_chosen, sharp_problem
+from graphsynth.jamming.space.along import NOTHING, Along, Change, changed
+from graphsynth.jamming.space.members import Members, at_end, extreme_member
 from graphsynth.jamming.space.model import MODEL, Unsupported
-from graphsynth.jamming.space.pose import prove_pose
-from graphsynth.jamming.space.turn import certify_in_space
+from graphsynth.jamming.space.turn import Effort, certify_members
 from graphsynth.jamming.verdict import Verdict
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
+    from graphsynth.tolerances.box import ParameterBox
 
 Array = NDArray[np.float64]
 #: Inputs of the grid of the small-tilt model; peaks of it that are looked at; how much lower these may be.
@@ -118,6 +121,24 @@ def _round_a_peak(along: Along, change: Change, grid: Array, poses: Array, k: in
     return found
 
 
+class _Asked(NamedTuple):
+    """A question about all members of a box of dimensions along a motion.
+
+    ``change``: what a factor on misalignments or limits changes; a jam comes with larger factors (``up`` = 1) or
+    smaller ones (-1).  Estimates: the factors ``free`` and ``jam`` at which the members that bind first and last have
+    no room left, the latter at the input ``worst``.
+    """
+
+    given: JointProblem
+    motion: Motion
+    box: ParameterBox
+    change: Callable[[float], Change]
+    up: float
+    worst: _Worst
+    jam: float
+    free: float
+
+
 class _Sides(NamedTuple):
     """What was proved of a factor: free with one, binding with the other, at an input."""
 
@@ -127,44 +148,58 @@ class _Sides(NamedTuple):
     reasons: tuple[str, ...]
 
 
-def _proved(
-    along: Along, worst: _Worst, estimate: float, up: float, change: Callable[[float], Change], gap: float, end: float
-) -> _Sides:
-    """Prove freedom and a jam round an estimate; a jam comes with larger factors (``up`` = 1) or smaller ones (-1)."""
+def _proved(asked: _Asked, gap: float, end: float) -> _Sides:
+    """Prove freedom and a jam round the estimates."""
+    u, motion, box = asked.worst.u, asked.motion, asked.box
     binds, free, reasons = math.nan, math.nan, []
     side = _SIDE * gap
     for _ in range(_TRIES):
-        factor = estimate * (1.0 + side) ** up
-        q, given = along.start(worst.u, worst.pose, change(factor))
-        proof = prove_pose(along.model(change(factor)), q, given=given)
+        factor = asked.jam * (1.0 + side) ** asked.up
+        proof = Members(at_end(changed(asked.given, asked.change(factor)), 1), motion, box).prove(u, box.whole)
         if proof.state < 0:
             binds = factor
             break
         side *= _WIDER
     else:
-        reasons.append(f"a jam at the input {worst.u!r} is not proved: {proof.reason}")
+        reasons.append(f"a jam at the input {u!r} is not proved: {proof.reason}")
     side, why = _SIDE * gap, ""
     for _ in range(_TRIES):
-        factor, left = estimate * (1.0 + side) ** -up, end - perf_counter()
-        if left <= 0.0:
+        factor = asked.free * (1.0 + side) ** -asked.up
+        if perf_counter() >= end:
             why = why or "the time was up"
             break
-        proved = certify_in_space(along.motion, *arguments(changed(along.given, change(factor))), seconds=left)
+        proved = certify_members(changed(asked.given, asked.change(factor)), motion, box, Effort(end))
         if proved.verdict is Verdict.CERTIFIED_FREE:
             free = factor
             break
         why, side = proved.reason, side * _WIDER
     if math.isnan(free):
         reasons.append(f"freedom is not proved: {why}")
-    return _Sides(free, binds, worst.u, tuple(reasons))
+    return _Sides(free, binds, u, tuple(reasons))
+
+
+def _of_members(asked: _Asked, estimate: Callable[[Along], tuple[_Worst, float]]) -> _Asked:
+    """Correct the estimates of the nominal mechanism by those of the members that bind first and last."""
+    if not asked.box.size and not limits_chosen(asked.given, asked.given.limits):
+        return asked
+    found = []
+    for end, side in ((0, 1.0), (1, -1.0)):
+        given = at_end(asked.given, end)
+        members = Members(changed(given, asked.change(asked.free)), asked.motion, asked.box)
+        mechanism = members.mechanism(extreme_member(members, asked.worst.u, side))
+        motion = replace(asked.motion, mechanism=mechanism)
+        found.append(estimate(Along(sharp_problem(mechanism, given.limits, given.misalignments), motion)))
+    (_, free), (worst, jam) = found
+    return asked._replace(worst=worst, jam=jam, free=free)
 
 
 def largest_scale(
     motion: Motion,
-    bearings: Bearings,
+    bearings: Bearings | None,
     tilts: Misalignment | Iterable[Misalignment],
     *,
     condition: Condition = "A",
+    tolerances: Tolerances = 0.0,
     relative_gap: float = 1e-3,
     seconds: float = 60.0,
 ) -> ScaleCertificate:
@@ -172,7 +207,7 @@ def largest_scale(
 
     Parameters
     ----------
-    motion, bearings, tilts, condition
+    motion, bearings, tilts, condition, tolerances
         As for `certify_in_space`; ranges of limits and narrow ranges of misalignments count.
     relative_gap : float
         Wanted ``high / low - 1``.
@@ -183,8 +218,9 @@ def largest_scale(
     -------
     ScaleCertificate
         Certified: with all misalignments ``low`` times as large every input is free, with ``high`` times the input
-        ``at`` binds.  Unlike with small tilts nothing is proved for the factors between or below.  ``low`` is 0, or
-        ``high`` infinite, where nothing is proved, and ``reason`` says why.
+        ``at`` binds; for all members of the tolerances, which keep the two apart.  Unlike with small tilts nothing is
+        proved for the factors between or below.  ``low`` is 0, or ``high`` infinite, where nothing is proved, and
+        ``reason`` says why.
 
     Examples
     --------
@@ -197,33 +233,48 @@ def largest_scale(
     """
     begin = perf_counter()
     check_range(motion, relative_gap=relative_gap, seconds=seconds)
+    limits, axes, box = drawn(motion.mechanism, bearings, tilts, tolerances)
+    given = problem(motion.mechanism, limits, axes, condition)
     try:
-        along = Along(problem(motion.mechanism, bearings, tilts, condition), motion)
-        worst = worst_input(along)
-        least = along.least(worst.u, worst.pose)
-        estimate = along.allowed(worst.u, worst.pose, NOTHING, least)
-        if 0.0 < estimate < math.inf:  # another input may be the worst at the factor found
-            worst = worst_input(along, Change(phi=estimate))
-            least = along.least(worst.u, worst.pose, Change(phi=estimate))
-            estimate *= along.allowed(worst.u, worst.pose, Change(phi=estimate), least)
+        worst, estimate = _misaligned(Along(given, motion))
+        asked = _Asked(given, motion, box, lambda factor: Change(phi=factor), 1.0, worst, estimate, estimate)
+        asked = _of_members(asked, _misaligned) if 0.0 < estimate < math.inf else asked
     except Unsupported as error:
         return ScaleCertificate(0.0, math.inf, math.nan, 0, str(error), perf_counter() - begin, SCALE)
-    if not 0.0 < estimate < math.inf:
+    if not (0.0 < asked.free < math.inf and 0.0 < asked.jam < math.inf):
         why = {0.0: "it binds with any misalignment", math.inf: "no misalignment up to 0.5 rad binds"}
         reason = f"{why.get(estimate, 'no closure was found')} (estimated)"
         return ScaleCertificate(0.0, math.inf, worst.u, 0, reason, perf_counter() - begin, SCALE)
     gap, end = max(relative_gap, 1e-9), begin + seconds
-    found = _proved(along, worst, estimate, 1.0, lambda factor: Change(phi=factor), gap, end)
+    found = _proved(asked, gap, end)
     low, high = 0.0 if math.isnan(found.free) else found.free, math.inf if math.isnan(found.binds) else found.binds
     return _told(ScaleCertificate(low, high, found.at, 0, "; ".join(found.reasons), 0.0, SCALE), relative_gap, begin)
 
 
+def _misaligned(along: Along) -> tuple[_Worst, float]:
+    """Worst input, and the factor on all misalignments that leaves no room there (estimated)."""
+    worst = worst_input(along)
+    estimate = along.allowed(worst.u, worst.pose, NOTHING, along.least(worst.u, worst.pose))
+    if 0.0 < estimate < math.inf:  # another input may be the worst at the factor found
+        worst = worst_input(along, Change(phi=estimate))
+        least = along.least(worst.u, worst.pose, Change(phi=estimate))
+        estimate *= along.allowed(worst.u, worst.pose, Change(phi=estimate), least)
+    return worst, estimate
+
+
+def _limited(along: Along) -> tuple[_Worst, float]:
+    """Worst input, and the factor on all limits that just leaves room there (estimated)."""
+    worst = worst_input(along)
+    return worst, worst.value
+
+
 def least_factor(
     motion: Motion,
-    bearings: Bearings,
+    bearings: Bearings | None,
     tilts: Misalignment | Iterable[Misalignment],
     *,
     condition: Condition = "A",
+    tolerances: Tolerances = 0.0,
     relative_gap: float = 1e-3,
     seconds: float = 60.0,
 ) -> FactorCertificate:
@@ -231,7 +282,7 @@ def least_factor(
 
     Parameters
     ----------
-    motion, bearings, tilts, condition, relative_gap, seconds
+    motion, bearings, tilts, condition, tolerances, relative_gap, seconds
         As for `largest_scale`.
 
     Returns
@@ -250,21 +301,24 @@ def least_factor(
     """
     begin = perf_counter()
     check_range(motion, relative_gap=relative_gap, seconds=seconds)
+    limits, axes, box = drawn(motion.mechanism, bearings, tilts, tolerances)
+    given = problem(motion.mechanism, limits, axes, condition)
     try:
-        along = Along(problem(motion.mechanism, bearings, tilts, condition), motion)
-        worst = worst_input(along)
+        worst, estimate = _limited(Along(given, motion))
+        asked = _Asked(given, motion, box, lambda factor: Change(limits=factor), -1.0, worst, estimate, estimate)
+        asked = _of_members(asked, _limited) if 0.0 < estimate < math.inf else asked
     except Unsupported as error:
         return FactorCertificate(0.0, math.inf, math.nan, str(error), perf_counter() - begin)
-    if not 0.0 < worst.value < math.inf:
+    if not (0.0 < asked.free < math.inf and 0.0 < asked.jam < math.inf):
         why = {0.0: "nothing is misaligned: any limits will do", math.inf: "no limits are large enough"}
         return FactorCertificate(0.0, math.inf, worst.u, f"{why[worst.value]} (estimated)", perf_counter() - begin)
     gap, end = max(relative_gap, 1e-9), begin + seconds
-    found = _proved(along, worst, worst.value, -1.0, lambda factor: Change(limits=factor), gap, end)
+    found = _proved(asked, gap, end)
     low, high = 0.0 if math.isnan(found.binds) else found.binds, math.inf if math.isnan(found.free) else found.free
     return _told(FactorCertificate(low, high, found.at, "; ".join(found.reasons), 0.0), relative_gap, begin)
 
 
 def _told(found: _Found, gap: float, begin: float) -> _Found:
     """Add the time, and why the gap is wider than wanted."""
-    wide = "" if found.reason or found.relative_gap <= gap else "nearer to the verge nothing was proved"
+    wide = "" if found.reason or found.relative_gap <= gap else "nearer to the verge nothing was proved of all members"
     return replace(found, reason=found.reason or wide, seconds=perf_counter() - begin)

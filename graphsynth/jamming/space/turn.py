@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +17,13 @@ from graphsynth.intervals.reading import shortened
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.certify import TurnCertificate
 from graphsynth.jamming.joints.drawing import Tolerances, drawn
-from graphsynth.jamming.joints.limits import Misalignment, bounds
+from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.pieces import check_range
 from graphsynth.jamming.joints.program import Bearings, JointProblem, problem
 from graphsynth.jamming.joints.search import limits_chosen
-from graphsynth.jamming.space.members import Members, Place, SpaceWitness, binding_member, slopes
+from graphsynth.jamming.space.members import MemberPoses, Members, Place, SpaceWitness, at_end, binding_member, slopes
 from graphsynth.jamming.space.model import MODEL, Unsupported
-from graphsynth.jamming.space.pose import REACHES, PoseProof, prove_pose, rates
+from graphsynth.jamming.space.pose import REACHES, PoseProof, free_poses, rates, settle_pose
 from graphsynth.jamming.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -42,6 +42,8 @@ _BOXES = 300
 #: unknowns; how near to 1 a factor is for a member to be looked at; spread by the input, beside that by the dimensions,
 #: from which on a piece with members of both kinds is cut.
 _CUTS, _MOVED, _NEAR, _CLEAR = 12, 0.03, 1e-3, 0.3
+#: Factor of the linearised closure below which a piece is cut rather than solved for; pieces taken at once.
+_SURE, _CHUNK = 0.9999, 64
 
 
 class _Piece(NamedTuple):
@@ -120,10 +122,24 @@ def certify_in_space(
     >>> certify_in_space(motion, JointLimits(0.1), Misalignment(0, 1, 0.1)).verdict.name
     'CERTIFIED_FREE'
     """
-    begin = perf_counter()
+    end = perf_counter() + seconds
     check_range(motion, resolution=resolution, max_pieces=max_pieces, seconds=seconds)
     limits, axes, box = drawn(motion.mechanism, bearings, tilts, tolerances)
     given = problem(motion.mechanism, limits, axes, condition)
+    return certify_members(given, motion, box, Effort(end, resolution, max_pieces))
+
+
+class Effort(NamedTuple):
+    """Limits of the work: when it ends (`perf_counter`), narrowest piece over the range, pieces."""
+
+    end: float
+    resolution: float = 1e-3
+    max_pieces: int = 5000
+
+
+def certify_members(given: JointProblem, motion: Motion, box: ParameterBox, effort: Effort) -> TurnCertificate:
+    """Prove as `certify_in_space`, of a problem and a box of dimensions."""
+    begin = perf_counter()
     try:
         work = _Work(given, motion, box)
     except Unsupported as error:
@@ -133,7 +149,7 @@ def certify_in_space(
         return TurnCertificate(
             Verdict.UNDECIDED, str(error), *nothing, False, None, 0, perf_counter() - begin, model=MODEL
         )
-    pieces, stopped = work.search(resolution, max_pieces, begin + seconds)
+    pieces, stopped = work.search(effort)
     decided = _decided(pieces, box)
     witness = None if decided == 1.0 else work.witness(pieces)
     verdict, reason = _verdict(motion, pieces, stopped, witness)
@@ -154,13 +170,13 @@ class _Work:
 
     def __init__(self, given: JointProblem, motion: Motion, box: ParameterBox) -> None:
         ranges = bool(limits_chosen(given, given.limits))
-        self.members = Members(_at_end(given, 0) if ranges else given, motion, box)
-        self.loose = Members(_at_end(given, 1), motion, box) if ranges else self.members
+        self.members = Members(at_end(given, 0) if ranges else given, motion, box)
+        self.loose = Members(at_end(given, 1), motion, box) if ranges else self.members
         self.given, self.several = given, ranges or box.size > 0
         self.likely: list[_Piece] = []
         self.evaluated = 0
 
-    def search(self, resolution: float, most: int, end: float) -> tuple[list[_Piece], str]:
+    def search(self, effort: Effort) -> tuple[list[_Piece], str]:
         """Cut until every piece is decided, too narrow or of members of both kinds; say what stopped the work."""
         own = self.members
         count = int(np.clip(math.ceil(_FIRST * (own.high - own.low) / math.tau), _FEWEST, _FIRST))
@@ -169,16 +185,16 @@ class _Work:
         done, stopped, first = [], "", True
         peak: _Piece | None = None
         while waiting:
-            fits = self.evaluated + len(waiting) <= most and perf_counter() < end
+            fits = self.evaluated + len(waiting) <= effort.max_pieces and perf_counter() < effort.end
             if not fits:
                 stopped = f"the limit of work was reached after {self.evaluated} pieces"
                 unknown = PoseProof.unknown(stopped)
                 done += [_Piece(*span, unknown, np.zeros(1 + own.box.size)) for span in waiting]
                 break
-            pieces = self._round(waiting, end)
+            pieces = self._round(waiting, effort.end)
             if first:
                 peak, first = self._peak(pieces), False
-            least = resolution * (own.high - own.low)
+            least = effort.resolution * (own.high - own.low)
             waiting = []
             self.likely += [p for p in pieces if p.proof.state == 0 and p.ends[1] > 1.0 - _NEAR]
             for piece in pieces:
@@ -243,22 +259,36 @@ class _Work:
         low, high, p_low, p_high = (np.array(part) for part in zip(*spans))
         box = Interval.from_bounds(low, high), Interval.from_bounds(p_low, p_high)
         poses, pieces = self.members.poses(*box), []
-        options: Any = {"boxes": boxes, "reaches": REACHES if boxes else (_REACH,)}
+        model, reaches = self.members.model, REACHES if boxes else (_REACH,)
         nothing = np.ones(1 + self.members.box.size)
+        first = {} if boxes else self._free(poses, end)
         for k, span in enumerate(spans):
             if not poses.found[k] or perf_counter() > end:
                 why = "the time was up" if poses.found[k] else "the plane mechanism is not assembled"
                 pieces.append(_Piece(*span, PoseProof.unknown(why), nothing))
                 continue
             self.evaluated += 1
-            proof = prove_pose(self.members.model, poses.q[k], given=poses.given[k], **options)
+            proof = first[k] if k in first else settle_pose(model, poses.q[k], poses.given[k], boxes, reaches)
+            if proof.state == 0 and k in first and not proof.scale < _SURE:
+                proof = settle_pose(model, poses.q[k], poses.given[k], boxes, reaches)
             least = proof.scale
-            if self.loose is not self.members and proof.state < 1:
+            if self.loose is not self.members and proof.state < 1 and not proof.scale < _SURE:
                 own = self.loose.poses(*(part[k : k + 1] for part in box))
-                other = prove_pose(self.loose.model, own.q[0], given=own.given[0], **options)
+                other = settle_pose(self.loose.model, own.q[0], own.given[0], boxes, reaches)
                 proof, least = replace(proof, state=min(other.state, 0)), other.scale
             pieces.append(_Piece(*span, proof, *self._worth(proof, least, poses.given[k])))
         return pieces
+
+    def _free(self, poses: MemberPoses, end: float) -> dict[int, PoseProof]:
+        """Prove which pieces are free, many at once, as far as the time goes."""
+        found: dict[int, PoseProof] = {}
+        rows = np.flatnonzero(poses.found)
+        for k in range(0, len(rows), _CHUNK):
+            part = rows[k : k + _CHUNK]
+            if perf_counter() > end:
+                break
+            found |= zip(part.tolist(), free_poses(self.members.model, poses.q[part], poses.given[part]))
+        return found
 
     def _worth(self, proof: PoseProof, least: float, given: Array) -> tuple[Array, tuple[float, float], float]:
         """Estimate what is worth cutting of an undecided piece, the ends of its factors, their spread by the input.
@@ -275,15 +305,6 @@ class _Work:
         by_input, side = float(spread[:drivers].sum()), float(spread[drivers:].sum())
         worth = np.append(worth[:drivers].max(initial=0.0), worth[drivers:])
         return worth, (least - side, proof.scale + side), by_input
-
-
-def _at_end(given: JointProblem, end: int) -> JointProblem:
-    """Return a problem with all limits at the low (0) or high (1) ends of their ranges."""
-    limits = []
-    for own in given.limits:
-        values: Any = {name: bounds(own, name)[end] for name in (*own.tilts, "axial_clearance")}
-        limits.append(type(own)(**values))
-    return replace(given, limits=tuple(limits))
 
 
 def _split(pieces: list[_Piece], single: _Piece) -> list[_Piece]:

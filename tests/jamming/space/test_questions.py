@@ -22,6 +22,7 @@ from graphsynth.jamming.joints import RIGID, SPHERICAL, JointLimits, Misalignmen
 from graphsynth.jamming.joints.program import problem
 from graphsynth.jamming.space import least_factor
 from graphsynth.jamming.space.along import Along, Change
+from graphsynth.tolerances import LengthTolerance
 
 LENGTHS, ALPHA, LIMIT = (1, 3, 2, 3.5), 0.08, 0.13
 
@@ -49,10 +50,24 @@ def test_the_scale_of_one_bearing_lies_between_its_bounds():
     assert small.low > found.high and "small tilts" in small.model  # they differ by more than the bounds leave
 
 
+def test_with_tolerances_the_scale_is_that_of_the_worst_and_of_the_best_member():
+    """Crank and coupler within 1 %: the bearing tilts by asin(l2 sin(alpha) sin(u) / l3)."""
+    parts = [LengthTolerance(1, (0, 2), 0.03), LengthTolerance(2, (1, 3), 0.02)]
+    found = largest_scale(moved(1.5, 1.6), one_bearing(), ALPHA, model="exact", tolerances=parts)
+    worst, best = (math.asin(math.sin(LIMIT) * (2.0 + side) / (3.0 - 1.5 * side)) / ALPHA for side in (-0.02, 0.02))
+    assert found.low < worst < best < found.high and not math.isinf(found.high)
+    assert found.low > worst * (1.0 - 2e-3) and found.high < best * (1.0 + 2e-3)
+    assert (found.low, found.high) != (0.0, math.inf) and "all members" in found.reason
+
+
 @pytest.mark.slow
 def test_the_least_factor_of_one_bearing_lies_between_its_bounds():
     least = least_factor(moved(1.5, 1.6), one_bearing(), Misalignment(0, 1, ALPHA))
     assert least.low < math.asin(1.5 * math.sin(ALPHA)) / LIMIT < least.high and least.relative_gap < 1e-3
+    parts = [LengthTolerance(1, (0, 2), 0.03), LengthTolerance(2, (1, 3), 0.02)]
+    factor = least_factor(moved(1.5, 1.6), one_bearing(), Misalignment(0, 1, ALPHA), tolerances=parts)
+    ends = [math.asin((3.0 - 1.5 * side) / (2.0 + side) * math.sin(ALPHA)) / LIMIT for side in (0.02, -0.02)]
+    assert factor.low < ends[0] < ends[1] < factor.high < ends[1] * (1.0 + 2e-3)
 
 
 def test_no_scale_where_nothing_binds_or_everything_does():

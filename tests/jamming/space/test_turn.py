@@ -25,7 +25,7 @@ def test_between_small_and_exact_tilts_the_exact_ones_decide():
     tilt = Misalignment(0, 1, alpha)
     assert assess_jamming(motion, tilt=tilt, joints=one_bearing(JointLimits(0.1201)), seconds=0.1).verdict not in (
         FREE, JAMMED)  # fmt: skip
-    report = assess_jamming(motion, tilt=tilt, joints=one_bearing(JointLimits(0.1201)), model="exact", seconds=0.5)
+    report = assess_jamming(motion, tilt=tilt, joints=one_bearing(JointLimits(0.1201)), model="exact", seconds=3.0)
     assert report.certificate.arcs(-1)
     assert report.verdict is JAMMED and "exact closure" in report.model
 
@@ -36,8 +36,7 @@ def test_the_ends_of_a_range_of_limits_count():
     for ends, verdict in (((0.9, 0.99), JAMMED), ((0.99, 1.01), SOME), ((1.01, 1.1), FREE)):
         low, high = (wanted * end for end in ends)
         limit = JointLimits(0.5 * (low + high), tilt_range=(low, high))
-        seconds = 0.1 if verdict is SOME else 20.0
-        assert certify_in_space(motion, one_bearing(limit), tilt, seconds=seconds).verdict is verdict
+        assert certify_in_space(motion, one_bearing(limit), tilt, seconds=20.0).verdict is verdict
 
 
 @pytest.mark.slow
