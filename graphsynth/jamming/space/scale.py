@@ -29,7 +29,7 @@ from graphsynth.jamming.joints.search import limits_chosen, sharp_problem
 from graphsynth.jamming.space.along import NOTHING, Along, Change, changed
 from graphsynth.jamming.space.members import Members, at_end, extreme_member
 from graphsynth.jamming.space.model import MODEL, Unsupported
-from graphsynth.jamming.space.turn import Effort, certify_members
+from graphsynth.jamming.space.turn import Stint, certify_members
 from graphsynth.jamming.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -168,7 +168,7 @@ def _proved(asked: _Asked, gap: float, end: float) -> _Sides:
         if perf_counter() >= end:
             why = why or "the time was up"
             break
-        proved = certify_members(changed(asked.given, asked.change(factor)), motion, box, Effort(end))
+        proved = certify_members(changed(asked.given, asked.change(factor)), motion, box, Stint(end))
         if proved.verdict is Verdict.CERTIFIED_FREE:
             free = factor
             break

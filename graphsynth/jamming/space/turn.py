@@ -126,10 +126,10 @@ def certify_in_space(
     check_range(motion, resolution=resolution, max_pieces=max_pieces, seconds=seconds)
     limits, axes, box = drawn(motion.mechanism, bearings, tilts, tolerances)
     given = problem(motion.mechanism, limits, axes, condition)
-    return certify_members(given, motion, box, Effort(end, resolution, max_pieces))
+    return certify_members(given, motion, box, Stint(end, resolution, max_pieces))
 
 
-class Effort(NamedTuple):
+class Stint(NamedTuple):
     """Limits of the work: when it ends (`perf_counter`), narrowest piece over the range, pieces."""
 
     end: float
@@ -137,7 +137,7 @@ class Effort(NamedTuple):
     max_pieces: int = 5000
 
 
-def certify_members(given: JointProblem, motion: Motion, box: ParameterBox, effort: Effort) -> TurnCertificate:
+def certify_members(given: JointProblem, motion: Motion, box: ParameterBox, effort: Stint) -> TurnCertificate:
     """Prove as `certify_in_space`, of a problem and a box of dimensions."""
     begin = perf_counter()
     try:
@@ -176,7 +176,7 @@ class _Work:
         self.likely: list[_Piece] = []
         self.evaluated = 0
 
-    def search(self, effort: Effort) -> tuple[list[_Piece], str]:
+    def search(self, effort: Stint) -> tuple[list[_Piece], str]:
         """Cut until every piece is decided, too narrow or of members of both kinds; say what stopped the work."""
         own = self.members
         count = int(np.clip(math.ceil(_FIRST * (own.high - own.low) / math.tau), _FEWEST, _FIRST))
