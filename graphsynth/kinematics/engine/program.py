@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from graphsynth.mechanism.joints import COLUMNS, Cam, Gear, JointGeometry, Prism
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.assur import Decomposition, decompose
+from graphsynth.structure.graph import MechanismGraph
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -113,12 +115,18 @@ def compile_program(mechanism: Mechanism, dimensions: Array | None = None) -> Pr
     if not isinstance(mechanism, Mechanism):
         raise GeometryError(f"{type(mechanism).__name__} is not a Mechanism; give one")
     try:
-        found = decompose(mechanism.graph, [driver.pair for driver in mechanism.drivers])
+        found = _decomposed(mechanism.graph, tuple(driver.pair for driver in mechanism.drivers))
     except GraphError as error:
         raise GeometryError(f"the mechanism cannot be simulated: {error}") from error
     sizes = mechanism.dimensions[None] if dimensions is None else dimensions
     check_largest(float(np.abs(sizes[..., _LENGTHS]).max(initial=0.0)))  # products of four lengths must be numbers
     return _Compiler(mechanism, found, sizes).program()
+
+
+@lru_cache(maxsize=512)
+def _decomposed(graph: MechanismGraph, drivers: tuple[tuple[int, int], ...]) -> Decomposition:
+    """Structural groups, kept: searches compile the same graph again and again."""
+    return decompose(graph, drivers)
 
 
 class _Compiler:
