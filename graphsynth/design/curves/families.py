@@ -71,14 +71,14 @@ def families(links: Sequence[int], sliders: int) -> list[Family]:
     seen: dict[str, Family] = {}
     for count in links:
         for graph in (inversion for chain in enumerate_chains(count) for inversion in chain.inversions()):
-            canonical = MechanismGraph.from_key(graph.key)
-            for coloured, family in _of(canonical, sliders if count <= _SLIDING else 0):
+            for coloured, family in of_graph(graph, sliders if count <= _SLIDING else 0):
                 seen.setdefault(coloured, family)
     return list(seen.values())
 
 
-def _of(graph: MechanismGraph, sliders: int) -> Iterator[tuple[str, Family]]:
-    """Families of an inversion, each with a key that isomorphic ones share."""
+def of_graph(graph: MechanismGraph, sliders: int) -> Iterator[tuple[str, Family]]:
+    """Yield the families of an inversion, each with a key that isomorphic ones share."""
+    graph = MechanismGraph.from_key(graph.key)
     pairs = [(a, b) for a, b, _ in graph.joints]
     for driver in (k for k, (a, _) in enumerate(pairs) if a == graph.frame):
         if find_fault(graph, [pairs[driver]]) is not None:
