@@ -51,7 +51,7 @@ def _loops(parts: Parts, link: int, place: Placement) -> list[list[Point]]:
     fine = _FINE * max(abs(b - a) for a, b in (shape.box for shape in parts.plan.outlines))
 
     def loop(shape: Rounded) -> list[Point]:
-        return [place(link, z) for z in shape.flat(fine)]
+        return [place(parts.plan.links[link], z) for z in shape.flat(fine)]
 
     return [loop(parts.plan.outlines[link]), *(loop(hole)[::-1] for hole in parts.plan.holes[link])]
 
@@ -63,7 +63,9 @@ def _together(parts: Parts, width: float) -> Sketch:
     for link, own in loops.items():
         layer = parts.layers[link]
         style = Style("link", 1.2, colour(layer), fill_opacity=1.0 if layer == 0 else 0.75)
-        sketch.shapes.append(Path(tuple(map(tuple, own)), style, closed=True, layer="bar", part=f"link-{link}"))
+        sketch.shapes.append(
+            Path(tuple(map(tuple, own)), style, closed=True, layer="bar", part=f"link-{parts.plan.label(link)}")
+        )
     return sketch
 
 
@@ -90,10 +92,12 @@ def _apart(parts: Parts, width: float) -> Sketch:
         for link, own in lifted.items():
             if parts.layers[link] == layer:
                 style = Style("link", 1.2, colour(layer))
-                sketch.shapes.append(Path(tuple(map(tuple, own)), style, closed=True, layer="bar", part=f"link-{link}"))
+                sketch.shapes.append(
+                    Path(tuple(map(tuple, own)), style, closed=True, layer="bar", part=f"link-{parts.plan.label(link)}")
+                )
     for link, own in lifted.items():
         rightmost = max(own[0], key=lambda z: z.real)
-        sketch.label(rightmost, str(link), 11 + 0j, size=13.0)
+        sketch.on(layer="label").label(rightmost, parts.plan.label(link), 11 + 0j, size=13.0)
     return sketch
 
 

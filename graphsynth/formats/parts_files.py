@@ -82,11 +82,11 @@ def write_parts(
         files.append(place / "cut.dxf")
     for link in range(len(parts.layers)):
         if "stl" in forms:
-            write(f"link-{link}.stl", link_stl(parts, link))
+            write(f"link-{parts.plan.label(link)}.stl", link_stl(parts, link))
         if "step" in forms:
-            with replacing(place / f"link-{link}.step") as fresh:
+            with replacing(place / f"link-{parts.plan.label(link)}.step") as fresh:
                 write_step(parts, link, fresh)
-            files.append(place / f"link-{link}.step")
+            files.append(place / f"link-{parts.plan.label(link)}.step")
     return files
 
 
@@ -151,9 +151,9 @@ def cut_svg(parts: Parts) -> str:
         path = " ".join(_path(shape, corner.imag) for shape in (outline, *holes))
         at = _label_place(outline, holes)
         lines.append(
-            f'<g id="link-{link}"><path d="{path}" fill="none" stroke="#ff0000" stroke-width="0.1"/>'
+            f'<g id="link-{parts.plan.label(link)}"><path d="{path}" fill="none" stroke="#ff0000" stroke-width="0.1"/>'
             f'<text x="{at.real:.3f}" y="{corner.imag - at.imag:.3f}" font-family="sans-serif" font-size="{size:.3g}" '
-            f'text-anchor="middle" dominant-baseline="central" fill="#0000ff">{link}</text></g>'
+            f'text-anchor="middle" dominant-baseline="central" fill="#0000ff">{parts.plan.label(link)}</text></g>'
         )
     wide, high = f"{corner.real:.3f}", f"{corner.imag:.3f}"
     return (
@@ -204,7 +204,7 @@ def cut_dxf(parts: Parts) -> Any:
                 space.add_lwpolyline(points, format="xyb", close=True, dxfattribs=look)
         at = _label_place(outline, holes)
         height = max(2.0, 0.6 * parts.sizes.pin)
-        text = space.add_text(str(link), height=height, dxfattribs={"layer": "NUMBERS"})
+        text = space.add_text(parts.plan.label(link), height=height, dxfattribs={"layer": "NUMBERS"})
         text.set_placement(
             (at.real, at.imag), align=need("ezdxf.enums", "dxf", "DXF").TextEntityAlignment.MIDDLE_CENTER
         )
@@ -242,7 +242,7 @@ def link_stl(parts: Parts, link: int) -> bytes:
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     rows = np.zeros(len(solid), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
     rows["normal"], rows["corners"] = normals, solid
-    head = f"graphsynth link {link}, millimetres".encode().ljust(80, b" ")
+    head = f"graphsynth link {parts.plan.label(link)}, millimetres".encode().ljust(80, b" ")
     return head + len(solid).to_bytes(4, "little") + rows.tobytes()
 
 
@@ -267,5 +267,5 @@ def write_step(parts: Parts, link: int, path: Path) -> None:
     for hole in parts.plan.holes[link]:
         sheet -= face(hole)
     solid = cad.extrude(sheet, amount=parts.sizes.thickness)
-    solid.label = f"link {link}"
+    solid.label = f"link {parts.plan.label(link)}"
     cad.export_step(solid, os.fspath(path))

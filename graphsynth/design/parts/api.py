@@ -13,7 +13,7 @@ from graphsynth.design.parts.collisions import Hazards
 from graphsynth.design.parts.gaps import Solid, Tube, proved_travel
 from graphsynth.design.parts.layers import least_layers
 from graphsynth.design.parts.outline import Rounded
-from graphsynth.design.parts.plan import PartSizes, PartsPlan, Travel, plan
+from graphsynth.design.parts.plan import PartSizes, PartsPlan, Travel, divided, plan
 from graphsynth.design.parts.result import Parts
 from graphsynth.kinematics.certify.poses import enclosures
 from graphsynth.kinematics.engine.result import Motion
@@ -76,16 +76,30 @@ def parts(
     own = plan(mechanism, given, unit, travel)
     if tube is not None and (short := _short_slot(motion, own, unit, travel, tube)):
         tube, reason = None, short
-    hazards = Hazards(own, mechanism.frame, reached, motion.inputs[motion.assembled])
+    at = motion.inputs[motion.assembled]
+    hazards = Hazards(own, mechanism.frame, reached, at)
+    layers = _stacked(hazards, tube)
+    if layers is None:  # one link of two sheets: those with the fewest layers are proved first
+        tried = [Hazards(other, mechanism.frame, reached, at) for other in divided(own, mechanism.frame)]
+        found = [(other, least) for other in tried if (least := least_layers(other.stacking())) is not None]
+        for other, _ in sorted(found, key=lambda one: (max(one[1]), one[0].length(one[1]))):
+            layers = _stacked(other, tube)
+            if layers is not None:
+                hazards = other
+                break
+        else:
+            raise GeometryError(f"no layers without a collision: {'; '.join(map(str, hazards.impossible()))}")
+    gap = min((hazards.known[pair].gap for pair in hazards.relied(layers)), default=math.inf)
+    collisions = tuple(map(hazards.collision, hazards.kept_apart))
+    return Parts(motion, unit, hazards.plan, layers, not reason, reason, gap, collisions, perf_counter() - begin)
+
+
+def _stacked(hazards: Hazards, tube: Tube | None) -> tuple[int, ...] | None:
+    """Return layers whose gaps are proved, if there is a tube to prove them in; None if there is no layering."""
     while True:
         layers = least_layers(hazards.stacking())
-        if layers is None:
-            raise GeometryError(f"no layers without a collision: {'; '.join(map(str, hazards.impossible()))}")
-        if tube is None or not hazards.refuted(layers, tube):
-            break
-    gap = min((hazards.known[pair].gap for pair in hazards.relied(layers)), default=math.inf)
-    found = tuple(map(hazards.collision, hazards.kept_apart))
-    return Parts(motion, unit, own, layers, not reason, reason, gap, found, perf_counter() - begin)
+        if layers is None or tube is None or not hazards.refuted(layers, tube):
+            return layers
 
 
 def _tube(motion: Motion, unit: float, max_boxes: int, seconds: float) -> tuple[Tube | None, str]:

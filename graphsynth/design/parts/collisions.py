@@ -35,13 +35,13 @@ class Collision(NamedTuple):
 
 
 class Hazards:
-    """The workspace of the search: bodies are the links, then the pins with their spacers."""
+    """The workspace of the search: bodies are the sheets, then the pins with their spacers."""
 
     def __init__(self, plan: PartsPlan, frame: int, poses: Array, inputs: Array) -> None:
-        self.plan, self.frame, self.links = plan, frame, len(plan.outlines)
-        self.bodies = [Solid(link, outline) for link, outline in enumerate(plan.outlines)]
+        self.plan, self.frame, self.sheets = plan, frame, len(plan.outlines)
+        self.bodies = [Solid(link, outline) for link, outline in zip(plan.links, plan.outlines)]
         self.bodies += [Solid(pin.link, Rounded((pin.at,), plan.sizes.spacer)) for pin in plan.pins]
-        self.jointed = {pair for pin in plan.pins for pair in combinations(pin.links, 2)}
+        self.jointed = {pair for pin in plan.pins for pair in combinations(pin.sheets, 2)}
         self.known: dict[Pair, Found] = {}
         for one, other in self._pairs():
             found = gaps(self.bodies[one], self.bodies[other], poses)
@@ -51,10 +51,10 @@ class Hazards:
 
     def _pairs(self) -> Iterator[Pair]:
         """Pairs that may meet in a layer: links, links and pins, pins."""
-        moving = [link for link in range(self.links) if link != self.frame]
+        moving = [link for link in range(self.sheets) if link != self.frame]
         yield from (pair for pair in combinations(moving, 2) if pair not in self.jointed)
-        pins = list(enumerate(self.plan.pins, self.links))
-        yield from ((link, p) for link in moving for p, pin in pins if link not in pin.links)
+        pins = list(enumerate(self.plan.pins, self.sheets))
+        yield from ((link, p) for link in moving for p, pin in pins if link not in pin.sheets)
         yield from ((p, q) for (p, _), (q, _) in combinations(pins, 2))
 
     @property
@@ -64,20 +64,28 @@ class Hazards:
 
     def stacking(self, pairs: Sequence[Pair] | None = None) -> Stacking:
         """Return what layers must obey, for all pairs kept apart or those given."""
-        n, apart = self.links, self.kept_apart if pairs is None else pairs
+        n, apart = self.sheets, self.kept_apart if pairs is None else pairs
         return Stacking(
             n,
             self.frame,
-            [pin.links for pin in self.plan.pins],
+            [pin.sheets for pin in self.plan.pins],
             sorted(self.jointed) + [(a, b) for a, b in apart if b < n],
             [(p - n, c) for c, p in apart if c < n <= p],
             [(p - n, q - n) for p, q in apart if p >= n],
         )
 
+    def length(self, layers: Sequence[int]) -> int:
+        """Return how many layers all pins together reach over."""
+        return sum(high - low for low, high in self._spans(layers))
+
+    def _spans(self, layers: Sequence[int]) -> list[tuple[int, int]]:
+        """Lowest and highest layer of every pin."""
+        return [(min(own), max(own)) for own in ([layers[k] for k in pin.sheets] for pin in self.plan.pins)]
+
     def relied(self, layers: Sequence[int]) -> list[Pair]:
         """Pairs that share a layer somewhere, so that their gap counts."""
-        n = self.links
-        spans = [(min(own), max(own)) for own in ([layers[k] for k in pin.links] for pin in self.plan.pins)]
+        n = self.sheets
+        spans = self._spans(layers)
 
         def meet(one: int, other: int) -> bool:
             if other < n:
@@ -107,13 +115,13 @@ class Hazards:
 
     def name(self, body: int) -> str:
         """Name a link or a pin."""
-        return f"link {body}" if body < self.links else self.plan.pins[body - self.links].title
+        return f"link {self.plan.label(body)}" if body < self.sheets else self.plan.pins[body - self.sheets].title
 
     def impossible(self) -> list[Collision]:
         """Return collisions that exclude every layering, none of which can be left out."""
         core = self.kept_apart
         for pair in list(core):
             rest = [other for other in core if other != pair]
-            if layered(self.stacking(rest), self.links - 1) is None:
+            if layered(self.stacking(rest), self.sheets - 1) is None:
                 core = rest
         return [self.collision(pair) for pair in core]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import combinations
 from typing import NamedTuple
@@ -101,9 +101,10 @@ class Sizes(NamedTuple):
 
 
 class Pin(NamedTuple):
-    """A pin: the links it goes through, the one that holds it, its place there, and what it is."""
+    """A pin: the sheets it goes through with its places, the link that holds it, its place there, and what it is."""
 
-    links: tuple[int, ...]
+    sheets: tuple[int, ...]
+    places: tuple[complex, ...]
     link: int
     at: complex
     kind: str  #: "pin", "shaft" of a motor, or "guide" in a slot
@@ -116,12 +117,21 @@ class Pin(NamedTuple):
 
 
 class PartsPlan(NamedTuple):
-    """Outlines and holes of every link, and pins; millimetres, in the frames of the links."""
+    """Outlines and holes of every sheet, and pins; millimetres, in the frames of the links.
 
+    Sheets have the numbers of their links; the second sheet of a link, if it has one, comes after all links.
+    """
+
+    links: tuple[int, ...]  #: of every sheet
     outlines: tuple[Rounded, ...]
     holes: tuple[tuple[Rounded, ...], ...]
     pins: tuple[Pin, ...]
     sizes: Sizes
+
+    def label(self, sheet: int) -> str:
+        """Return the number of its link, with "b" for a second sheet."""
+        link = self.links[sheet]
+        return str(link) if sheet == link else f"{link}b"
 
 
 #: Where ``at_b`` travels along the line of a joint, by its pair, millimetres.
@@ -153,7 +163,9 @@ def plan(mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel) ->
         holder = (
             driver.link if shaft and driver else mechanism.frame if mechanism.frame in places_of else min(places_of)
         )
-        pins.append(Pin(tuple(sorted(places_of)), holder, places_of[holder], "shaft" if shaft else "pin", name))
+        own = tuple(sorted(places_of))
+        there = tuple(places_of[link] for link in own)
+        pins.append(Pin(own, there, holder, places_of[holder], "shaft" if shaft else "pin", name))
         for link, at in places_of.items():
             places[link].append(at)
             holes[link].append((Rounded((at,), (sizes.pin if link == holder else sizes.hole) / 2.0), name))
@@ -168,7 +180,7 @@ def plan(mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel) ->
             way = cmath.exp(1j * joint.angle_b) * reach
             guides = [B - way, B + way]
         for at in guides:
-            pins.append(Pin(tuple(sorted((joint.a, joint.b))), joint.b, at, "guide", name))
+            pins.append(Pin((joint.a, joint.b), (A, at), joint.b, at, "guide", name))
             holes[joint.b].append((Rounded((at,), sizes.pin / 2.0), name))
         low, high = travel[joint.pair]
         reach += sizes.clearance
@@ -183,7 +195,47 @@ def plan(mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel) ->
     _check_holes(holes, sizes)
     radius = [sizes.boss * (_BOARD if link == mechanism.frame else 1.0) for link in links]
     outlines = tuple(Rounded.around(own, r) for own, r in zip(places, radius))
-    return PartsPlan(outlines, tuple(tuple(hole for hole, _ in own) for own in holes), tuple(pins), sizes)
+    return PartsPlan(tuple(links), outlines, tuple(tuple(hole for hole, _ in own) for own in holes), tuple(pins), sizes)
+
+
+def divided(whole: PartsPlan, frame: int) -> Iterator[PartsPlan]:
+    """Return the plans in which one link consists of two sheets, joined by a pin that both hold, as a crankshaft.
+
+    Such a link has three pins or more: one joins the sheets, the others are on one sheet each.
+    """
+    for link in range(len(whole.outlines)):
+        own = [k for k, pin in enumerate(whole.pins) if link in pin.sheets]
+        if link == frame or any(len(hole.hull) > 1 for hole in whole.holes[link]):
+            continue
+        if any(whole.pins[k].kind == "guide" for k in own):
+            continue
+        for joining in own:
+            _, *others = (k for k in own if k != joining)
+            if whole.pins[joining].kind == "shaft" and whole.pins[joining].link != link:
+                continue
+            for count in range(1, len(others) + 1):
+                yield from (_divided(whole, link, joining, moved) for moved in combinations(others, count))
+
+
+def _divided(whole: PartsPlan, link: int, joining: int, moved: Sequence[int]) -> PartsPlan:
+    """Return the plan with a second sheet for a link, which has some of its pins."""
+    sizes, second = whole.sizes, len(whole.outlines)
+    pins, holes = list(whole.pins), [list(own) for own in whole.holes]
+    pin = pins[joining]
+    at = pin.places[pin.sheets.index(link)]
+    away = {pins[k].places[pins[k].sheets.index(link)] for k in moved}
+    for k in moved:
+        pins[k] = pins[k]._replace(sheets=tuple(second if sheet == link else sheet for sheet in pins[k].sheets))
+    pins[joining] = pin._replace(sheets=(*pin.sheets, second), places=(*pin.places, at), link=link, at=at)
+    holes.append([hole for hole in holes[link] if hole.hull[0] in away or hole.hull[0] == at])
+    holes[link] = [hole for hole in holes[link] if hole.hull[0] not in away]
+    for sheet, place in zip(pins[joining].sheets, pins[joining].places):  # held by both sheets, loose in the others
+        radius = (sizes.pin if sheet in (link, second) else sizes.hole) / 2.0
+        holes[sheet] = [Rounded(h.hull, radius) if h.hull == (place,) else h for h in holes[sheet]]
+    outlines = list(whole.outlines)
+    outlines[link] = Rounded.around([hole.hull[0] for hole in holes[link]], sizes.boss)
+    outlines.append(Rounded.around([hole.hull[0] for hole in holes[second]], sizes.boss))
+    return PartsPlan((*whole.links, link), tuple(outlines), tuple(map(tuple, holes)), tuple(pins), sizes)
 
 
 def _meeting(mechanism: Mechanism, unit: float) -> list[tuple[dict[int, complex], str]]:

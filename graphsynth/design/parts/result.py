@@ -60,7 +60,8 @@ class Parts(Shown):
     plan : PartsPlan
         Outlines and holes of every link in its frame, pins, sizes.
     layers : tuple of int
-        Layer of every link; the frame is 0, below all others.
+        Layer of every link; the frame is 0, below all others.  Where a link consists of two sheets, the second one
+        comes after all links, see `PartsPlan.links`.
     certified : bool
         Over the whole motion parts of one layer are proved to stay at least the clearance apart; else this is
         estimated at the samples, see ``reason``.
@@ -96,16 +97,16 @@ class Parts(Shown):
         """Layers above the frame."""
         return max(self.layers)
 
-    def moments(self, link: int) -> Moments:
-        """Area, first moment and polar second moment of the sheet of a link without its holes; mm, closed form."""
-        found = self.plan.outlines[link].moments
-        for hole in self.plan.holes[link]:
+    def moments(self, sheet: int) -> Moments:
+        """Area, first moment and polar second moment of a sheet without its holes; mm, closed form."""
+        found = self.plan.outlines[sheet].moments
+        for hole in self.plan.holes[sheet]:
             found = found.less(hole.moments)
         return found
 
     def span(self, pin: int) -> tuple[int, int]:
         """Lowest and highest layer of a pin."""
-        own = [self.layers[link] for link in self.plan.pins[pin].links]
+        own = [self.layers[link] for link in self.plan.pins[pin].sheets]
         return min(own), max(own)
 
     def pin_length(self, pin: int) -> float:
@@ -115,21 +116,21 @@ class Parts(Shown):
 
     def spacers(self, pin: int) -> list[float]:
         """Lengths of the spacers on a pin, between links that are not in neighbouring layers."""
-        own = sorted(self.layers[link] for link in self.plan.pins[pin].links)
+        own = sorted(self.layers[link] for link in self.plan.pins[pin].sheets)
         return [(b - a - 1) * self.sizes.pitch - self.sizes.washer for a, b in pairwise(own) if b - a > 1]
 
     def washers(self, pin: int) -> int:
         """Count the washers on a pin: one between neighbouring layers, two at a spacer."""
-        return len(self.plan.pins[pin].links) - 1 + len(self.spacers(pin))
+        return len(self.plan.pins[pin].sheets) - 1 + len(self.spacers(pin))
 
     def bodies(self, density: float = PLYWOOD) -> dict[int, Body]:
         """Return mass (kg), moment of inertia (kg m^2) and centre (m) of every moving link with the pins it holds."""
         density = positive("density", density)
         found, sheet = {}, density * self.sizes.thickness * _MM
-        for link in range(len(self.layers)):
+        for link in range(self.motion.mechanism.graph.links):
             if link == self.motion.mechanism.frame:
                 continue
-            own = [_body(self.moments(link), sheet)]
+            own = [_body(self.moments(k), sheet) for k, whose in enumerate(self.plan.links) if whose == link]
             for k, pin in enumerate(self.plan.pins):
                 if pin.link == link and pin.kind != "shaft":
                     r = 0.5 * self.sizes.pin * _MM
@@ -150,10 +151,11 @@ class Parts(Shown):
             length, width = sides(self, link)
             area = self.moments(link).area
             name = "frame" if link == self.motion.mechanism.frame else "link"
+            name += f" {self.plan.label(link)}"
             t = self.sizes.thickness
             rows.append(
                 BillRow(
-                    f"{name} {link}",
+                    name,
                     1,
                     str(layer),
                     length,
@@ -207,7 +209,7 @@ class Parts(Shown):
 
     def _told(self) -> tuple[str, list[tuple[str, str]]]:
         by_layer = [
-            f"{k}: " + " ".join(str(link) for link, own in enumerate(self.layers) if own == k)
+            f"{k}: " + " ".join(self.plan.label(sheet) for sheet, own in enumerate(self.layers) if own == k)
             for k in range(self.count + 1)
         ]
         s = self.sizes
@@ -225,9 +227,12 @@ class Parts(Shown):
             ),
             ("mass", f"{sum(row.number * row.mass for row in self.bill):.3g} g of plywood and beech"),
         ]
+        for sheet in range(self.motion.mechanism.graph.links, len(self.layers)):
+            joined = ", ".join(pin.name for pin in self.plan.pins if {sheet, self.plan.links[sheet]} <= set(pin.sheets))
+            rows.insert(1, ("two sheets", f"link {self.plan.links[sheet]}, joined by the pin of joint {joined}"))
         if undecided:
             rows.append(("undecided", "; ".join(undecided)))
-        return f"Parts of {len(self.layers)} links in {self.count} layers above the frame", rows
+        return f"Parts of {self.motion.mechanism.graph.links} links in {self.count} layers above the frame", rows
 
     def _picture(self) -> str:
         return self.draw().svg

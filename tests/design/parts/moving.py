@@ -40,12 +40,16 @@ def sharing(made):
     """Pairs of parts that are in one layer somewhere, as (name, link, boundary): links, pins that pass through."""
     frame = made.motion.mechanism.frame
     for k in range(1, made.count + 1):
-        there = [(f"link {a}", a, shape, {a}) for a, shape in enumerate(made.plan.outlines) if made.layers[a] == k]
+        there = [
+            (f"link {a}", made.plan.links[a], shape, {a})
+            for a, shape in enumerate(made.plan.outlines)
+            if made.layers[a] == k
+        ]
         for n, pin in enumerate(made.plan.pins):
-            own = [made.layers[a] for a in pin.links]
+            own = [made.layers[a] for a in pin.sheets]
             if min(own) < k < max(own):
                 disc = type(made.plan.outlines[0])((pin.at,), made.sizes.spacer)
-                there.append((f"pin {n}", pin.link, disc, set(pin.links)))
+                there.append((f"pin {n}", pin.link, disc, set(pin.sheets)))
         for i, one in enumerate(there):
             for other in there[:i]:
                 if not one[3] & other[3] and frame not in (one[1] if one[0][0] == "l" else -1,):
