@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import graphsynth as gs
-from graphsynth.design import CurveIndex, burmester_curves, four_bars_for_poses
+from graphsynth.design import CurveIndex, PathLinkage, burmester_curves, four_bars_for_poses, four_bars_through
 from graphsynth.design.curves.fourier import coefficients, orders, unit
 from graphsynth.drawing.svg import number, painted, picture, words
 from graphsynth.jamming import Bearing
@@ -884,6 +884,54 @@ def curve_index() -> str:
     return board.svg("A wanted curve, thick, and the nearest three of 2000: the same wherever it lies")
 
 
+NINE_POINTS = [
+    (2.41, 2.79), (3.14, 2.62), (2.81, 2.25), (2.11, 1.86), (1.64, 1.49), (1.37, 1.2), (1.34, 1.27), (1.34, 1.66),
+    (1.46, 2.17),
+]  # fmt: skip
+
+
+def branches(linkage: PathLinkage) -> list[list[complex]]:
+    """Sample both branches of the path of a four-bar."""
+    O, Q, A, B = linkage.crank_pivot, linkage.rocker_pivot, linkage.crank_pin, linkage.rocker_pin
+    arm, shape = abs(B - A), (linkage.point - A) / (B - A)
+    found = []
+    for side in (1, -1):
+        found.append([])
+        for k in range(721):
+            pin = O + (A - O) * cmath.exp(2j * math.pi * k / 720)
+            reach = abs(Q - pin)
+            cosine = (arm**2 + reach**2 - abs(B - Q) ** 2) / (2 * arm * reach)
+            if abs(cosine) <= 1:
+                found[-1].append(pin + shape * arm * (Q - pin) / reach * cmath.exp(1j * side * math.acos(cosine)))
+    return found
+
+
+def nine_points() -> str:
+    """Draw nine points, the two four-bars that pass them on one branch and in order, and one that does not."""
+    found = four_bars_through(NINE_POINTS)
+    whole = found.without_defects
+    torn = min(
+        (one for one in found.linkages if one.turns_fully and not one.one_branch), key=lambda one: max(one.lengths)
+    )
+    board = Board(620, 430, 130 + 350j, 95.0)
+    for linkage, colour, dash in ((torn, "note", "5 5"), (whole[1], "b", ""), (whole[0], "a", "")):
+        paths = sorted(branches(linkage), key=lambda path: min(abs(z - complex(*NINE_POINTS[0])) for z in path))
+        for branch in paths if dash else paths[:1]:
+            board.curve(branch, colour=colour, width=1.4 if dash else 2, dash=dash)
+        joints = linkage.crank_pivot, linkage.crank_pin, linkage.rocker_pin, linkage.rocker_pivot
+        if not dash:
+            board.line(*joints, colour=colour, width=3)
+            board.line(joints[1], linkage.point, joints[2], colour=colour, width=1.6)
+            for pivot in joints[::3]:
+                board.ground(pivot)
+            for pin in joints[1:3]:
+                board.joint(pin)
+    for at in NINE_POINTS:
+        x, y = board.xy(complex(*at))
+        board.parts.append(f'<circle cx="{x}" cy="{y}" r="4.5" {painted("ink", "paper", 1)}/>')
+    return board.svg("Nine points, two four-bars that pass them in order, and the two branches of one that does not")
+
+
 DRAWINGS = {
     "theory-arcs": jam_arcs,
     "theory-bearing": tilted_bearing,
@@ -900,6 +948,7 @@ DRAWINGS = {
     "theory-krawczyk": krawczyk,
     "theory-rounding-test": rounding_test,
     "theory-levels": levels,
+    "theory-nine-points": nine_points,
     "theory-linkage": lambda_linkage,
     "theory-modes": modes,
     "theory-platform": platform,
