@@ -139,7 +139,12 @@ def main(arguments: list[str] | None = None) -> None:
     given = parser.parse_args(arguments)
     seed = (given.seed, given.pivots)
     if given.trace:
-        sys.stdout.write(f"{trace(shipped(given.pivots), seed, given.work)}\n")
+        found = trace(shipped(given.pivots), seed, given.work)
+        known = len(shipped(given.pivots).z) * (3 - given.pivots)
+        sys.stdout.write(
+            f"{found.bent} roots of bent points, {found.straight} of them of straight ones, of which {known} are known; "
+            f"their sum is linear to {found.defect:.1g} ({found.without:.1g} without one of them)\n"
+        )
         return
     start = grown(planted(given.pivots, np.random.default_rng(seed)), triples, seed, given.work)
     kept = dict(np.load(given.out)) if given.out.exists() else {}
