@@ -23,8 +23,8 @@ SETTINGS = ((1e-4, 1e-7, 1e-2, 1e-10), (1e-6, 1e-7, 1e-3, 1e-13))
 SAME = 1e-8
 #: How often other paths are tried for roots that are missing, at most: no more if one try adds nothing.
 _ROUNDS = 3
-#: Random detours for roots that are lost, relative; which part of the roots may be lost for another try.
-_DETOURS, _FEW = (3e-3, 1e-2, 3e-2) * 3, 0.1
+#: Random detours for roots that are lost, relative; how many may be lost for another try, or one in fifty.
+_DETOURS, _FEW = (3e-3, 1e-2, 3e-2) * 3, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ def candidates(task: Task, begin: Start, rng: np.random.Generator) -> tuple[Comp
         lost: Mask = np.asarray(~np.isfinite(z).all(axis=1))
         lost[repeated(z, pivots)] = True
         left = np.flatnonzero(lost)
-        if left.size == 0 or left.size > _FEW * len(z) or (detour and len(_whole(z, pivots)) >= len(z)):
+        if left.size == 0 or left.size > max(_FEW, len(z) // 50) or (detour and len(_whole(z, pivots)) >= len(z)):
             break
         at = Start(begin.end, np.stack(cognates(begin.z[left].T)[k], axis=1))
         if detour:
