@@ -894,15 +894,14 @@ def branches(linkage: PathLinkage) -> list[list[complex]]:
     """Sample both branches of the path of a four-bar."""
     O, Q, A, B = linkage.crank_pivot, linkage.rocker_pivot, linkage.crank_pin, linkage.rocker_pin
     arm, shape = abs(B - A), (linkage.point - A) / (B - A)
-    found = []
-    for side in (1, -1):
-        found.append([])
+    found: list[list[complex]] = [[], []]
+    for path, side in zip(found, (1, -1)):
         for k in range(721):
             pin = O + (A - O) * cmath.exp(2j * math.pi * k / 720)
             reach = abs(Q - pin)
             cosine = (arm**2 + reach**2 - abs(B - Q) ** 2) / (2 * arm * reach)
             if abs(cosine) <= 1:
-                found[-1].append(pin + shape * arm * (Q - pin) / reach * cmath.exp(1j * side * math.acos(cosine)))
+                path.append(pin + shape * arm * (Q - pin) / reach * cmath.exp(1j * side * math.acos(cosine)))
     return found
 
 

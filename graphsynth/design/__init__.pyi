@@ -20,6 +20,7 @@ from .poses.linkages import (
     PoseLinkages as PoseLinkages,
     four_bars_for_poses as four_bars_for_poses,
 )
+from .poses.six_bars import PoseSixBar as PoseSixBar, six_bars_for_poses as six_bars_for_poses
 from .task.answers import DesignedMechanism as DesignedMechanism
 from .task.search import Designs as Designs, design as design
 from .task.starts import index_starts as index_starts

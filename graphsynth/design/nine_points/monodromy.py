@@ -142,7 +142,7 @@ def main(arguments: list[str] | None = None) -> None:
         found = trace(shipped(given.pivots), seed, given.work)
         known = len(shipped(given.pivots).z) * (3 - given.pivots)
         sys.stdout.write(
-            f"{found.bent} roots of bent points, {found.straight} of them of straight ones, of which {known} are known; "
+            f"{found.bent} roots of bent points, {found.straight} of them of straight ones ({known} are known); "
             f"their sum is linear to {found.defect:.1g} ({found.without:.1g} without one of them)\n"
         )
         return
