@@ -132,5 +132,8 @@ def length_tolerances(context: Any, effort: Effort) -> Problem:
     lengths = [LengthTolerance(1, (0, 2), 0.01), LengthTolerance(2, (1, 3), 0.025)]
     run, counts = partial(certify_coupled, *given, tolerances=lengths), (100, 300) if effort.quick else (100, 300, 1000)
     rows = [_row("proof over all lengths", run, ("max_pieces", n), (height, 0.01, 0.01), effort) for n in counts]
+    run = partial(certify_in_space, *given, tolerances=lengths)
+    parts = (3e-2,) if effort.quick else (3e-2, 1e-2)
+    rows += [_row("exact closure", run, ("resolution", part), (height, 0.01, 0.01), effort) for part in parts]
     question = "Where one bearing binds, crank and coupler within 1 %: inputs left undecided though all members agree"
     return Problem("length-tolerances", question, "rad", tuple(rows))

@@ -102,6 +102,8 @@ class Bodies:
         Number of coordinates, and of those that are not given; given ones are last.
     slides : dict
         Column of the model to column here, for shifts and slides.
+    closing : list of int
+        Joints that cannot tilt and close a loop of such.
     """
 
     def __init__(self, model: SpaceModel, q: Array) -> None:
@@ -113,7 +115,7 @@ class Bodies:
         self.charts: list[int] = []
         self.turns: dict[int, int] = {}
         self.size = 0
-        self._closing: list[int] = []
+        self.closing: list[int] = []
         self._walked = walked(model, q, level=True)
         given = {int(model.column[k, TURN]): n for n, k in enumerate(k for k, j in enumerate(model.joints) if j.driven)}
         self._given = given
@@ -160,7 +162,7 @@ class Bodies:
                 used.add(k)
                 other, forward = (joint.b, True) if link == joint.a else (joint.a, False)
                 if self.of_link[other] >= 0:
-                    self._closing.append(k)
+                    self.closing.append(k)
                     continue
                 (A, _), (B, _) = self.seats[k]
                 before, after = (A, swapped(B)) if forward else (B, swapped(A))
@@ -198,7 +200,7 @@ class Bodies:
         for path in self.model.paths:
             terms += self._round(count, path)
             count += 1
-        for k in self._closing:
+        for k in self.closing:
             terms += self._same(count, k, _Z)
             count += 1
             if self.model.joints[k].driven:

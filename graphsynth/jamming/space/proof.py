@@ -51,7 +51,7 @@ def closings(closure: Closure, at: Array, rate: Array, given: Array) -> Mask:
     model, count = closure.model, len(at)
     eye = np.broadcast_to(np.eye(given.shape[1]), (count, given.shape[1], given.shape[1]))
     along = np.concatenate([rate, eye], 1)
-    still = _sides(np.abs(along), given)
+    still = sides(np.abs(along), given)
     if not closure.rows:
         return _within(model, at, still)
     loops = closure.loops(exact(at))
@@ -61,7 +61,7 @@ def closings(closure: Closure, at: Array, rate: Array, given: Array) -> Mask:
     own = Balls(*(part[each, :, basic].swapaxes(1, 2) for part in (J.mid, J.rad)))
     inverse = exact(np.linalg.pinv(np.where(fine[:, None, None], own.mid, 0.0)))
     start = times(inverse, value[..., None])[..., 0].size
-    start = start + _sides(times(inverse, times(J, exact(along))).size, given)
+    start = start + sides(times(inverse, times(J, exact(along))).size, given)
     rest = (exact(np.eye(len(closure.rows))) - times(inverse, own)).size
     reach = 2.0 * start + 1e-15
     proved, live = np.zeros(count, dtype=np.bool_), np.flatnonzero(fine)
@@ -77,12 +77,12 @@ def closings(closure: Closure, at: Array, rate: Array, given: Array) -> Mask:
         turned = times(H, exact(along[live][:, None]))
         # of the given coordinates alone, of both kinds, of the basic ones alone
         both = times(exact(along[live].swapaxes(1, 2)[:, None]), turned).size
-        bend = _sides(_sides(both, gamma[:, None]), gamma)
-        mixed = _sides(turned.size, gamma[:, None])[rows, :, columns].swapaxes(1, 2)
+        bend = sides(sides(both, gamma[:, None]), gamma)
+        mixed = sides(turned.size, gamma[:, None])[rows, :, columns].swapaxes(1, 2)
         square = H.size[rows[..., None], :, columns[:, :, None], columns[:, None, :]]
-        square = _sides(square.transpose(0, 3, 1, 2), reach[live][:, None])
-        bend = bend + 2.0 * _sides(mixed, reach[live]) + _sides(square, reach[live])
-        image = (start[live] + _sides(rest[live], reach[live]) + 0.5 * bend) * _UP
+        square = sides(square.transpose(0, 3, 1, 2), reach[live][:, None])
+        bend = bend + 2.0 * sides(mixed, reach[live]) + sides(square, reach[live])
+        image = (start[live] + sides(rest[live], reach[live]) + 0.5 * bend) * _UP
         inside = (image < reach[live]).all(1)
         proved[live[inside]] = (_identity(around) & _within(model, at[live], whole))[inside]
         reach[live] = np.maximum(1.5 * image, reach[live]) + 1e-300
@@ -90,7 +90,18 @@ def closings(closure: Closure, at: Array, rate: Array, given: Array) -> Mask:
     return proved
 
 
-def _sides(A: Array, x: Array) -> Array:
+def bend_of(H: Balls, along: Array, given: Array, basic: Ints, reach: Array) -> Array:
+    """Bound what second derivatives H (n, width, width) make over a box, twice, rounded up.
+
+    The given coordinates lead all by ``along`` (width, given); the ``basic`` unknowns are moved within ``reach``.
+    """
+    turned = times(H, exact(along[None]))
+    bend = sides(sides(times(exact(along.T[None]), turned).size, given), given)
+    bend = bend + 2.0 * sides(sides(turned.size[:, basic], given), reach)
+    return np.asarray(bend + sides(sides(H.size[:, basic[:, None], basic[None, :]], reach), reach))
+
+
+def sides(A: Array, x: Array) -> Array:
     """Products of nonnegative matrices (..., n, k) with vectors (..., k), rounded up."""
     return np.asarray((A @ x[..., None])[..., 0] * _UP)
 
@@ -107,14 +118,14 @@ def _basics(model: SpaceModel, at: Array, J: Array) -> tuple[Ints, Mask]:
         room[:, columns] = np.clip(left, 1e-12, 1.0)[:, None]
     basic, fine = np.zeros((len(at), J.shape[1]), dtype=np.intp), np.zeros(len(at), dtype=np.bool_)
     for k in range(len(at)):
-        found = _pivots(J[k, :, : model.size], room[k])
+        found = pivots(J[k, :, : model.size], room[k])
         fine[k] = len(found) == J.shape[1]
         if fine[k]:
             basic[k] = found
     return basic, fine
 
 
-def _pivots(J: Array, weight: Array) -> Ints:
+def pivots(J: Array, weight: Array) -> Ints:
     """Independent columns of a derivative, the largest by weight first."""
     _, upper, order = qr(J * weight, mode="economic", pivoting=True)
     diagonal = np.abs(np.diag(upper))
@@ -199,7 +210,7 @@ def contract(closure: Closure, box: Box) -> tuple[Box, NDArray[np.bool_]]:
     ball = box.ball
     weight = np.maximum(ball.rad[0], 1e-300)[: closure.model.size]
     J = closure.jacobian(closure.loops(exact(box.unknowns(exact(ball.mid[:1])).mid)))
-    basic = _pivots(J.mid[0][:, : closure.model.size], weight)
+    basic = pivots(J.mid[0][:, : closure.model.size], weight)
     for _ in range(_CONTRACTIONS):
         live = np.flatnonzero(~empty)
         before = (high - low)[live]

@@ -21,6 +21,7 @@ from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.pieces import check_range
 from graphsynth.jamming.joints.program import Bearings, JointProblem, problem
 from graphsynth.jamming.joints.search import limits_chosen
+from graphsynth.jamming.space.apart import closes_apart
 from graphsynth.jamming.space.members import MemberPoses, Members, Place, SpaceWitness, at_end, binding_member, slopes
 from graphsynth.jamming.space.model import MODEL, Unsupported
 from graphsynth.jamming.space.pose import REACHES, PoseProof, free_poses, rates, settle_pose
@@ -43,7 +44,9 @@ _BOXES = 300
 #: from which on a piece with members of both kinds is cut.
 _CUTS, _MOVED, _NEAR, _CLEAR = 12, 0.03, 1e-3, 0.3
 #: Factor of the linearised closure below which a piece is cut rather than solved for; pieces taken at once.
-_SURE, _CHUNK = 0.9999, 64
+_SURE, _CHUNK = 0.999, 64
+#: Worth of cutting a parameter from which on links are tried as bodies, which takes as long as thirty pieces.
+_WIDE = 1.0
 
 
 class _Piece(NamedTuple):
@@ -276,8 +279,18 @@ class _Work:
                 own = self.loose.poses(*(part[k : k + 1] for part in box))
                 other = settle_pose(self.loose.model, own.q[0], own.given[0], boxes, reaches)
                 proof, least = replace(proof, state=min(other.state, 0)), other.scale
-            pieces.append(_Piece(*span, proof, *self._worth(proof, least, poses.given[k])))
+            piece = _Piece(*span, proof, *self._worth(proof, least, poses.given[k]))
+            pieces.append(self._apart(piece, poses.given[k]))
         return pieces
+
+    def _apart(self, piece: _Piece, given: Array) -> _Piece:
+        """Try to prove a piece free with links as bodies, where many cuts of its dimensions would be needed."""
+        found = piece.proof.optimum
+        if piece.proof.state or found is None or not found.scale < 1.0 or not piece.worth[1:].max(initial=0.0) > _WIDE:
+            return piece
+        if not closes_apart(self.members.model, found.q, rates(self.members.floats, found.q), given):
+            return piece
+        return piece._replace(proof=PoseProof(1, found.scale, math.inf, "closes within all limits", found))
 
     def _free(self, poses: MemberPoses, end: float) -> dict[int, PoseProof]:
         """Prove which pieces are free, many at once, as far as the time goes."""

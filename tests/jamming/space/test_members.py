@@ -11,14 +11,19 @@ from test_turn import one_bearing
 
 from graphsynth import Mechanism, simulate
 from graphsynth.intervals.balls import exact
+from graphsynth.intervals.proving import points
 from graphsynth.jamming import Bearing, Verdict
 from graphsynth.jamming.joints import JointLimits, Misalignment, largest_scale as small_scale
 from graphsynth.jamming.joints.program import problem
 from graphsynth.jamming.space import certify_in_space, prove_pose
+from graphsynth.jamming.space.apart import closes_apart
 from graphsynth.jamming.space.binding import at
 from graphsynth.jamming.space.bodies import Bodies
 from graphsynth.jamming.space.closure import Closure
+from graphsynth.jamming.space.members import Members
 from graphsynth.jamming.space.model import in_space, start
+from graphsynth.jamming.space.optimum import some_closures
+from graphsynth.jamming.space.pose import rates
 from graphsynth.tolerances import EndFloat, FitClearance, HolePosition, LengthTolerance, ThermalExpansion, parameter_box
 
 FREE, JAMMED, SOME = Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED, Verdict.CERTIFIED_JAMMED_FOR_SOME
@@ -139,6 +144,21 @@ def test_random_members_are_as_the_box_is(alpha, verdict):
         p = np.where(rng.random(4) < 0.5, rng.choice([-1.0, 1.0], 4), rng.uniform(-1.0, 1.0, 4)) * box.high
         state = least(box.member(motion.mechanism, p), rng.uniform(1.5, 1.52), Bearing(), tilt)
         assert state == (1 if verdict is FREE else -1)
+
+
+@pytest.mark.parametrize(("slide", "room"), [(0.0, 0.03), (0.0, -1e-9), (0.02, 0.06), (0.02, -0.06)])
+def test_links_as_bodies_are_proved_free_up_to_the_worst_member_and_no_further(slide, room):
+    """One bearing with crank and coupler within 3 % at one input; a slide there takes off its part of the height."""
+    alpha, part, u = 0.05, 0.03, 1.2
+    height = (1.0 + part) * math.sin(alpha) * math.sin(u) - slide
+    limit = JointLimits(math.asin(height / (2.5 * (1.0 - part))) * (1.0 + room), slide)
+    parts = [LengthTolerance(1, (0, 2), part), LengthTolerance(2, (1, 3), 2.5 * part)]
+    motion = simulate(four_bar(), [u, u + 0.1])
+    given = problem(motion.mechanism, one_bearing(limit), Misalignment(0, 1, alpha))
+    members = Members(given, motion, parameter_box(motion.mechanism, parts))
+    poses = members.poses(points(np.array([u])), members.box.whole.reshape(1, -1))
+    q = some_closures(members.floats, poses.q).q[0]
+    assert closes_apart(members.model, q, rates(members.floats, q), poses.given[0]) == (room > 0.0)
 
 
 def test_no_tolerance_is_the_sharp_mechanism():

@@ -53,7 +53,7 @@ def test_the_scale_of_one_bearing_lies_between_its_bounds():
 def test_with_tolerances_the_scale_is_that_of_the_worst_and_of_the_best_member():
     """Crank and coupler within 1 %: the bearing tilts by asin(l2 sin(alpha) sin(u) / l3)."""
     parts = [LengthTolerance(1, (0, 2), 0.03), LengthTolerance(2, (1, 3), 0.02)]
-    found = largest_scale(moved(1.5, 1.6), one_bearing(), ALPHA, model="exact", tolerances=parts)
+    found = largest_scale(moved(1.5, 1.6), one_bearing(), ALPHA, model="exact", tolerances=parts, seconds=300.0)
     worst, best = (math.asin(math.sin(LIMIT) * (2.0 + side) / (3.0 - 1.5 * side)) / ALPHA for side in (-0.02, 0.02))
     assert found.low < worst < best < found.high and not math.isinf(found.high)
     assert found.low > worst * (1.0 - 2e-3) and found.high < best * (1.0 + 2e-3)
