@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 #: Samples of a dwell; inputs before and after a dead centre between which its speed is differentiated.
 _STILL, _NEAR = 13, 0.02
+#: Samples all over a curve that shall draw a closed path, and half the width of the band that holds it, over a side.
+_WHOLE, _BAND = 48, 0.2
 #: Steps of the times of a path after each step of its mechanism.
 _ROUNDS = 2
 
@@ -96,7 +98,10 @@ class PointAim(TimedAim):
         self.link, self.point = model.carrier(target.point), model.point_at(target.point)
         closed = isinstance(target, PathTarget) and target.closed
         self.wanted = Wanted(self.goal, self.turn, self.size, closed, free=False)
-        self.weight /= math.sqrt(len(self.goal))
+        self.whole = (
+            np.linspace(0.0, model.task.span, _WHOLE, endpoint=False) if closed and self.inputs is None else np.zeros(0)
+        )
+        self.weight /= math.sqrt(len(self.goal) + len(self.whole))
 
     def place(self, u: Unknowns) -> Complex:
         """Place of the point on its link, (sets, 1)."""
@@ -123,18 +128,30 @@ class PointAim(TimedAim):
             found[:, 0] = np.angle((w * np.exp(-1j * self.turn)).sum(axis=1))
         return found
 
+    def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
+        """Those of the points; of a closed path also some all over the curve."""
+        n = len(self.goal)
+        found = super().times(moved, u, None if before is None else before[:, :n])
+        return np.concatenate([found, np.tile(self.whole, (len(found), 1))], axis=1) if len(self.whole) else found
+
     def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
         """Real and imaginary parts of distances over the size, and angles."""
         own = frames[:, :, self.link]
         z, w = own[..., 0] + 1j * own[..., 1], own[..., 2] + 1j * own[..., 3]
         arm = w * self.place(u)
-        e = (z + arm - self.goal) / self.size
+        goal = np.broadcast_to(self.goal, (len(z), len(self.goal)))
+        if len(self.whole):  # no part of the curve may be elsewhere
+            goal = np.concatenate([goal, beside((z + arm)[:, len(self.goal) :], self.goal)], axis=1)
+        e = (z + arm - goal) / self.size
         sets, n = z.shape
         loads, direct = self.blank(sets, 2 + (self.turn is not None), n)
         loads[:, 0, self.link, 0] = loads[:, 1, self.link, 1] = 1.0 / self.size
         loads[:, 0, self.link, 2], loads[:, 1, self.link, 2] = -arm.imag / self.size, arm.real / self.size
         direct[:, 0, :, self.point], direct[:, 1, :, self.point] = w.real / self.size, w.imag / self.size
         direct[:, 0, :, self.point + 1], direct[:, 1, :, self.point + 1] = -w.imag / self.size, w.real / self.size
+        if len(self.whole):
+            inside = e == 0.0
+            loads, direct = loads * ~inside[:, None, None, None], direct * ~inside[:, None, :, None]
         values = [e.real, e.imag]
         if self.turn is not None:
             values.append(np.angle(w * np.exp(-1j * (self.turn + self.own(u, 0)))))
@@ -142,6 +159,21 @@ class PointAim(TimedAim):
             direct[:, 2, :, self.at] = -1.0
         free = self.inputs is None
         return Rows(times, np.stack(values, axis=1), loads, direct, self.weight, free, start=self.start)
+
+
+def beside(z: Complex, corners: Complex) -> Complex:
+    """Return points (any shape) themselves within a band about a closed polygon, else the nearest ones of the band.
+
+    The band is wider than the sagitta of a smooth curve through the corners.
+    """
+    side = np.roll(corners, -1) - corners
+    part = (np.conj(side) * (z[..., None] - corners)).real / np.maximum(np.abs(side) ** 2, 1e-300)
+    on = corners + np.clip(part, 0.0, 1.0) * side
+    away = np.maximum(np.abs(z[..., None] - on), 1e-300)
+    over = np.maximum(away - _BAND * np.abs(side), 0.0)
+    k = over.argmin(axis=-1)[..., None]
+    way = (z[..., None] - on) * over / away
+    return np.asarray(z - np.take_along_axis(way, k, axis=-1)[..., 0])
 
 
 class Measure:

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.shown import Shown
-from graphsynth.design.task.aims import TimedAim
+from graphsynth.design.task.aims import TimedAim, beside
 from graphsynth.design.task.plans import Plan
 from graphsynth.design.task.problem import TaskProblem
 from graphsynth.design.task.targets import DwellTarget, FunctionTarget, PathTarget, PosesTarget, SwingTarget, Target
 from graphsynth.design.task.task import DesignTask
+from graphsynth.jamming.questions import largest_scale
 from graphsynth.kinematics.dimensional.design import World
 from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, matched
 from graphsynth.kinematics.dimensional.problem import carried, own_frame
@@ -34,8 +35,12 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 #: Samples of a motion that is judged, slack of bounds, and the largest gap of a joint.
 _SAMPLES, _SLACK, _RESIDUAL = 720, 1e-6, 1e-9
+#: Relative difference of a length from that of a given bar.
+_FIT = 1e-3
 #: Samples of a motion that is certified, and boxes it may take.
 _PROVED, _BOXES = 181, 20_000
+#: Distance of the bounds of the margin of binding, and the time of its proof.
+_GAP, _SECONDS = 0.02, 5.0
 
 
 class Origin(NamedTuple):
@@ -112,6 +117,9 @@ class DesignedMechanism(Shown):
         Smallest transmission angle, radians.
     ratio : float
         Longest over shortest length.
+    jam_margin : float
+        Misalignment of the driver's axis at which the joints begin to bind, over the one of the task: a certified lower
+        bound for small tilts; NaN if the task names none, or another reason rejects the mechanism.
     score : float
         What it is ranked by; less is better.
     certificate : MotionCertificate or None
@@ -129,6 +137,7 @@ class DesignedMechanism(Shown):
     size: float
     transmission: float
     ratio: float
+    jam_margin: float
     score: float
     certificate: MotionCertificate | None
     carriers: Mapping[str, int]
@@ -181,14 +190,20 @@ def judged(task: DesignTask, found: Candidate) -> DesignedMechanism:
     for target, error in zip(task.targets, errors):
         name = type(target).__name__.removesuffix("Target").lower()
         wrong[f"the {name} is missed"] = wrong.get(f"the {name} is missed", False) or not error <= target.tolerance
+    margin = math.nan
+    if task.misalignment is not None and not any(wrong.values()):
+        scale = largest_scale(motion, task.joint_tilt, task.misalignment, relative_gap=_GAP, seconds=_SECONDS)
+        margin = scale.low
+        wrong["its joints bind at the misalignment"] = not margin >= 1.0
     reasons = tuple(reason for reason, is_so in wrong.items() if is_so)
     size = float(abs(complex(*np.ptp(places.reshape(-1, 2), axis=0)))) if done else math.inf
     worst = max(error / target.tolerance * target.weight for target, error in zip(task.targets, errors))
     links, weight = found.mechanism.graph.links, task.rank
     score = weight["error"] * worst + weight["links"] * links + weight["size"] * size / task.size
     score -= weight["transmission"] * (angle if done else 0.0)
+    score -= weight["jam"] * (min(margin, 4.0) if margin == margin else 0.0)
     return DesignedMechanism(
-        found.mechanism, motion, errors, not reasons, reasons, links, size, angle, ratio, score, None, carriers
+        found.mechanism, motion, errors, not reasons, reasons, links, size, angle, ratio, margin, score, None, carriers
     )
 
 
@@ -225,6 +240,12 @@ def _bounds(task: DesignTask, motion: Motion, places: Array) -> dict[str, bool]:
         broken["a length is out of its bounds"] = bool(
             min(lengths) < task.lengths[0] * (1 - _SLACK) or max(lengths) > task.lengths[1] * (1 + _SLACK)
         )
+    if task.bars:
+        lengths = _lengths(mechanism, moving=True)
+        for bar in task.bars:
+            k = min(range(len(lengths)), key=lambda k: abs(math.log(lengths[k] / bar)), default=-1)
+            fits = k >= 0 and abs(math.log(lengths.pop(k) / bar)) <= _FIT
+            broken["a given bar is not used"] = broken.get("a given bar is not used", False) or not fits
     if task.linear and task.stroke is not None:
         law = mechanism.drivers[0].law
         stroke = abs(law.rate) if isinstance(law, Linear) else math.nan
@@ -234,10 +255,12 @@ def _bounds(task: DesignTask, motion: Motion, places: Array) -> dict[str, bool]:
     return broken
 
 
-def _lengths(mechanism: Mechanism) -> list[float]:
-    """Distances of revolute joints on one link."""
+def _lengths(mechanism: Mechanism, moving: bool = False) -> list[float]:
+    """Distances of revolute joints on one link, the frame left out or not."""
     found = []
     for link in range(mechanism.graph.links):
+        if moving and link == mechanism.frame:
+            continue
         own = [j.at_a if j.a == link else j.at_b for j in mechanism.joints if link in j.pair and j.kind == "R"]
         found += [math.dist(p, q) for i, p in enumerate(own) for q in own[i + 1 :]]
     return found or [1.0]
@@ -297,6 +320,9 @@ def _point_error(task: DesignTask, target: PathTarget | PosesTarget, motion: Mot
         times = matched(own, Wanted(target.goal, turn, target.size, closed, free=False))
     at = at_times(own, times)[0][0]
     far = float(np.abs(at[:, 0] + 1j * at[:, 1] - target.goal).max()) / target.size
+    if isinstance(target, PathTarget) and target.closed and target.inputs is None:  # nor may the curve be elsewhere
+        z = own.frames[0, :, 0] + 1j * own.frames[0, :, 1]
+        far = max(far, float(np.abs(z - beside(z, target.goal)).max()) / target.size)
     if turn is None:
         return far
     rest = (at[:, 2] + 1j * at[:, 3]) * np.exp(-1j * turn)

@@ -99,6 +99,7 @@ class Model:
         design = plan.design
         self.joints, self.links = len(design.kinds), design.graph.links
         self.names = list(task.names)
+        self.fixed = {*design.joints_of(design.graph.frame or 0)}
         self.given = np.array([k for k, _ in plan.given], dtype=np.intp)
         tied = [] if plan.pins is None else [plan.pins[0]]
         self.free = np.setdiff1d(np.arange(self.joints), [*self.given, *tied])

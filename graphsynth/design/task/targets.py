@@ -103,7 +103,8 @@ class PathTarget(TimedTarget):
     ----------
     points : sequence of (x, y)
     closed : bool
-        Without inputs: the last point is followed by the first, and the path is the whole curve.
+        Without inputs: the last point is followed by the first, and the path is the whole curve, which nowhere leaves
+        its polygon by more than a fifth of a side.
     point : str
         Name of the point.
 

@@ -19,8 +19,9 @@ Drive = Literal["rotation", "rocking", "cylinder", "slide"]
 _SHORT, _LONG = 0.1, 6.0
 #: x and y of the lower left, then of the upper right corner.
 Box = tuple[float, float, float, float]
-#: What answers are ranked by, and how much each counts: errors in tolerances, links, size of the task, radians.
-RANKED = {"error": 1.0, "links": 0.05, "size": 0.02, "transmission": 0.1}
+#: What answers are ranked by, and how much each counts: errors in tolerances, links, size of the task, radians,
+#: the margin of binding (at most 4).
+RANKED = {"error": 1.0, "links": 0.05, "size": 0.02, "transmission": 0.1, "jam": 0.05}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -52,12 +53,16 @@ class DesignTask(Shown):
         the task.
     crank : float, optional
         Given length of the driven link.
+    bars : sequence of float
+        Lengths of bars that are there and shall be used: each is a distance of two joints on a moving link.
     length_ratio : float
         Longest over shortest of these distances; those of points from the joints of their link count as long ones.
     transmission : float or str
         Smallest transmission angle over the motion.
+    misalignment, joint_tilt : float or str, optional
+        Tilt of the driver's axis that must not make the joints bind, and that which every joint takes up (0.3 degrees).
     rank : mapping of str to float
-        What counts how much in the ranking, beside the defaults: "error", "links", "size", "transmission".
+        What counts how much in the ranking, beside the defaults: "error", "links", "size", "transmission", "jam".
 
     Examples
     --------
@@ -77,8 +82,11 @@ class DesignTask(Shown):
     box: Box | None = None
     lengths: tuple[float, float] | None = None
     crank: float | None = None
+    bars: Sequence[float] = ()
     length_ratio: float = 8.0
     transmission: float = math.radians(25.0)
+    misalignment: float | None = None
+    joint_tilt: float = math.radians(0.3)
     rank: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -113,6 +121,12 @@ class DesignTask(Shown):
             put(self, "lengths", (_SHORT * min(sizes), _LONG * max(sizes)))
         if self.crank is not None:
             positive("crank", self.crank)
+        put(self, "bars", tuple(positive(f"bars[{k}]", bar) for k, bar in enumerate(self.bars)))
+        for name in ("misalignment", "joint_tilt"):
+            if getattr(self, name) is not None:
+                put(self, name, positive(name, angle(name, getattr(self, name))))
+        if self.misalignment is not None and self.linear:
+            raise GeometryError("misalignment is that of an axis that is driven; a linear drive has none: leave it out")
         if finite("length_ratio", self.length_ratio) < 1.0:
             raise GeometryError(f"length_ratio = {self.length_ratio} must be 1 or more")
         put(self, "transmission", angle("transmission", self.transmission))

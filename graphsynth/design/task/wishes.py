@@ -115,6 +115,14 @@ def direct_wishes(model: Model, u: Unknowns, strict: float) -> tuple[Array, Arra
     if task.crank is not None and (k := _crank(model, sides)) >= 0:
         values.append(length[:, k] - math.log(task.crank))
         slopes.append(by[:, k])
+    used = np.zeros((sets, len(sides)), dtype=np.bool_)
+    used[:, [p in model.fixed and q in model.fixed for p, q in sides]] = True  # sides of the frame are no bars
+    for bar in task.bars:
+        away = np.where(used, np.inf, np.abs(length[:, : len(sides)] - math.log(bar)))
+        k = away.argmin(axis=1)
+        used[row, k] = True
+        values.append(np.where(np.isfinite(away[row, k]), length[row, k] - math.log(bar), 1.0))
+        slopes.append(by[row, k])
     if task.pivot_region is not None:
         frame = model.plan.design.graph.frame
         assert frame is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import GeometryError
@@ -14,10 +15,12 @@ if TYPE_CHECKING:
     from graphsynth.design.task.answers import DesignedMechanism
     from graphsynth.design.task.search import Designs, Progress
     from graphsynth.design.task.targets import Target
+    from graphsynth.drawing.plots import Line
     from graphsynth.drawing.shapes import Shape
     from graphsynth.pipeline.design.tables import DesignTable
 
-_FRAMES = 90
+#: Frames of a picture in motion; answers in one chart.
+_FRAMES, _CURVES = 90, 3
 _WIDE, _HIGH = 460.0, 400.0
 
 
@@ -57,6 +60,8 @@ def records(context: Context, designs: Designs) -> tuple[Record, ...]:
             Quantity.of_si("transmission angle", answer.transmission, "deg"),
             Quantity("length ratio", answer.ratio),
         )
+        if math.isfinite(answer.jam_margin):
+            margins = (*margins, Quantity("margin of binding", answer.jam_margin, "", "certified"))
         words = f"does the task, {proof}" if answer.accepted else "does not do the task"
         reason = "; ".join(answer.reasons)
         found.append(
@@ -120,7 +125,9 @@ def _caption(designs: Designs, answer: DesignedMechanism) -> str:
     errors = ", ".join(f"{name} {error:.2g}" for name, error in zip(_titles(designs), answer.errors))
     degrees = math.degrees(answer.transmission)
     motion = "certified" if answer.certified else "estimated"
-    return f"Errors: {errors}. Smallest transmission angle {degrees:.1f}°, size {answer.size:.3g}; motion {motion}."
+    links = ", ".join(f"{name}: link {link}" for name, link in answer.carriers.items())
+    figures = f"Smallest transmission angle {degrees:.1f}°, size {answer.size:.3g}; motion {motion}"
+    return f"Errors: {errors}. {figures}. {links[:1].upper()}{links[1:]}."
 
 
 def _drawn_targets(designs: Designs) -> tuple[Shape, ...]:
@@ -143,33 +150,31 @@ def _drawn_targets(designs: Designs) -> tuple[Shape, ...]:
 
 
 def curves(context: Context, designs: Designs) -> tuple[Picture, ...]:
-    """Draw targets and what the best answers make of them."""
+    """Draw what the best answers do over what is wanted: paths, or angles of links over the input."""
     import numpy as np
 
     from graphsynth.drawing.plots import Chart, Line
 
-    found = []
-    for name, target in zip(_titles(designs), designs.task.targets):
-        lines = [*_wanted(target)]
-        if not lines:
-            continue
-        point = str(getattr(target, "point", ""))
-        for k, answer in enumerate(designs.answers[:3]):
+    found, task = [], designs.task
+    unit = 1.0 if task.linear else math.degrees(1.0)
+    for name, target in zip(_titles(designs), task.targets):
+        lines, point = list(_wanted(target, unit)), str(getattr(target, "point", ""))
+        for k, answer in enumerate(designs.answers[:_CURVES]):
             if point:
                 x, y = answer.motion.point(point).position.T
             else:
                 link = answer.carriers[str(getattr(target, "link", ""))]
-                x, y = np.degrees(answer.motion.inputs), np.degrees(np.unwrap(answer.motion.poses[:, link, 2]))
+                x, y = unit * answer.motion.inputs, np.degrees(np.unwrap(answer.motion.poses[:, link, 2]))
                 y = y - y[0]
             lines.append(Line(x, y, f"place {k + 1}", "acd"[k]))
-        labels = ("x", "y") if point else ("input [°]", "output from its start [°]")
+        labels = ("x", "y") if point else ("part of the stroke" if task.linear else "input [°]", "output [°]")
         chart = Chart(lines, *labels, equal=bool(point), size=(5.4, 3.8))
-        found.append(Picture(f"Target and answers: {name}", chart.svg(), "The target in red; the answers over it."))
-    return tuple(found)
+        found.append(Picture(f"Target and answers: {name}", chart.svg(), "What is wanted dashed, the answers over it."))
+    return tuple(found) if designs.answers else ()
 
 
-def _wanted(target: Target) -> list:  # type: ignore[type-arg]
-    """Return the line of a target over its points, or over its inputs; none for strokes and dwells of free start."""
+def _wanted(target: Target, unit: float) -> Iterator[Line]:
+    """Yield the line of a target over its points, or over inputs in a unit; none for strokes and free starts."""
     import numpy as np
 
     from graphsynth.design.task.targets import FunctionTarget, PathTarget, PosesTarget
@@ -178,11 +183,10 @@ def _wanted(target: Target) -> list:  # type: ignore[type-arg]
     if isinstance(target, PathTarget | PosesTarget):
         z = target.goal
         z = np.append(z, z[0]) if isinstance(target, PathTarget) and target.closed else z
-        return [Line(z.real, z.imag, "target", "jam", "--")]
-    if isinstance(target, FunctionTarget) and not target.own_start and target.inputs is not None:
+        yield Line(z.real, z.imag, "target", "jam", "--")
+    elif isinstance(target, FunctionTarget) and not target.own_start and target.inputs is not None:
         outputs = np.degrees(np.array(target.outputs))
-        return [Line(np.degrees(np.array(target.inputs)), outputs - outputs[0], "target", "jam", "--")]
-    return []
+        yield Line(unit * np.array(target.inputs), outputs - outputs[0], "target", "jam", "--")
 
 
 def mechanisms(context: Context, designs: Designs) -> Columns:

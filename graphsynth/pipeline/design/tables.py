@@ -199,8 +199,11 @@ class DesignTable:
     box: Box | None = None
     lengths: tuple[float, float] | None = None
     crank: Annotated[float | None, In(above=0)] = None
+    bars: tuple[float, ...] = ()
     length_ratio: Annotated[float, In(least=1)] = 8.0
     transmission: Annotated[float, In("deg", least=0, below=90)] = 25.0 * DEGREE
+    misalignment: Annotated[float | None, In("deg", above=0)] = None
+    joint_tilt: Annotated[float, In("deg", above=0)] = 0.3 * DEGREE
     seconds: Annotated[float, In(above=0)] = 60.0
     answers: Annotated[int, In(least=1, most=100)] = 5
 
@@ -216,5 +219,6 @@ class DesignTable:
         tables: tuple[Any, ...] = (*self.paths, *self.poses, *self.functions, *self.dwells, *self.swings)
         targets: list[Target] = [table.target(turn) for table in tables]
         own = ("drive", "span", "stroke", "links", "sliders", "pivots", "pivot_region", "box", "lengths", "crank")
-        more: dict[str, Any] = {name: getattr(self, name) for name in (*own, "length_ratio", "transmission")}
+        wishes = ("bars", "length_ratio", "transmission", "misalignment", "joint_tilt")
+        more: dict[str, Any] = {name: getattr(self, name) for name in (*own, *wishes)}
         return DesignTask(targets=targets, **more)

@@ -260,3 +260,21 @@ def test_a_search_that_finds_nothing_says_only_that() -> None:
     assert not found.accepted and not found.impossible
     assert found.statement.startswith("no mechanism was found that does the task, which does not prove")
     assert found.rejected
+
+
+def test_given_bars_are_used_and_a_misalignment_is_forgiven() -> None:
+    """A stroke of 4 by a crank, a bar of 2 and one of 5; the margin of binding is that of the jamming room."""
+    path = PathTarget.segment((0, 0), (4, 0), count=12)
+    task = DesignTask(targets=[path], links=[4], bars=[2.0, 5.0], misalignment="0.1 deg")
+    found = design(task, count=1)
+    assert found.accepted, found
+    own = found[0].mechanism
+    lengths = [
+        math.dist(*((j.at_a if j.a == link else j.at_b) for j in own.joints if link in j.pair)) for link in (1, 2, 3)
+    ]
+    for bar in (2.0, 5.0):
+        assert min(abs(length / bar - 1.0) for length in lengths) < 1e-3
+    report = gs.assess_jamming(found[0].motion, tilt="0.1 deg", joints="0.3 deg", certify=False)
+    assert found[0].jam_margin == pytest.approx(report.smallest_scale, rel=0.05) and found[0].jam_margin >= 1.0
+    too_much = design(DesignTask(targets=[path], links=[4], bars=[2.0, 5.0], misalignment="20 deg"), count=1, seconds=4)
+    assert not too_much.accepted and too_much.rejected["its joints bind at the misalignment"]
