@@ -184,7 +184,8 @@ def _ways(closed: bool) -> list[tuple[bool, bool]]:
 def _correlation(products: AnyComplex, k: NDArray[np.int64], closed: bool) -> tuple[NDArray[Any], Array]:
     """Squared sums of products (sets, shifts) at some shifts, and these: a grid, or both ends of an open curve."""
     if not closed:
-        sums = np.stack([products.sum(axis=1), products @ (1.0 - 2.0 * (k % 2)).astype(products.real.dtype)], axis=1)
+        even, odd = (products[:, k % 2 == part].sum(axis=1) for part in (0, 1))
+        sums = np.stack([even + odd, even - odd], axis=1)
         return sums.real**2 + sums.imag**2, np.array([0.0, 0.5])
     grid = 4 * 2 ** math.ceil(math.log2(len(k) // 2 + 1))
     spread = np.zeros((len(products), grid), dtype=products.dtype)

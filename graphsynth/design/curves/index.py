@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 #: Mechanisms moved anew beyond those wanted; fewest positions of one; rows unpacked at once; no number is larger.
 _SPARE, _FEWEST, _BLOCK, _FAR = 5, 8, 1 << 16, 1e6
-#: Curves whose distance is computed, by default.
-CANDIDATES = 1000
+#: Closed curves whose distance is computed, by default; open ones over that.
+CANDIDATES, _OPEN = 1000, 8
 
 
 class CurveIndex:
@@ -147,7 +147,7 @@ class CurveIndex:
         only : callable, optional
             Says of a `Design` (graph, drivers, kinds of joints) whether its mechanisms may be found.
         candidates : int
-            Curves whose distance is computed: more miss fewer, see the theory.
+            Closed curves whose distance is computed: more miss fewer, see the theory; open ones eight times as many.
 
         Returns
         -------
@@ -213,7 +213,8 @@ class CurveIndex:
         self, wanted: Wanted, count: int, only: Callable[[Design], bool] | None, candidates: int
     ) -> list[CurveMatch]:
         count, candidates = whole("count", count, 1, 10**5), whole("candidates", candidates, 1, 10**7)
-        near = self._nearest(wanted, max(candidates, count + _SPARE), only)[: count + _SPARE]
+        most = max(candidates * (1 if wanted.closed else _OPEN), count + _SPARE)
+        near = self._nearest(wanted, most, only)[: count + _SPARE]
         found = [self._matched(int(number), wanted) for number in near]
         return sorted((match for match in found if match is not None), key=lambda match: match.error)[:count]
 
