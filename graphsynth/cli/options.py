@@ -124,6 +124,7 @@ _VERBS: dict[str, tuple[str, *tuple[Option, ...]]] = {
         _option("TASK", "name of a shipped scene of module 'design', or a TOML file", dest="scene"),
         _option("--out DIR", "report folder (default graphsynth-out/TASK)", Path),
         _option("--seconds S", "time limit of the search (default: as the task says)", float),
+        _option("--go-on", "begin with the mechanisms of the last report in DIR"),
         _option("--workers K", "worker processes (default: all cores)", workers),
     ),
     "accuracy": (

@@ -10,7 +10,7 @@ from dataclasses import replace
 from operator import le
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.core.errors import FormatError, GraphError, SceneError, SpecError, TooLargeError
+from graphsynth.core.errors import FormatError, GraphError, GraphsynthError, SceneError, SpecError, TooLargeError
 from graphsynth.pipeline.products import (
     Attempt,
     Candidate,
@@ -24,9 +24,10 @@ from graphsynth.pipeline.products import (
 )
 from graphsynth.pipeline.scene import StructureTable
 from graphsynth.pipeline.stages import Context
-from graphsynth.pipeline.tables import suggest
+from graphsynth.pipeline.tables import Place, suggest
 
 if TYPE_CHECKING:
+    from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
     from graphsynth.structure.system.assortment import LinkAssortment
     from graphsynth.structure.system.spec import StructuralSpec
@@ -132,6 +133,23 @@ def _read(context: Context, place: int, text: str) -> MechanismGraph:
         at = context.scene.place / "structure" / "graphs" / str(place)
         raise at.error(f"is neither a canonical key nor the text form of a graph: {error}") from error
     return graph
+
+
+def read_mechanism(context: Context, name: str, at: Place) -> tuple[Mechanism, bytes]:
+    """Read a file of a dimensioned mechanism, with its bytes; a `SceneError` at a place tells of one that is none."""
+    from graphsynth.core.textfiles import read_bytes
+    from graphsynth.mechanism.files import JSON_MAX
+    from graphsynth.mechanism.model import Mechanism
+
+    path = context.scene.folder / name
+    try:
+        data = read_bytes(path, JSON_MAX, "a mechanism", path.name)
+    except FormatError as error:
+        raise at.error(f"names {name!r}, which {str(error).removeprefix(f'{path.name}: ')}") from error
+    try:
+        return (Mechanism.from_json(data) if path.suffix == ".json" else Mechanism.from_toml(data)), data
+    except GraphsynthError as error:  # FormatError: no mechanism as text; others: one that nobody can build
+        raise at.error(f"names {name!r}, which is no mechanism: {error}") from error
 
 
 def assortment_text(graph: MechanismGraph) -> str:

@@ -49,6 +49,20 @@ def test_tables_make_the_targets_of_the_library() -> None:
     assert own.transmission == pytest.approx(math.pi / 6) and own.pivots == ((0.0, 0.0),)
 
 
+def test_a_link_slides_where_its_tolerance_is_a_length() -> None:
+    own = scene(
+        swings=[{"stroke": [2, 3], "within": 0.1, "link": "ram"}],
+        functions=[{"inputs": [0, 90], "places": [0, 4], "within": 0.2, "link": "valve"}],
+        dwells=[{"span": 30, "within": 0.3, "link": "ram"}],
+        sliders=2,
+    ).mechanism.task()
+    function, dwell, swing = own.targets
+    assert own.sliding == {"ram", "valve"}
+    assert isinstance(swing, SwingTarget) and (swing.least, swing.most, swing.tolerance) == (2, 3, 0.1)
+    assert isinstance(function, FunctionTarget) and function.outputs == (0, 4) and function.tolerance == 0.2
+    assert isinstance(dwell, DwellTarget) and dwell.slides and dwell.tolerance == 0.3
+
+
 def test_inputs_of_a_cylinder_are_parts_of_its_stroke() -> None:
     table = {"inputs": [0, 0.5, 1], "outputs_deg": [0, 20, 50]}
     own = scene(functions=[table], drive="cylinder", stroke=[0.5, 1]).mechanism.task()
@@ -93,6 +107,11 @@ products = ["tables"]
     mechanism = gs.Mechanism.from_toml(Path(told["answers"][0]["file"]).read_text("utf-8"))
     assert mechanism.graph.key == told["answers"][0]["key"]
     assert (tmp_path / "report" / "report.html").exists()
+    assert main(["design", str(tmp_path / "own.toml"), *options, "--go-on"]) == 0
+    assert json.loads(capsys.readouterr().out)["accepted"] == 1
+    (tmp_path / "report" / "mechanism-2.toml").write_text("no mechanism", "utf-8")
+    assert main(["design", str(tmp_path / "own.toml"), *options, "--go-on"]) == 2
+    assert "is no mechanism" in capsys.readouterr().err
     assert main(["design", "lambda"]) == 2 and "use graphsynth run" in capsys.readouterr().err
 
 
@@ -106,8 +125,11 @@ products = ["tables"]
         ({"paths": [SEGMENT], "links": [5]}, "even numbers"),
         ({"functions": [{"formula": "import os"}]}, "formula"),
         ({"functions": [{}]}, "either inputs"),
+        ({"functions": [{"inputs": [0, 1], "places": [0, 1]}]}, "not within"),
+        ({"swings": [{"stroke": [1, 2]}]}, "give both or none"),
         ({"poses": [{"points": [[0, 0]], "angles_deg": []}]}, "1 points and 0 angles"),
         ({"paths": [SEGMENT], "pivot": [0, 0]}, "did you mean 'pivots'"),
+        ({"paths": [SEGMENT], "begin": ["none.toml"]}, "begin"),
     ],
 )
 def test_mistakes_are_told_with_their_place(mechanism: dict[str, Any], words: str) -> None:

@@ -91,8 +91,13 @@ def _carriers(task: DesignTask, design: Design) -> Iterator[tuple[int, ...]]:
     near = {link for link in range(graph.links) if graph.neighbours[frame] >> link & 1}
     driven = {*design.drivers[0]} if task.drive == "cylinder" else {design.drivers[0][1]}
     free = [link for link in range(graph.links) if link != frame and link not in near | driven]
-    outputs = [link for link in sorted(near) if link not in driven]
-    yield from product(*(free if of_point else outputs for of_point in task.names.values()))
+    guided = {
+        link for k, pair in enumerate(graph.joints) if design.kinds[k] == "P" for link in pair[:2] if frame in pair[:2]
+    }
+    outputs = {
+        slides: [link for link in sorted(near - driven) if (link in guided) == slides] for slides in (True, False)
+    }
+    yield from product(*(free if of_point else outputs[name in task.sliding] for name, of_point in task.names.items()))
 
 
 def _given(task: DesignTask, design: Design) -> Iterator[tuple[tuple[int, Point], ...]]:

@@ -275,10 +275,13 @@ class FunctionTarget(TimedTarget):
         At the inputs, which must be given: radians or texts such as "30 deg"; lengths of a slider.
     link : str
         Name of the output link, which is jointed to the frame.
+    slides : bool
+        It slides on the frame: outputs and tolerance are lengths.
     """
 
     outputs: Sequence[float]
     link: str = "output"
+    slides: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -332,12 +335,14 @@ class DwellTarget(Target):
         How long: of the input.
     start : float or str, optional
         From where on; free by default.
-    link : str
+    link, slides
+        As of a function.
     """
 
     span: float
     start: float | None = None
     link: str = "output"
+    slides: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -366,13 +371,15 @@ class SwingTarget(Target):
         Limits of the stroke: radians or texts such as "30 deg", lengths of a slider.
     time_ratio : float, optional
         Time of the slow stroke over that of the quick one, at a constant speed of the driver (full rotation).
-    link : str
+    link, slides
+        As of a function.
     """
 
     least: float = 0.0
     most: float = math.inf
     time_ratio: float | None = None
     link: str = "output"
+    slides: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

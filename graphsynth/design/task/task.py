@@ -136,6 +136,13 @@ class DesignTask(Shown):
             choice("rank", name, tuple(RANKED))
             finite(f"rank[{name!r}]", value)
         put(self, "rank", {**RANKED, **self.rank})
+        for name in self.sliding:
+            if not all(
+                getattr(t, "slides", False) for t in targets if name == getattr(t, "link", getattr(t, "point", ""))
+            ):
+                raise GeometryError(f"link {name!r} slides for one target and turns for another; name two links")
+        if self.sliding and not self.sliders:
+            raise GeometryError("a link slides, but sliders = 0; allow one or more")
         for target in targets:
             last = (getattr(target, "inputs", None) or (0.0,))[-1]
             if last > span + 1e-9 and self.drive != "rotation":
@@ -163,6 +170,11 @@ class DesignTask(Shown):
             name = str(getattr(target, "point", "") or getattr(target, "link", ""))
             found[name] = found.get(name, False) or hasattr(target, "point")
         return found
+
+    @property
+    def sliding(self) -> set[str]:
+        """Names of the links that slide on the frame."""
+        return {str(getattr(target, "link", "")) for target in self.targets if getattr(target, "slides", False)}
 
     def _told(self) -> tuple[str, list[tuple[str, str]]]:
         rows = [(type(t).__name__, f"tolerance {t.tolerance:g}, weight {t.weight:g}") for t in self.targets]

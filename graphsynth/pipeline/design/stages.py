@@ -10,13 +10,16 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.pipeline.display import table
 from graphsynth.pipeline.products import Columns, Finding, Picture, Quantity, Record, Table, exact
 from graphsynth.pipeline.stages import Context
+from graphsynth.pipeline.steps import read_mechanism
 
 if TYPE_CHECKING:
     from graphsynth.design.task.answers import DesignedMechanism
     from graphsynth.design.task.search import Designs, Progress
     from graphsynth.design.task.targets import Target
+    from graphsynth.design.task.task import DesignTask
     from graphsynth.drawing.plots import Line
     from graphsynth.drawing.shapes import Shape
+    from graphsynth.mechanism.model import Mechanism
     from graphsynth.pipeline.design.tables import DesignTable
 
 #: Frames of a picture in motion; answers in one chart.
@@ -26,10 +29,17 @@ _WIDE, _HIGH = 460.0, 400.0
 
 def search(context: Context) -> Designs:
     """Find mechanisms for the task; a `SceneError` if it contradicts itself."""
+    from graphsynth.design.curves.index import CurveIndex
     from graphsynth.design.task.search import design
+    from graphsynth.design.task.starts import index_starts
 
     own: DesignTable = context.scene.mechanism
-    told = context.told
+    told, place = context.told, context.scene.place / "mechanism"
+    given = [read_mechanism(context, name, place / "begin" / str(k))[0] for k, name in enumerate(own.begin)]
+    index = index_starts(CurveIndex(context.scene.folder / own.index)) if own.index else None
+
+    def starts(task: DesignTask) -> list[Mechanism]:
+        return [*given, *(index(task) if index is not None else ())]
 
     def progress(p: Progress) -> None:
         if told is not None:
@@ -42,6 +52,7 @@ def search(context: Context) -> Designs:
             count=own.answers,
             seed=context.scene.scene.seed,
             executor=context.executor,
+            starts=starts,
             progress=progress,
         )
     except GeometryError as error:

@@ -111,29 +111,35 @@ class FunctionTable:
 
     inputs: tuple[float, ...] = ()
     outputs: Annotated[tuple[float, ...], In("deg")] = ()
+    places: tuple[float, ...] = ()
     formula: str = ""
     between: tuple[float, float] = (0.0, 1.0)
     input_range: float = 90.0
     output_range: Deg = 90.0 * DEGREE
+    place_range: float = 1.0
     own_start: bool = False
     link: str = "output"
+    within: Annotated[float | None, In(above=0)] = None
     tolerance: Deg = 0.5 * DEGREE
     weight: Annotated[float, In(above=0)] = 1.0
 
     def __post_init__(self) -> None:
-        table = bool(self.inputs or self.outputs)
-        require(table != bool(self.formula), "needs either inputs and outputs_deg or a formula")
+        table = bool(self.inputs or self.outputs or self.places)
+        require(table != bool(self.formula), "needs either inputs and outputs_deg (of a slider places) or a formula")
+        require(not self.places or self.within is not None, "has places but not within, their tolerance; give it")
 
     def target(self, turn: float) -> Target:
         """Return the target."""
         from graphsynth.design.task.formulas import formula
         from graphsynth.design.task.targets import FunctionTarget
 
-        more: dict[str, Any] = {"own_start": self.own_start, "link": self.link}
-        more |= {"tolerance": self.tolerance, "weight": self.weight}
+        more: dict[str, Any] = {"own_start": self.own_start, **_of_link(self)}
+        slides = more["slides"]
         if not self.formula:
-            return FunctionTarget(inputs=[turn * u for u in self.inputs], outputs=self.outputs, **more)
-        more |= {"input_range": turn * self.input_range, "output_range": self.output_range}
+            outputs = self.places if slides else self.outputs
+            return FunctionTarget(inputs=[turn * u for u in self.inputs], outputs=outputs, **more)
+        more |= {"input_range": turn * self.input_range}
+        more |= {"output_range": self.place_range if slides else self.output_range}
         return FunctionTarget.of(formula(self.formula), self.between, **more)
 
 
@@ -144,6 +150,7 @@ class DwellTable:
     span: float
     start: float | None = None
     link: str = "output"
+    within: Annotated[float | None, In(above=0)] = None
     tolerance: Deg = 0.5 * DEGREE
     weight: Annotated[float, In(above=0)] = 1.0
 
@@ -152,28 +159,41 @@ class DwellTable:
         from graphsynth.design.task.targets import DwellTarget
 
         start = None if self.start is None else turn * self.start
-        more = {"tolerance": self.tolerance, "weight": self.weight}
-        return DwellTarget(span=turn * self.span, start=start, link=self.link, **more)
+        return DwellTarget(span=turn * self.span, start=start, **_of_link(self))
 
 
 @dataclass(frozen=True, slots=True)
 class SwingTable:
-    """A link swings: limits of its stroke, time of the slow stroke over that of the quick one."""
+    """A link swings, or slides by a stroke: limits, time of the slow stroke over that of the quick one."""
 
     least: Deg = 0.0
     most: Annotated[float | None, In("deg", above=0)] = None
+    stroke: tuple[float, float] | None = None
     time_ratio: Annotated[float | None, In(least=1, most=20)] = None
     link: str = "output"
+    within: Annotated[float | None, In(above=0)] = None
     tolerance: Deg = 0.5 * DEGREE
     weight: Annotated[float, In(above=0)] = 1.0
+
+    def __post_init__(self) -> None:
+        sliding = (self.stroke is None) == (self.within is None)
+        require(sliding, "has a stroke, of a link that slides, or within, its tolerance, alone; give both or none")
 
     def target(self, turn: float) -> Target:
         """Return the target."""
         from graphsynth.design.task.targets import SwingTarget
 
-        most = math.inf if self.most is None else self.most
-        more = {"tolerance": self.tolerance, "weight": self.weight}
-        return SwingTarget(least=self.least, most=most, time_ratio=self.time_ratio, link=self.link, **more)
+        least, most = self.least, math.inf if self.most is None else self.most
+        if self.stroke is not None:
+            least, most = self.stroke
+        return SwingTarget(least=least, most=most, time_ratio=self.time_ratio, **_of_link(self))
+
+
+def _of_link(table: FunctionTable | DwellTable | SwingTable) -> dict[str, Any]:
+    """Return link, tolerance and weight; with ``within``, a tolerance of lengths, the link slides."""
+    slides = table.within is not None
+    tolerance = table.within if slides else table.tolerance
+    return {"link": table.link, "slides": slides, "tolerance": tolerance, "weight": table.weight}
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,6 +224,8 @@ class DesignTable:
     transmission: Annotated[float, In("deg", least=0, below=90)] = 25.0 * DEGREE
     misalignment: Annotated[float | None, In("deg", above=0)] = None
     joint_tilt: Annotated[float, In("deg", above=0)] = 0.3 * DEGREE
+    begin: tuple[str, ...] = ()  # files of mechanisms to begin with
+    index: str = ""  # folder of an index of curves to begin with
     seconds: Annotated[float, In(above=0)] = 60.0
     answers: Annotated[int, In(least=1, most=100)] = 5
 

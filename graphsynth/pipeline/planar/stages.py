@@ -6,9 +6,10 @@ import hashlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.core.errors import FormatError, GraphsynthError
+from graphsynth.core.errors import GraphsynthError
 from graphsynth.pipeline.planar.tables import (
     BearingsTable,
     EmbodyTable,
@@ -84,22 +85,11 @@ def take(context: Context) -> Iterator[Candidate | FileCandidate]:
 
 
 def _read(context: Context, place: int, name: str) -> FileCandidate:
-    from graphsynth.core.textfiles import read_bytes
-    from graphsynth.mechanism.files import JSON_MAX
-    from graphsynth.mechanism.model import Mechanism
+    from graphsynth.pipeline.steps import read_mechanism
 
-    at = context.scene.place / "mechanism" / "files" / str(place)
-    path = context.scene.folder / name
-    try:
-        data = read_bytes(path, JSON_MAX, "a mechanism", path.name)
-    except FormatError as error:
-        raise at.error(f"names {name!r}, which {str(error).removeprefix(f'{path.name}: ')}") from error
-    try:
-        mechanism = Mechanism.from_json(data) if path.suffix == ".json" else Mechanism.from_toml(data)
-    except GraphsynthError as error:  # FormatError: no mechanism as text; others: one that nobody can build
-        raise at.error(f"names {name!r}, which is no mechanism: {error}") from error
+    mechanism, data = read_mechanism(context, name, context.scene.place / "mechanism" / "files" / str(place))
     key = f"{mechanism.graph.key} {hashlib.sha256(data).hexdigest()[:12]}"
-    return FileCandidate(place + 1, path.stem, mechanism, key, f"file {path.stem}")
+    return FileCandidate(place + 1, Path(name).stem, mechanism, key, f"file {Path(name).stem}")
 
 
 def embody(context: Context, design: Candidate | FileCandidate) -> Built:

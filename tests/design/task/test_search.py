@@ -49,7 +49,9 @@ TASKS = {
         4,
     ),
     "function of a slider": (
-        DesignTask(targets=[FunctionTarget(inputs=even(5, 2.0), outputs=[0, 0.1, 0.3, 0.4, 0.5])], sliders=1),
+        DesignTask(
+            targets=[FunctionTarget(inputs=even(5, 2.0), outputs=[0, 0.1, 0.3, 0.4, 0.5], slides=True)], sliders=1
+        ),
         4,
     ),
     "stroke": (DesignTask(targets=[SwingTarget(least=3.0, most=3.1)]), 6),
@@ -211,6 +213,31 @@ def test_strokes_and_time_ratios_are_those_of_the_closed_form() -> None:
     apart = abs(corner(ground, far, swing) - corner(ground, near, swing))
     assert abs(stroke - math.radians(60)) < 0.02
     assert abs((math.pi + apart) / (math.pi - apart) - ratio) < 0.02
+
+
+def test_an_offset_slider_crank_has_its_stroke_and_time_ratio() -> None:
+    """Dead centres where crank and rod are in line: both in closed form, from the lengths of the answer."""
+    wanted = SwingTarget(least=2.0, most=2.0, time_ratio=1.3, link="ram", slides=True)
+    found = design(DesignTask(targets=[wanted], links=[4], sliders=1), count=1)
+    assert found.accepted, found
+    own = found[0].mechanism
+    assert own.joint(0, found[0].carriers["ram"]).kind == "P"
+    driven = own.drivers[0].link
+    (joint,) = [j for j in own.joints if driven in j.pair and 0 not in j.pair]
+    rod = next(link for link in joint.pair if link != driven)
+    if own.joint(0, driven).kind == "R" and own.joint(driven, rod).kind == "R":
+        motion = gs.simulate(own, np.linspace(0.0, math.tau, 3601))
+        pin = next(j for j in own.joints if rod in j.pair and driven not in j.pair)
+        z = motion.point(pin.a, pin.at_a).position @ [1.0, 1.0j]
+        A = complex(*own.joint(0, driven).at_a)
+        r = math.dist(*(j.at_a if j.a == driven else j.at_b for j in own.joints if driven in j.pair))
+        b = math.dist(*(j.at_a if j.a == rod else j.at_b for j in own.joints if rod in j.pair))
+        way = (z[np.abs(z - z[0]).argmax()] - z[0]) / np.abs(z - z[0]).max()
+        e = abs((np.conj(way) * (A - z[0])).imag)
+        stroke = math.sqrt((b + r) ** 2 - e**2) - math.sqrt((b - r) ** 2 - e**2)
+        apart = math.asin(e / (b - r)) - math.asin(e / (b + r))
+        assert abs(stroke - 2.0) < 0.02
+        assert abs((math.pi + apart) / (math.pi - apart) - 1.3) < 0.02
 
 
 def test_a_dwell_stands_still_while_the_crank_turns() -> None:

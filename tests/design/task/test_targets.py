@@ -82,6 +82,11 @@ def test_a_function_is_drawn_out_over_its_ranges() -> None:
         (lambda: PosesTarget(poses=[(0, 0, 0)]), "2 to 400 poses"),
         (lambda: DesignTask(targets=[]), "one or more targets"),
         (lambda: task(links=[5]), "even numbers"),
+        (lambda: DesignTask(targets=[SwingTarget(least=1, slides=True)]), "sliders = 0"),
+        (
+            lambda: DesignTask(targets=[SwingTarget(least=1, slides=True), DwellTarget(span=1)], sliders=1),
+            "slides for one target and turns for another",
+        ),
         (lambda: task(span=1.0), "rocking"),
         (lambda: task(pivots=[(0, 0), (0, 0)]), "pivots repeat"),
         (lambda: task(box=(0, 0, 0, 1)), "x0 < x1"),
