@@ -15,7 +15,14 @@ from pathlib import Path
 import numpy as np
 
 import graphsynth as gs
-from graphsynth.design import CurveIndex, PathLinkage, burmester_curves, four_bars_for_poses, four_bars_through
+from graphsynth.design import (
+    CurveIndex,
+    PathLinkage,
+    burmester_curves,
+    cognates,
+    four_bars_for_poses,
+    four_bars_through,
+)
 from graphsynth.design.curves.fourier import coefficients, orders, unit
 from graphsynth.drawing.svg import number, painted, picture, words
 from graphsynth.jamming import Bearing
@@ -931,11 +938,46 @@ def nine_points() -> str:
     return board.svg("Nine points, two four-bars that pass them in order, and the two branches of one that does not")
 
 
+STEPHENSON = {
+    (0, 2): (0, 0), (1, 2): (1, 1.2), (0, 3): (4, 0), (1, 3): (3.6, 2.3), (0, 4): (6.2, 0.4), (4, 5): (5.5, 2.7),
+    (1, 5): (2.4, 3.4),
+}  # fmt: skip
+
+
+def six_bar_cognates() -> str:
+    """Draw a Stephenson III six-bar, another one with the same curve, and the curve."""
+    parts = tuple(gs.Revolute(a, b, place, place) for (a, b), place in STEPHENSON.items())
+    graph = gs.MechanismGraph(6, list(STEPHENSON), frame=0)
+    given = gs.Mechanism(graph, parts, [gs.Driver(0, 2)], {"P": (5, (4.6, 4.4))}, [(0.0, 0.0, 0.0)] * 6)
+    other = next(one for one in cognates(given) if one.timed and one.turns[4:] == (5, 4) and one.turns[1] != 1)
+    board = Board(620, 400, 90 + 330j, 62.0)
+    curve: list[complex] = []
+    for side in (-1, 1):
+        path = given.simulate([0.02 * side * k for k in range(120)], events=False)
+        curve = [complex(x, y) for x, y in path.point("P").position[path.assembled]][::-1] + curve[::-1]
+    for mechanism, colour in ((given, "a"), (other.mechanism, "b")):
+        assert mechanism.pose is not None
+        at = {}
+        for joint in mechanism.joints:
+            x, y, angle = mechanism.pose[joint.a]
+            at[joint.pair] = complex(x, y) + cmath.exp(1j * angle) * complex(*joint.at_a)  # type: ignore[union-attr]
+        for link in range(1, 6):
+            corners = [z for pair, z in at.items() if link in pair] + [complex(4.6, 4.4)] * (link == 5)
+            board.line(*corners, colour=colour, width=3, fill=colour if len(corners) > 2 else "")
+        for pair, z in at.items():
+            (board.ground if 0 in pair else board.joint)(z)
+    board.curve(curve, width=2.5)
+    board.joint(complex(4.6, 4.4))
+    board.text(complex(4.75, 4.65), "P")
+    return board.svg("A Stephenson III six-bar and another one whose point P draws the same curve at the same angles")
+
+
 DRAWINGS = {
     "theory-arcs": jam_arcs,
     "theory-bearing": tilted_bearing,
     "theory-binding": binding,
     "theory-body": body,
+    "theory-cognates": six_bar_cognates,
     "theory-conventions": conventions,
     "theory-curve-index": curve_index,
     "theory-cuts": cuts,
