@@ -27,6 +27,7 @@ from graphsynth.design.curves.fourier import coefficients, orders, unit
 from graphsynth.drawing.svg import number, painted, picture, words
 from graphsynth.jamming import Bearing
 from graphsynth.mechanism.four_bar import TiltedFourBar
+from graphsynth.mechanism.model import TracePoint
 from graphsynth.systems.antenna.mechanism import PointingMechanism
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
@@ -948,7 +949,8 @@ def six_bar_cognates() -> str:
     """Draw a Stephenson III six-bar, another one with the same curve, and the curve."""
     parts = tuple(gs.Revolute(a, b, place, place) for (a, b), place in STEPHENSON.items())
     graph = gs.MechanismGraph(6, list(STEPHENSON), frame=0)
-    given = gs.Mechanism(graph, parts, [gs.Driver(0, 2)], {"P": (5, (4.6, 4.4))}, [(0.0, 0.0, 0.0)] * 6)
+    P = TracePoint(5, (4.6, 4.4))
+    given = gs.Mechanism(graph, parts, (gs.Driver(0, 2),), {"P": P}, ((0.0, 0.0, 0.0),) * 6)
     other = next(one for one in cognates(given) if one.timed and one.turns[4:] == (5, 4) and one.turns[1] != 1)
     board = Board(620, 400, 90 + 330j, 62.0)
     curve: list[complex] = []
@@ -960,14 +962,14 @@ def six_bar_cognates() -> str:
         at = {}
         for joint in mechanism.joints:
             x, y, angle = mechanism.pose[joint.a]
-            at[joint.pair] = complex(x, y) + cmath.exp(1j * angle) * complex(*joint.at_a)  # type: ignore[union-attr]
+            at[joint.pair] = complex(x, y) + cmath.exp(1j * angle) * complex(*joint.at_a)
         for link in range(1, 6):
-            corners = [z for pair, z in at.items() if link in pair] + [complex(4.6, 4.4)] * (link == 5)
+            corners = [z for pair, z in at.items() if link in pair] + [complex(*P.at)] * (link == 5)
             board.line(*corners, colour=colour, width=3, fill=colour if len(corners) > 2 else "")
         for pair, z in at.items():
             (board.ground if 0 in pair else board.joint)(z)
     board.curve(curve, width=2.5)
-    board.joint(complex(4.6, 4.4))
+    board.joint(complex(*P.at))
     board.text(complex(4.75, 4.65), "P")
     return board.svg("A Stephenson III six-bar and another one whose point P draws the same curve at the same angles")
 
