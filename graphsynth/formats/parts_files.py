@@ -23,6 +23,7 @@ from graphsynth.design.parts.result import Parts, turned
 _BETWEEN = 2.0
 #: Flat sides of a solid stay this near to its arcs, in millimetres.
 _DEVIATION = 0.01
+_HALF = 0.36  #: height of half a digit, in units of the size
 _WIDTH = 600.0  #: of the sheet
 #: What can be written.
 FORMS = ("svg", "dxf", "stl", "step", "csv")
@@ -109,7 +110,7 @@ def laid_out(parts: Parts) -> tuple[list[tuple[complex, complex]], complex]:
     wide = max([_WIDTH, *((high - low).real + 2.0 * between for _, (low, high) in boxes)])
     places: dict[int, tuple[complex, complex]] = {}
     x = y = between
-    row = 0.0
+    row = right = 0.0
     for link in sorted(range(len(boxes)), key=lambda k: -(boxes[k][1][1] - boxes[k][1][0]).imag):  # the tallest first
         turn, (low, high) = boxes[link]
         size = high - low
@@ -117,7 +118,8 @@ def laid_out(parts: Parts) -> tuple[list[tuple[complex, complex]], complex]:
             x, y, row = between, y + row + between, 0.0
         places[link] = turn, complex(x, y) - low
         x, row = x + size.real + between, max(row, size.imag)
-    return [places[link] for link in range(len(boxes))], complex(wide, y + row + between)
+        right = max(right, x)
+    return [places[link] for link in range(len(boxes))], complex(right, y + row + between)
 
 
 def _moved(shape: Rounded, turn: complex, shift: complex) -> Rounded:
@@ -152,8 +154,8 @@ def cut_svg(parts: Parts) -> str:
         at = _label_place(outline, holes)
         lines.append(
             f'<g id="link-{parts.plan.label(link)}"><path d="{path}" fill="none" stroke="#ff0000" stroke-width="0.1"/>'
-            f'<text x="{at.real:.3f}" y="{corner.imag - at.imag:.3f}" font-family="sans-serif" font-size="{size:.3g}" '
-            f'text-anchor="middle" dominant-baseline="central" fill="#0000ff">{parts.plan.label(link)}</text></g>'
+            f'<text x="{at.real:.3f}" y="{corner.imag - at.imag + _HALF * size:.3f}" font-family="sans-serif" '
+            f'font-size="{size:.3g}" text-anchor="middle" fill="#0000ff">{parts.plan.label(link)}</text></g>'
         )
     wide, high = f"{corner.real:.3f}", f"{corner.imag:.3f}"
     return (

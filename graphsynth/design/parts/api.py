@@ -10,14 +10,20 @@ import numpy as np
 from graphsynth.core.checks import positive
 from graphsynth.core.errors import GeometryError
 from graphsynth.design.parts.collisions import Hazards
-from graphsynth.design.parts.gaps import Solid, Tube, proved_travel
+from graphsynth.design.parts.gaps import Array, Solid, Tube, corners, proved_travel
 from graphsynth.design.parts.layers import least_layers
 from graphsynth.design.parts.outline import Rounded
 from graphsynth.design.parts.plan import PartSizes, PartsPlan, Travel, divided, plan
 from graphsynth.design.parts.result import Parts
-from graphsynth.kinematics.certify.poses import enclosures
+from graphsynth.kinematics.certify.poses import Enclosures, enclosures
 from graphsynth.kinematics.engine.result import Motion
+from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.joints import PinSlot, Prismatic
+
+#: Boxes wider than this (over Lc, radians) are made narrower by more samples, of which there are at most so many.
+_WIDE, _SAMPLES = 1e-4, 20_000
+#: Poses that differ by less than this, in their size, belong to the same assembly.
+_SAME = 1e-7
 
 
 def parts(
@@ -72,7 +78,8 @@ def parts(
         raise GeometryError(f"{len(reached)} poses of the motion are assembled; parts need a motion of two or more")
     tube, reason = _tube(motion, unit, max_boxes, seconds) if prove else (None, "no proof was asked for")
     given = PartSizes() if sizes is None else sizes
-    travel, mechanism = _travel(motion, unit), motion.mechanism
+    mechanism = motion.mechanism
+    travel = _travel(motion, unit, reached if tube is None else np.concatenate([reached, tube.poses()]))
     own = plan(mechanism, given, unit, travel)
     if tube is not None and (short := _short_slot(motion, own, unit, travel, tube)):
         tube, reason = None, short
@@ -106,6 +113,9 @@ def _tube(motion: Motion, unit: float, max_boxes: int, seconds: float) -> tuple[
     """Return proved poses over the whole motion in millimetres, or why there are none."""
     try:
         found = enclosures(motion, max_boxes=max_boxes, seconds=seconds)
+        finer = None if found.reason else _finer(motion, found)
+        if finer is not None and not (second := enclosures(finer, max_boxes=max_boxes, seconds=seconds)).reason:
+            found = second
     except GeometryError as error:
         return None, str(error)
     if found.reason:
@@ -114,28 +124,54 @@ def _tube(motion: Motion, unit: float, max_boxes: int, seconds: float) -> tuple[
     return Tube(found.u_mid, found.u_rad, *(array * lengths for array in (found.x, found.V, found.radius))), ""
 
 
-def _travel(motion: Motion, unit: float) -> dict[tuple[int, int], tuple[float, float]]:
-    """Return how far the pins in slots travel at the samples, in millimetres."""
+def _finer(motion: Motion, found: Enclosures) -> Motion | None:
+    """Return the motion with more samples where the boxes around its exact poses are wide; None if nowhere.
+
+    A box is as wide as the square of its range of inputs.  The finer motion begins at the same pose, and a proved
+    branch has only one continuation, so it is the same branch.
+    """
+    inputs, Lc = motion.inputs, motion.Lc
+    wide = (np.hypot(found.radius[:, :, 0], found.radius[:, :, 1]) / Lc + found.radius[:, :, 2]).max(axis=1)
+    pieces = np.ceil(np.sqrt(wide / _WIDE))
+    sense = 1.0 if inputs[-1] > inputs[0] else -1.0
+    if pieces.max() <= 1.0 or not (np.diff(inputs) * sense > 0.0).all() or pieces.sum() > _SAMPLES:
+        return None
+    owner = np.clip(np.searchsorted(inputs * sense, found.u_mid * sense) - 1, 0, len(inputs) - 2)
+    counts = np.bincount(owner, weights=pieces, minlength=len(inputs) - 1).astype(int)
+    runs = [np.linspace(a, b, max(n, 1) + 1)[:-1] for a, b, n in zip(inputs[:-1], inputs[1:], counts)]
+    finer = simulate(motion.mechanism, np.append(np.concatenate(runs), inputs[-1]), start=motion.poses[0], events=False)
+    same = np.abs(finer.poses[0] - motion.poses[0]).max() <= _SAME * (1.0 + np.abs(motion.poses[0]).max())
+    return finer if finer.completed and same else None
+
+
+def _slots(motion: Motion, unit: float) -> list[tuple[Prismatic | PinSlot, Solid, Solid]]:
+    """Return the joints with slots, the point that slides and the point on the line."""
+    return [
+        (joint, Solid(joint.b, _point(joint.at_b, unit)), Solid(joint.a, _point(joint.at_a, unit)))
+        for joint in motion.mechanism.joints
+        if isinstance(joint, Prismatic | PinSlot)
+    ]
+
+
+def _point(at: tuple[float, float], unit: float) -> Rounded:
+    return Rounded((complex(*at) * unit,), 0.0)
+
+
+def _travel(motion: Motion, unit: float, poses: Array) -> dict[tuple[int, int], tuple[float, float]]:
+    """Return how far the pins in slots travel at poses, in millimetres."""
     found = {}
-    for joint in motion.mechanism.joints:
-        if isinstance(joint, Prismatic | PinSlot):
-            ways = motion.point(joint.b, joint.at_b).position - motion.point(joint.a, joint.at_a).position
-            turn = np.exp(-1j * (motion.poses[:, joint.a, 2] + joint.angle_a))
-            s = ((ways @ [1.0, 1.0j]) * turn).real[motion.assembled] * unit
-            found[joint.pair] = (float(s.min()), float(s.max()))
+    for joint, guide, line in _slots(motion, unit):
+        ways = (corners(guide, poses) - corners(line, poses))[:, 0]
+        s = (ways * np.exp(-1j * (poses[:, joint.a, 2] + joint.angle_a))).real
+        found[joint.pair] = (float(s.min()), float(s.max()))
     return found
 
 
 def _short_slot(motion: Motion, own: PartsPlan, unit: float, travel: Travel, tube: Tube) -> str:
     """Return which slot is not proved long enough over the whole motion; empty if all are."""
-    for joint in motion.mechanism.joints:
-        if isinstance(joint, Prismatic | PinSlot):
-            low, high = travel[joint.pair]
-            guide, line = (
-                Solid(k, Rounded((complex(*at) * unit,), 0.0))
-                for k, at in ((joint.b, joint.at_b), (joint.a, joint.at_a))
-            )
-            room = own.sizes.clearance
-            if not proved_travel(guide, line, joint.angle_a, tube, (low - room, high + room)):
-                return f"the slot of joint {joint.a}-{joint.b} is not proved long enough between the samples"
+    for joint, guide, line in _slots(motion, unit):
+        low, high = travel[joint.pair]
+        room = own.sizes.clearance
+        if not proved_travel(guide, line, joint.angle_a, tube, (low - room, high + room)):
+            return f"the slot of joint {joint.a}-{joint.b} is not proved long enough between the samples"
     return ""

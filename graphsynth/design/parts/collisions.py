@@ -54,7 +54,7 @@ class Hazards:
         moving = [link for link in range(self.sheets) if link != self.frame]
         yield from (pair for pair in combinations(moving, 2) if pair not in self.jointed)
         pins = list(enumerate(self.plan.pins, self.sheets))
-        yield from ((link, p) for link in moving for p, pin in pins if link not in pin.sheets)
+        yield from ((link, p) for link in moving for p, pin in pins if link not in (*pin.sheets, *pin.passes))
         yield from ((p, q) for (p, _), (q, _) in combinations(pins, 2))
 
     @property
@@ -122,6 +122,6 @@ class Hazards:
         core = self.kept_apart
         for pair in list(core):
             rest = [other for other in core if other != pair]
-            if layered(self.stacking(rest), self.sheets - 1) is None:
+            if layered(self.stacking(rest), self.sheets - 1, shortest=False) is None:
                 core = rest
         return [self.collision(pair) for pair in core]

@@ -47,6 +47,11 @@ class Tube:
     V: Array
     radius: Array
 
+    def poses(self, count: int = 5) -> Array:
+        """Return so many poses of each box, those of its centre along the inputs."""
+        steps = np.linspace(-1.0, 1.0, count)[:, None] * self.u_rad
+        return np.asarray(self.x + self.V * steps[:, :, None, None]).reshape(-1, *self.x.shape[1:])
+
 
 class Found(NamedTuple):
     """What is known about two bodies: ``status`` "free", "hit" or "undecided", a gap, and the input it belongs to."""

@@ -48,6 +48,8 @@ class Stacking:
 def least_layers(stacking: Stacking) -> tuple[int, ...] | None:
     """Layer of every link, with the least number of layers above the frame; None if no layering is possible."""
     most = stacking.links - 1  # only the order of links counts, so more layers do not help
+    if layered(stacking, most, shortest=False) is None:
+        return None
     for count in range(1, most + 1):
         found = layered(stacking, count)
         if found is not None:
@@ -55,8 +57,8 @@ def least_layers(stacking: Stacking) -> tuple[int, ...] | None:
     return None
 
 
-def layered(stacking: Stacking, count: int) -> tuple[int, ...] | None:
-    """Return a layering with ``count`` layers above the frame and the shortest pins."""
+def layered(stacking: Stacking, count: int, *, shortest: bool = True) -> tuple[int, ...] | None:
+    """Return a layering with ``count`` layers above the frame, with the shortest pins or any."""
     from scipy.optimize import Bounds, LinearConstraint, milp
     from scipy.sparse import csr_matrix
 
@@ -77,7 +79,7 @@ def layered(stacking: Stacking, count: int) -> tuple[int, ...] | None:
         )
         upper[own] = 0.0
     answer = milp(
-        np.concatenate([np.zeros(cells), np.ones(pins)]),
+        np.concatenate([np.zeros(cells), np.full(pins, float(shortest))]),
         integrality=np.concatenate([np.ones(cells), np.zeros(pins)]),
         bounds=Bounds(0.0, upper),
         constraints=[LinearConstraint(matrix, -np.inf, [b for _, b in rows]), LinearConstraint(placed, 1.0, 1.0)],

@@ -24,6 +24,8 @@ from graphsynth.mechanism.model import Mechanism
 _SAME = 1e-9
 #: A pin by default: this part of the largest link, at most that part of the shortest way between two holes.
 _OF_LARGEST, _OF_SHORTEST = 40.0, 4.0
+#: Pins by default are made smaller by these factors until the holes fit.
+_SMALLER = (1.0, 0.8, 0.64, 0.5, 0.4, 0.32, 0.25)
 #: The board of the frame reaches this many walls and bosses beyond its holes.
 _BOARD = 2.0
 
@@ -109,6 +111,7 @@ class Pin(NamedTuple):
     at: complex
     kind: str  #: "pin", "shaft" of a motor, or "guide" in a slot
     name: str
+    passes: tuple[int, ...] = ()  #: sheets in whose slot it moves, without a spacer
 
     @property
     def title(self) -> str:
@@ -139,7 +142,23 @@ Travel = Mapping[tuple[int, int], tuple[float, float]]
 
 
 def plan(mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel) -> PartsPlan:
-    """Return outlines, holes and pins of a mechanism with revolute and prismatic joints and pins in slots."""
+    """Return outlines, holes and pins of a mechanism with revolute and prismatic joints and pins in slots.
+
+    If the pin is not given, it is made smaller where holes would be too near to each other.
+    """
+    told = ""
+    for smaller in _SMALLER if given.pin is None else _SMALLER[:1]:
+        found, near = _planned(mechanism, given, unit, travel, smaller)
+        if not near:
+            return found
+        told = told or near
+    raise GeometryError(f"{told}; make the pin or the wall smaller, or the unit larger")
+
+
+def _planned(
+    mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel, smaller: float
+) -> tuple[PartsPlan, str]:
+    """Return the plan with the pin made smaller, and which holes are too near to each other."""
     for joint in mechanism.joints:
         if not isinstance(joint, Revolute | Prismatic | PinSlot):
             raise GeometryError(
@@ -148,11 +167,12 @@ def plan(mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel) ->
             )
     meeting = _meeting(mechanism, unit)
     traced = [(link, complex(*at) * unit) for link, at in mechanism.points.values() if link != mechanism.frame]
-    sizes = given.filled(*_ways(mechanism, meeting, traced, unit))
+    largest, shortest = _ways(mechanism, meeting, traced, unit)
+    sizes = given.filled(largest * smaller, shortest * smaller)
     links = range(mechanism.graph.links)
     places: list[list[complex]] = [[] for _ in links]
     holes: list[list[tuple[Rounded, str]]] = [[] for _ in links]
-    pins = []
+    pins: list[Pin] = []
     for places_of, name in meeting:
         driver = next((d for d in mechanism.drivers if {d.base, d.link} <= set(places_of)), None)
         shaft = (
@@ -179,6 +199,9 @@ def plan(mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel) ->
             reach = 2.0 * sizes.boss
             way = cmath.exp(1j * joint.angle_b) * reach
             guides = [B - way, B + way]
+        for k, pin in enumerate(pins):  # what is jointed to the slider in its middle may reach through the slot
+            if pin.kind != "guide" and joint.b in pin.sheets and _near(pin.places[pin.sheets.index(joint.b)], B):
+                pins[k] = pin._replace(passes=(*pin.passes, joint.a))
         for at in guides:
             pins.append(Pin((joint.a, joint.b), (A, at), joint.b, at, "guide", name))
             holes[joint.b].append((Rounded((at,), sizes.pin / 2.0), name))
@@ -192,10 +215,10 @@ def plan(mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel) ->
         if all(abs(at - own) > _SAME * abs(at) for own in places[link]):
             places[link].append(at)
             holes[link].append((Rounded((at,), sizes.pin / 2.0), "point"))
-    _check_holes(holes, sizes)
     radius = [sizes.boss * (_BOARD if link == mechanism.frame else 1.0) for link in links]
     outlines = tuple(Rounded.around(own, r) for own, r in zip(places, radius))
-    return PartsPlan(tuple(links), outlines, tuple(tuple(hole for hole, _ in own) for own in holes), tuple(pins), sizes)
+    shapes = tuple(tuple(hole for hole, _ in own) for own in holes)
+    return PartsPlan(tuple(links), outlines, shapes, tuple(pins), sizes), _near_holes(holes, sizes)
 
 
 def divided(whole: PartsPlan, frame: int) -> Iterator[PartsPlan]:
@@ -278,8 +301,8 @@ def _ways(
     return max(ways), min(ways)
 
 
-def _check_holes(holes: Sequence[Sequence[tuple[Rounded, str]]], sizes: Sizes) -> None:
-    """Refuse holes of a link that leave too little between them: washers must not touch, nor slots cut other holes."""
+def _near_holes(holes: Sequence[Sequence[tuple[Rounded, str]]], sizes: Sizes) -> str:
+    """Name holes of a link that leave too little between them: washers must not touch, nor slots cut other holes."""
     from graphsynth.design.parts.gaps import apart
 
     for link, own in enumerate(holes):
@@ -288,10 +311,9 @@ def _check_holes(holes: Sequence[Sequence[tuple[Rounded, str]]], sizes: Sizes) -
             need = sizes.wall / 2.0 + one.radius + other.radius if slot else 2.0 * sizes.spacer
             found = apart(one.hull, other.hull)
             if found < need * (1.0 - _SAME):
-                raise GeometryError(
-                    f"holes of joints {name} and {second} in link {link} are {found:.3g} mm apart, and need {need:.3g}"
-                    "; make the pin or the wall smaller, or the unit larger"
-                )
+                names = f"holes of joints {name} and {second} in link {link}"
+                return f"{names} are {found:.3g} mm apart, and need {need:.3g}"
+    return ""
 
 
 def _two_digits(value: float, digits: int = 2) -> float:

@@ -115,13 +115,18 @@ class Parts(Shown):
         return (high - low) * self.sizes.pitch + self.sizes.thickness
 
     def spacers(self, pin: int) -> list[float]:
-        """Lengths of the spacers on a pin, between links that are not in neighbouring layers."""
-        own = sorted(self.layers[link] for link in self.plan.pins[pin].sheets)
-        return [(b - a - 1) * self.sizes.pitch - self.sizes.washer for a, b in pairwise(own) if b - a > 1]
+        """Lengths of the spacers on a pin, between sheets that are not in neighbouring layers."""
+        return [(b - a - 1) * self.sizes.pitch - self.sizes.washer for a, b in pairwise(self._stops(pin)) if b - a > 1]
 
     def washers(self, pin: int) -> int:
         """Count the washers on a pin: one between neighbouring layers, two at a spacer."""
-        return len(self.plan.pins[pin].sheets) - 1 + len(self.spacers(pin))
+        return len(self._stops(pin)) - 1 + len(self.spacers(pin))
+
+    def _stops(self, pin: int) -> list[int]:
+        """Layers of the sheets on a pin, and of those in whose slot it moves."""
+        own, (low, high) = self.plan.pins[pin], self.span(pin)
+        passed = [self.layers[sheet] for sheet in own.passes if low < self.layers[sheet] < high]
+        return sorted([self.layers[sheet] for sheet in own.sheets] + passed)
 
     def bodies(self, density: float = PLYWOOD) -> dict[int, Body]:
         """Return mass (kg), moment of inertia (kg m^2) and centre (m) of every moving link with the pins it holds."""

@@ -49,7 +49,7 @@ def sharing(made):
             own = [made.layers[a] for a in pin.sheets]
             if min(own) < k < max(own):
                 disc = type(made.plan.outlines[0])((pin.at,), made.sizes.spacer)
-                there.append((f"pin {n}", pin.link, disc, set(pin.sheets)))
+                there.append((f"pin {n}", pin.link, disc, {*pin.sheets, *pin.passes}))
         for i, one in enumerate(there):
             for other in there[:i]:
                 if not one[3] & other[3] and frame not in (one[1] if one[0][0] == "l" else -1,):

@@ -14,6 +14,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.design import PartSizes, Rounded
 from graphsynth.design.parts.gaps import Solid, Tube, gaps, proved_gap, proved_travel
 from graphsynth.dynamics import DynamicModel
+from graphsynth.mechanism.joints import Prismatic
 
 from .moving import carried, nearest, outline, sharing
 from .test_outline import polygon_moments
@@ -54,9 +55,35 @@ def moved(mechanism, way, count):
     return gs.simulate(mechanism, start + np.linspace(0, way, count), start=np.array(mechanism.pose))
 
 
-@given(testing.mechanisms(4, 8))
-@settings(max_examples=25, deadline=None)
+def outside_slots(made, inputs):
+    """Joints whose pin leaves its slot at inputs between the samples."""
+    motion = made.motion.mechanism.simulate(inputs, start=made.motion.poses[0])
+    for joint in made.motion.mechanism.joints:
+        if isinstance(joint, Prismatic):
+            way = motion.point(joint.b, joint.at_b).position - motion.point(joint.a, joint.at_a).position
+            s = made.unit * (way @ [1, 1j] * np.exp(-1j * (motion.poses[:, joint.a, 2] + joint.angle_a))).real
+            [slot] = [hole for hole in made.plan.holes[joint.a] if len(hole.hull) > 1]
+            ends = (np.array(slot.hull) - made.unit * complex(*joint.at_a)) * np.exp(-1j * joint.angle_a)
+            guides = [pin.at for pin in made.plan.pins if pin.kind == "guide"]
+            half = abs(guides[0] - guides[1]) / 2
+            if s.min() - half < ends.real.min() or s.max() + half > ends.real.max():
+                yield joint
+
+
+@given(testing.mechanisms(4, 6, prismatic=True))
+@settings(max_examples=10, deadline=None)
 def test_what_is_certified_is_never_contradicted(mechanism):
+    never_contradicted(mechanism)
+
+
+@pytest.mark.slow
+@given(testing.mechanisms(4, 8, prismatic=True))
+@settings(max_examples=120, deadline=None)
+def test_what_is_certified_of_many_is_never_contradicted(mechanism):
+    never_contradicted(mechanism)
+
+
+def never_contradicted(mechanism):
     motion = moved(mechanism, 0.5, 9)
     assume(motion.completed)
     try:
@@ -68,6 +95,7 @@ def test_what_is_certified_is_never_contradicted(mechanism):
     assume(made.certified)
     inputs = motion.inputs[0] + np.linspace(0, 0.5, 23)
     assert not list(contradictions(made, inputs))
+    assert not list(outside_slots(made, inputs))
 
 
 def parallelogram(angle, way):
@@ -88,6 +116,16 @@ def test_the_gap_of_parallel_cranks_decides_to_a_millionth(share, status):
     assert [c.status for c in made.collisions if {c.one, c.other} == {"link 1", "link 3"}] == ["hit"] * (
         status == "hit"
     )
+
+
+@pytest.mark.parametrize(("share", "hit"), [(1 - 1e-6, False), (1 + 1e-6, True)])
+def test_a_pin_counts_with_its_spacer(share, hit):
+    # at first the other crank's pivot is 80 sin(t) from this crank; its spacer is as wide as hole and one wall
+    start = math.radians(50)
+    gap = 40.0 * 2.0 * math.sin(start) - 3.0 - 2.0
+    sizes = PartSizes(clearance=gap * share, pin=2.0, hole=2.0, wall=2.0)
+    made = gs.parts(parallelogram(start, 0.5), unit=40.0, sizes=sizes, prove=False)
+    assert any({c.one, c.other} == {"link 1", "pin 0-3"} for c in made.collisions) is hit
 
 
 def test_cranks_that_sweep_over_each_others_pins_have_no_layering():
@@ -142,10 +180,25 @@ def test_a_collision_between_samples_is_found(boxes):
     assert proved_gap(bar, disc, wide, 0.1).status == "undecided"
 
 
+def test_a_gap_that_is_largest_in_the_middle_is_not_taken_for_the_least():
+    # a point on a circle above a wall: at the top it moves along the wall, and at both ends it is 2.955 from it
+    point, wall = Solid(1, Rounded((10 + 0j,), 0.0)), Solid(0, Rounded.around([-20 + 0j, 20 + 0j], 0.0))
+    way = math.pi - 0.6
+    tube = turning(1.0, way, 1)
+    tube.x[:, 1, 2] += 0.3
+    least = 10 * math.sin(0.3)
+    assert proved_gap(point, wall, tube, least + 0.01).status == "hit"
+    found = proved_gap(point, wall, tube, least - 1e-6)
+    assert found.status == "free" and found.gap <= least
+
+
 def test_travel_in_a_slot_is_proved_only_if_it_is_long_enough():
     guide, line = Solid(1, Rounded((10 + 0j,), 0.0)), Solid(0, Rounded((1 + 0j,), 0.0))
     tube = turning(1.0, 3.0, 2)  # x = 10 cos(u) - 1 from 9 down to -10.8999
     low = 10 * math.cos(3.0) - 1
+    turned = Solid(1, Rounded((0j,), 0.0)), Solid(0, Rounded((10 + 0j,), 0.0))  # the line turns, the point is at rest
+    assert proved_travel(turned[1], turned[0], 0.0, tube, (low + 1 - 1e-6, 10.0 + 1e-6))
+    assert not proved_travel(turned[1], turned[0], 0.0, tube, (low + 1 + 1e-3, 10.0 + 1e-6))
     assert proved_travel(guide, line, 0.0, tube, (low - 1e-6, 9.0 + 1e-6))
     assert not proved_travel(guide, line, 0.0, tube, (low + 1e-3, 9.0 + 1e-6))
     assert not proved_travel(guide, line, 0.0, tube, (low - 1e-3, 9.0 - 1e-3))
@@ -167,6 +220,13 @@ def test_gaps_of_segments_and_polygons():
         assert found == pytest.approx(expected - 0.75, abs=1e-12), hull
 
 
+def test_a_pin_in_the_middle_of_a_slider_may_reach_through_the_slot():
+    made = gs.parts(gs.simulate(gs.Mechanism.slider_crank(1.0, 3.0)), unit=40.0)
+    [pin] = [pin for pin in made.plan.pins if pin.passes]
+    [slot] = [sheet for sheet, holes in enumerate(made.plan.holes) if any(len(hole.hull) > 1 for hole in holes)]
+    assert pin.passes == (slot,) and pin.kind == "pin" and slot not in pin.sheets
+
+
 def test_a_slider_has_a_slot_with_two_guides():
     made = gs.parts(gs.simulate(gs.Mechanism.slider_crank(1.0, 3.0)), unit=40.0)
     assert made.certified
@@ -177,6 +237,16 @@ def test_a_slider_has_a_slot_with_two_guides():
     apart = abs(guides[1].at - guides[0].at)
     assert length == pytest.approx(2 * 40.0 + apart + 2 * made.sizes.clearance, rel=1e-4)
     assert not list(contradictions(made, np.linspace(0, 2 * np.pi, 41)))
+
+
+def test_a_pin_by_default_is_small_enough_for_the_holes():
+    # crank and slotted link sweep over each other's pivots: with a pin that fits, this is what is wrong
+    with pytest.raises(
+        GeometryError, match="no layers without a collision: .*link 1 and pin 0-2 .*link 2 and shaft 0-1"
+    ):
+        gs.parts(gs.simulate(gs.gallery.whitworth_quick_return()), unit=40.0)
+    with pytest.raises(GeometryError, match="holes of joints 0-2 and 2-4 in link 2 are"):
+        gs.parts(gs.simulate(gs.gallery.whitworth_quick_return()), unit=40.0, sizes=PartSizes(pin=5.0))
 
 
 def test_mass_centre_and_inertia_by_fine_polygons(lambda_parts):
