@@ -242,7 +242,7 @@ def test_a_slider_has_a_slot_with_two_guides():
 def test_a_pin_by_default_is_small_enough_for_the_holes():
     # crank and slotted link sweep over each other's pivots: with a pin that fits, this is what is wrong
     with pytest.raises(
-        GeometryError, match="no layers without a collision: .*link 1 and pin 0-2 .*link 2 and shaft 0-1"
+        GeometryError, match=r"no layers without a collision: .*link 1 and pin 0-2 .*link 2 and shaft 0-1"
     ):
         gs.parts(gs.simulate(gs.gallery.whitworth_quick_return()), unit=40.0)
     with pytest.raises(GeometryError, match="holes of joints 0-2 and 2-4 in link 2 are"):
