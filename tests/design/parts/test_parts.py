@@ -47,6 +47,16 @@ def test_the_lambda_linkage_needs_two_layers(lambda_parts):
     assert lambda_parts.gap <= 40.0 - 2 * lambda_parts.sizes.boss
 
 
+def test_every_pin_is_held_by_one_link_and_loose_in_the_others(lambda_parts):
+    assert [pin.kind for pin in lambda_parts.plan.pins].count("shaft") == 1
+    for pin in lambda_parts.plan.pins:
+        for sheet, place in zip(pin.sheets, pin.places):
+            [hole] = [hole for hole in lambda_parts.plan.holes[sheet] if hole.hull == (place,)]
+            held = sheet == (1 if pin.kind == "shaft" else pin.link)  # the motor's shaft drives the crank
+            assert 2 * hole.radius == (lambda_parts.sizes.pin if held else lambda_parts.sizes.hole)
+    assert lambda_parts.sizes.hole > lambda_parts.sizes.pin
+
+
 def moved(mechanism, way, count):
     """Motion from the pose on, by an angle or a length of the driver."""
     driver = mechanism.drivers[0]
