@@ -266,13 +266,17 @@ def _lengths(mechanism: Mechanism, moving: bool = False) -> list[float]:
     return found or [1.0]
 
 
-def signature(answer: DesignedMechanism) -> Array:
-    """Return the logarithms of lengths and arms in order: near copies, renumbered or moved, have nearly the same."""
+def signature(task: DesignTask, answer: DesignedMechanism) -> Array:
+    """Return the logarithms of lengths and arms in order: near copies, renumbered or moved, have nearly the same.
+
+    So have, for a task without a length, those of another size.
+    """
     mechanism, found = answer.mechanism, _lengths(answer.mechanism)
     for point in mechanism.points.values():
         own = [j.at_a if j.a == point.link else j.at_b for j in mechanism.joints if point.link in j.pair]
         found += [math.dist(point.at, p) for p in own]
-    return np.asarray(np.log(np.maximum(np.sort(found), 1e-12)))
+    logarithms = np.log(np.maximum(np.sort(found), 1e-12))
+    return np.asarray(logarithms if task.sized else logarithms - logarithms.mean())
 
 
 # --- errors of targets, from the new motion

@@ -40,6 +40,8 @@ _STAGES = ((80, 0.2, 8), (25, 0.2, 15), (6, 3.0, 40))
 _COPIES, _SHAKEN = 100, (-2.5, -0.4)
 #: Pieces of a wave, of which so many go on from the best; waves in each round by the number of links.
 _WAVE, _AGAIN, _WAVES = 8, 4, {4: 2, 6: 4, 8: 6, 10: 6}
+#: Waves without another answer after which a search rests that has some.
+_IDLE = 6
 #: Candidates of a piece that are kept; mechanisms whose lengths differ by less, all of them, are near copies.
 _KEPT, _ALIKE = 2, 0.1
 #: Candidates judged after each wave, for each answer asked; at once if their error is less, in tolerances.
@@ -135,7 +137,8 @@ def design(
     ----------
     task : DesignTask
     seconds : float
-        Time limit of the search; it ends before where enough answers were found.  They are then certified.
+        Time limit of the search; it ends before where enough answers were found, or some and long no other.  They
+        are then certified.
     seed : int
         Same task and seed, same answers, for any executor, unless the time limit cuts the search short.
     count : int
@@ -201,6 +204,7 @@ class _Run:
         self.judged: dict[int, DesignedMechanism] = {}
         self.reasons: Counter[str] = Counter()
         self.pieces, self.stopped = 0, ""
+        self.before, self.idle = 0, 0  # accepted before the last wave, waves without another one
 
     def search(self, executor: Executor | None, progress: Callable[[Progress], None] | None) -> None:
         """Go round by the numbers of links, the smallest first, until there are enough answers or no time is left."""
@@ -262,10 +266,18 @@ class _Run:
         finally:
             results.close()
         self._judge()
-        return self._enough()
+        good = self._accepted()
+        self.idle = self.idle + 1 if good == self.before else 0
+        self.before = good
+        if good and self.idle >= _IDLE:
+            self.stopped = f"no other was found in the last {_IDLE * _WAVE} pieces"
+        return self._enough() or bool(self.stopped)
+
+    def _accepted(self) -> int:
+        return sum(answer.accepted for answer in self._ranked())
 
     def _enough(self) -> bool:
-        return sum(answer.accepted for answer in self._ranked()) >= self.count
+        return self._accepted() >= self.count
 
     def _judge(self) -> None:
         """Judge the best candidates that were not judged yet."""
@@ -279,7 +291,7 @@ class _Run:
         kept: list[DesignedMechanism] = []
         marks: list[np.ndarray] = []
         for answer in sorted(self.judged.values(), key=lambda a: (not a.accepted, a.score)):
-            mark = signature(answer)
+            mark = signature(self.task, answer)
             same = any(
                 other.key == answer.key and len(own) == len(mark) and np.abs(own - mark).max() < _ALIKE
                 for other, own in zip(kept, marks)

@@ -163,6 +163,12 @@ class DesignTask(Shown):
         return max(sizes, default=0.0) or max(apart, default=0.0) or 1.0
 
     @property
+    def sized(self) -> bool:
+        """Whether the task knows a length: else a mechanism does it in any size."""
+        lengths = any(isinstance(t, PathTarget | PosesTarget) or getattr(t, "slides", False) for t in self.targets)
+        return lengths or any((self.pivots, self.bars, self.crank, self.box, self.pivot_region, self.stroke))
+
+    @property
     def names(self) -> dict[str, bool]:
         """Names of the points and links the targets speak of, in their order; true of points."""
         found: dict[str, bool] = {}

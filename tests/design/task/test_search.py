@@ -270,6 +270,27 @@ def test_the_same_answers_for_any_executor_and_none_twice() -> None:
             )
 
 
+def test_a_task_without_lengths_has_no_copies_of_another_size() -> None:
+    task = DesignTask(targets=[SwingTarget(least="60 deg", most="60 deg", time_ratio=1.5)], links=[4])
+    found = design(task, count=2)
+    shapes = []
+    for answer in found.answers:
+        own = answer.mechanism
+        sides = [math.dist(*((j.at_a if j.a == k else j.at_b) for j in own.joints if k in j.pair)) for k in range(4)]
+        shapes.append(np.sort(sides) / np.exp(np.log(sides).mean()))
+    assert len(shapes) == 2
+    for k, one in enumerate(shapes):
+        assert all(np.abs(np.log(one / other)).max() > 0.05 for other in shapes[:k])
+
+
+@pytest.mark.slow
+def test_a_search_rests_when_it_finds_no_other_answer() -> None:
+    """The best four-bar for a logarithm is one; within twice its error there is no other shape."""
+    log = FunctionTarget.of(np.log10, (1, 2), input_range="60 deg", output_range="90 deg", tolerance=0.0025)
+    found = design(DesignTask(targets=[log], links=[4]), count=9, seconds=300)
+    assert 1 <= len(found) < 9 and found.accepted and "no other was found" in found.statement
+
+
 def test_an_interruption_gives_the_best_so_far() -> None:
     def stop(progress: Any) -> None:
         if progress.pieces == 3:
