@@ -67,12 +67,15 @@ def index_starts(index: CurveIndex, count: int = 32) -> Starts:
         path = next((t for t in task.targets if isinstance(t, PathTarget) and t.inputs is None), None)
         if path is None:
             return []
-        found = []
-        for match in index.find(_pairs(path.goal), 8 * count, closed=path.closed):
-            if match.links in task.links and match.turns == (task.drive == "rotation"):
-                own = match.mechanism
-                found.append(Mechanism(own.graph, own.joints, own.drivers, {path.point: own.points["P"]}, own.pose))
-        return found[:count]
+
+        def fits(design: Design) -> bool:
+            turns = design.kinds[design.driver_joints[0]] == "R"
+            sliders = design.kinds.count("P") - (not turns)
+            fit = design.graph.links in task.links and sliders <= task.sliders
+            return fit and turns == (task.drive == "rotation")
+
+        every = [match.mechanism for match in index.find(_pairs(path.goal), count, closed=path.closed, only=fits)]
+        return [Mechanism(m.graph, m.joints, m.drivers, {path.point: m.points["P"]}, m.pose) for m in every]
 
     return starts
 
