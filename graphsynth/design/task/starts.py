@@ -69,10 +69,9 @@ def index_starts(index: CurveIndex, count: int = 32) -> Starts:
             return []
 
         def fits(design: Design) -> bool:
-            turns = design.kinds[design.driver_joints[0]] == "R"
-            sliders = design.kinds.count("P") - (not turns)
-            fit = design.graph.links in task.links and sliders <= task.sliders
-            return fit and turns == (task.drive == "rotation")
+            turns, sliders = design.kinds[design.driver_joints[0]] == "R", design.kinds.count("P")
+            few = sliders <= task.sliders + (not turns) and design.graph.links in task.links
+            return few and turns == (task.drive == "rotation")
 
         every = [match.mechanism for match in index.find(_pairs(path.goal), count, closed=path.closed, only=fits)]
         return [Mechanism(m.graph, m.joints, m.drivers, {path.point: m.points["P"]}, m.pose) for m in every]
