@@ -75,13 +75,8 @@ class TaskProblem:
         wide = 2 * model.joints
         places = pulled[..., :wide].reshape(*pulled.shape[:3], model.joints, 2)
         if model.plan.pins is not None:
-            own, first, second = model.plan.pins
-            way = u.places[:, second] - u.places[:, first]
-            turn = np.stack([-way[:, 1], way[:, 0]], axis=1) / np.maximum((way**2).sum(axis=1), 1e-300)[:, None]
-            column = wide + model.plan.design.numbers.index((own, "angle"))
-            change = pulled[..., column, None] * turn[:, None, None]
-            places[..., second, :] += change
-            places[..., first, :] += places[..., own, :] - change
+            own, first, _ = model.plan.pins  # its guide turns with its ends, which moves no other link (to first order)
+            places[..., first, :] += places[..., own, :]
         slopes[..., : 2 * len(model.free)] = places[..., model.free, :].reshape(*pulled.shape[:3], -1)
         slopes[..., 2 * len(model.free) : model.points_at] = pulled[..., wide + np.array(model.angles, dtype=np.intp)]
         if model.task.linear:  # a longer stroke: a smaller mechanism with stroke 1, seen larger

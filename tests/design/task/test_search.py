@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,11 +21,13 @@ from graphsynth.design import (
     SwingTarget,
     design,
 )
+from graphsynth.design.task.answers import Candidate, Origin, judged, signature
 from graphsynth.design.task.classical import solutions
 from graphsynth.design.task.model import Model
 from graphsynth.design.task.plans import plans
 from graphsynth.design.task.problem import TaskProblem
 from graphsynth.design.task.starts import placed_starts, random_starts
+from graphsynth.pipeline.planar.stages import scaled
 
 POINTS = [(0.0, 0.0), (1.0, 0.5), (2.0, 0.2), (3.0, -0.5)]
 POSES = [(x, y, 0.2 * k) for k, (x, y) in enumerate(POINTS)]
@@ -128,6 +131,53 @@ def test_a_hidden_four_bar_is_found_from_its_curve_and_pivots() -> None:
     assert best.certified
 
 
+def test_a_curve_that_also_goes_elsewhere_does_not_draw_a_closed_path() -> None:
+    """Half of the hidden curve, closed by a chord: every point is passed, yet the other half is elsewhere."""
+    motion = hidden()
+    z = motion.point("P").position @ [1.0, 1.0j]
+    plan = next(plan for plan in plans(DesignTask(targets=[PathTarget.segment((0, 0), (1, 0))], links=[4]), 4))
+    whole, half = z[:-1:12], z[:180:6]
+    errors = []
+    for goal in (whole, half):
+        path = PathTarget(points=[(p.real, p.imag) for p in goal], closed=True)
+        task = DesignTask(targets=[path], links=[4], transmission="5 deg")
+        errors.append(judged(task, Candidate(0.0, Origin(plan, 0, None), z.real, motion.mechanism, ())).errors[0])
+    size = float(np.abs(half - half.mean()).max())
+    assert errors[0] < 1e-6
+    # the curve leaves the chord by up to this, of which a fifth of the chord is allowed
+    far = np.abs((np.conj(half[-1] - half[0]) * (z[180:] - half[0])).imag).max() / abs(half[-1] - half[0])
+    assert errors[1] > 0.5 * (far - 0.2 * abs(half[-1] - half[0])) / size > 0.05
+
+
+def test_errors_of_angles_are_those_of_a_fine_motion() -> None:
+    """Stroke, time ratio, dwell and function of the hidden rocker, each against its angle at 36 000 inputs."""
+    motion = hidden()
+    fine = gs.simulate(motion.mechanism, np.linspace(0.0, math.tau, 36001))
+    theta = np.unwrap(fine.poses[:, 3, 2])
+    swing = float(np.ptp(theta))
+    apart = abs(float(fine.inputs[theta.argmax()] - fine.inputs[theta.argmin()]))
+    slow = max(apart, math.tau - apart)
+    targets = [
+        SwingTarget(least=swing + 0.2),
+        SwingTarget(most=swing - 0.3),
+        SwingTarget(time_ratio=3.0),
+        DwellTarget(span=1.0, start=0.5),
+        FunctionTarget(inputs=[0.0, 1.0, 2.0], outputs=[0.0, 0.0, 0.0]),
+    ]
+    task = DesignTask(targets=targets, links=[4], transmission="5 deg")
+    plan = next(plan for plan in plans(task, 4) if plan.carriers == (3,))
+    found = judged(task, Candidate(0.0, Origin(plan, 0, None), theta, motion.mechanism, ()))
+    window = theta[(fine.inputs >= 0.5) & (fine.inputs <= 1.5)]
+    at = np.interp([0.0, 1.0, 2.0], fine.inputs, theta)
+    wanted = [0.2, 0.3, abs(slow - 0.75 * math.tau), 0.5 * np.ptp(window), 0.5 * np.ptp(at)]
+    assert found.errors == pytest.approx(wanted, abs=1e-4) and not found.accepted
+    assert {"the swing is missed", "the dwell is missed", "the function is missed"} <= {*found.reasons}
+    other = replace(found, mechanism=scaled(found.mechanism, 3.0))
+    assert np.allclose(signature(task, found), signature(task, other))  # no target has a length
+    sized = DesignTask(targets=targets, links=[4], crank=1.0)
+    assert np.abs(signature(sized, found) - signature(sized, other)).min() > 1.0
+
+
 def test_two_targets_at_once_share_one_mechanism() -> None:
     """A timed path and the rocker's angle of the same hidden four-bar; each alone leaves more freedom."""
     motion = hidden()
@@ -185,6 +235,9 @@ def test_a_hidden_cylinder_is_found_from_the_angle_it_gives() -> None:
     assert found.accepted, found
     law: Any = found[0].mechanism.drivers[0].law
     assert 0.98 < abs(law.rate) < 1.02 and found[0].errors[0] < 1e-4
+    # the transmission angle at the lever's pin, between lever and cylinder, by the law of cosines
+    cosine = (1.0 + length**2 - 4.0) / (2.0 * length)
+    assert found[0].transmission == pytest.approx(np.arcsin(np.sqrt(1.0 - cosine**2)).min(), abs=0.01)
 
 
 def test_strokes_and_time_ratios_are_those_of_the_closed_form() -> None:
