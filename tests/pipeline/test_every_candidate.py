@@ -50,7 +50,7 @@ def test_the_platform_as_joints_moves_as_the_platform() -> None:
 def both() -> Any:
     scene = tables("didenko")
     scene["structure"] = {"graphs": [SingleMotorPlatform().graph().to_text(), OTHER]}
-    scene["outputs"]["products"] = ["records", "ranking", "best_pictures"]
+    scene["outputs"]["products"] = ["records", "ranking", "comparison", "best_pictures"]
     return execute(Scene.from_mapping(scene))
 
 
@@ -60,6 +60,17 @@ def test_both_are_assessed_and_ranked(both: Any) -> None:
     names = [{margin.name for margin in record.margins} for record in records]
     assert {"transmission angle", "tilt allowed", "distance to singularity"} <= names[0] & names[1]
     assert sorted(both["ranking"].numbers) == [1, 2] and len(both["best_pictures"]) == 2
+
+
+def test_the_platform_is_compared_with_the_other(both: Any) -> None:
+    (table,) = both["comparison"]
+    platform, other = ({margin.name: margin.value for margin in record.margins} for record in both["records"])
+    for (name, value, better, best), larger in zip(table.rows, (True, False), strict=True):
+        sign = 1.0 if larger else -1.0
+        assert float(value.rstrip("°")) == pytest.approx(platform[name], rel=1e-3)
+        assert int(better) == (sign * other[name] > sign * platform[name])
+        assert float(best.rstrip("°")) == pytest.approx(sign * max(sign * other[name], sign * platform[name]), rel=1e-3)
+        assert f"{name} {value}, {better} of 1 others" in table.findings[0].text
 
 
 def test_the_platform_keeps_its_own_dimensions(both: Any) -> None:

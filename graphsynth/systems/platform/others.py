@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 
 from graphsynth.pipeline.planar import stages as planar
 from graphsynth.pipeline.planar.stages import Built, Moved, Part
+from graphsynth.pipeline.products import Finding
 from graphsynth.systems.platform.stages import platform_of
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.pipeline.planar.stages_pictures import Best
-    from graphsynth.pipeline.products import Candidate, Outcome, Picture, Record
+    from graphsynth.pipeline.products import Candidate, Outcome, Picture, Record, Table
     from graphsynth.pipeline.stages import Context
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
@@ -51,6 +52,29 @@ def sketches(
     from graphsynth.pipeline.planar.stages_pictures import sketches as draw
 
     return draw(inner(context), written, best, records)
+
+
+def comparison(context: Context, records: tuple[Record, ...]) -> tuple[Table, ...]:
+    """Compare the platform of the scene with all others, objective by objective."""
+    from graphsynth.pipeline.display import table
+    from graphsynth.pipeline.units import behind
+
+    key = platform_of(context).graph().key
+    known = next((record for record in records if record.key == key and record.status == "assessed"), None)
+    ranking = context.scene.ranking
+    if known is None or ranking is None:
+        return ()
+    rows, told = [], []
+    for objective in ranking.objectives:
+        values = {r.number: m for r in records for m in r.margins if m.name == objective.quantity}
+        own, sign = values[known.number], 1.0 if objective.goal == "max" else -1.0
+        best = max(values.values(), key=lambda margin: sign * margin.value)
+        better = sum(sign * margin.value > sign * own.value for margin in values.values())
+        rows.append((own.name, f"{own.value:.4g}{behind(own.unit)}", better, f"{best.value:.4g}{behind(best.unit)}"))
+        told.append(f"{own.name} {own.value:.4g}{behind(own.unit)}, {better} of {len(values) - 1} others are better")
+    said = Finding(f"The platform of the scene (no. {known.number}): {'; '.join(told)}.")
+    columns = ("objective", "platform of the scene", "others that are better", "best")
+    return (table("The platform beside the others", columns, rows, "", said),)
 
 
 def as_mechanism(platform: SingleMotorPlatform) -> Mechanism:
