@@ -154,13 +154,13 @@ def cut_svg(parts: Parts) -> str:
         at = _label_place(outline, holes)
         lines.append(
             f'<g id="link-{parts.plan.label(link)}"><path d="{path}" fill="none" stroke="#ff0000" stroke-width="0.1"/>'
-            f'<text x="{at.real:.3f}" y="{corner.imag - at.imag + _HALF * size:.3f}" font-family="sans-serif" '
+            f'<text x="{at.real:.3f}" y="{corner.imag - at.imag + _HALF * size:.3f}" '
             f'font-size="{size:.3g}" text-anchor="middle" fill="#0000ff">{parts.plan.label(link)}</text></g>'
         )
     wide, high = f"{corner.real:.3f}", f"{corner.imag:.3f}"
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{wide}mm" height="{high}mm" viewBox="0 0 {wide} {high}">'
-        f"<title>Parts to cut, millimetres</title>{''.join(lines)}</svg>\n"
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{wide}mm" height="{high}mm" viewBox="0 0 {wide} {high}" '
+        f'font-family="sans-serif"><title>Parts to cut, millimetres</title>{"".join(lines)}</svg>\n'
     )
 
 
