@@ -117,14 +117,13 @@ class Bodies:
         self.size = 0
         self.closing: list[int] = []
         self._walked = walked(model, q, level=True)
-        given = {int(model.column[k, TURN]): n for n, k in enumerate(k for k, j in enumerate(model.joints) if j.driven)}
-        self._given = given
+        self._given = {column: n for n, column in enumerate(range(model.size, model.width))}
         self._grow()
         for k in range(len(model.joints)):
             for own in model.column[k, SHIFT_X : SLIDE + 1]:
                 if own >= 0:
                     self.slides[int(own)] = self._new()
-        self.width = self.size + len(given) + model.parameters
+        self.width = self.size + len(self._given)
         self.bodies = [self._numbered(body) for body in self.bodies]
         self.conditions = self._conditions()
 
@@ -411,7 +410,8 @@ def chart_of(x: Balls, y: Balls) -> list[Balls]:
 
 def stands_apart(model: SpaceModel) -> bool:
     """Whether `Bodies` describes a model: no guides, all axes along z but for misalignments below 1.5 rad."""
-    turns = [seat.turn for joint in model.joints for seat in (joint.seat_a, joint.seat_b)]
+    own = [joint for joint in model.joints if joint.parameter < 0]
+    turns = [seat.turn for joint in own for seat in (joint.seat_a, joint.seat_b)]
     level = all(turn[0] == turn[1] == 0.0 or (turn[2] == 0.0 and math.hypot(*turn) < 1.5) for turn in turns)
     return level and not any(joint.guide for joint in model.joints)
 
@@ -451,7 +451,8 @@ def walked(model: SpaceModel, q: Array, *, level: bool = False) -> Array:
             if link not in (joint.a, joint.b) or (joint.a in found and joint.b in found):
                 continue
             own = [q[c] if c >= 0 else 0.0 for c in model.column[k]]
-            c, s = math.cos(own[TURN]), math.sin(own[TURN])
+            turn = 0.0 if level and joint.parameter >= 0 else own[TURN]
+            c, s = math.cos(turn), math.sin(turn)
             x, y = (0.0, 0.0) if level else (own[TILT_X], own[TILT_Y])
             T = np.array(tilt_rates(x, y, x * x, y * y)[0]).reshape(3, 3)
             inner = T @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

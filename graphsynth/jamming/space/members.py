@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,11 +19,11 @@ from numpy.typing import NDArray
 from graphsynth.intervals import Interval
 from graphsynth.jamming.assembly import positions
 from graphsynth.jamming.assembly.positions import Positions, points
-from graphsynth.jamming.joints.limits import bounds
+from graphsynth.jamming.joints.limits import Misalignment, bounds
 from graphsynth.jamming.joints.program import JointProblem
 from graphsynth.jamming.joints.search import MemberWitness, limits_chosen, lowest, sharp_problem, unclosed_at
 from graphsynth.jamming.space.closure import Closure, closures
-from graphsynth.jamming.space.model import SpaceModel, driven_at, in_space, start
+from graphsynth.jamming.space.model import SpaceModel, driven_at, in_space, largest_turn, leaning, start
 from graphsynth.jamming.space.optimum import Optimum, least_scale
 from graphsynth.jamming.space.pose import PoseProof, prove_pose
 from graphsynth.tolerances.box import relative_box
@@ -52,11 +53,15 @@ class MemberPoses(NamedTuple):
 
 
 class Members:
-    """All members of a box of dimensions along a motion; raises `Unsupported` for what the model does not describe."""
+    """All members of a box of dimensions along a motion; raises `Unsupported` for what the model does not describe.
 
-    def __init__(self, given: JointProblem, motion: Motion, box: ParameterBox) -> None:
-        self.given, self.motion, self.box = given, motion, box
-        self.model = in_space(given, box)
+    ``box`` holds the ``sizes`` and two turns of every axis that may lean.
+    """
+
+    def __init__(self, given: JointProblem, motion: Motion, sizes: ParameterBox) -> None:
+        self.given, self.motion, self.sizes = given, motion, sizes
+        self.box = _with_axes(sizes, given.misalignments)
+        self.model = in_space(given, self.box)
         keep = np.flatnonzero(motion.assembled)
         ends = motion.inputs[keep]
         self.low, self.high = float(ends.min()), float(ends.max())
@@ -65,7 +70,9 @@ class Members:
     def unclosed(self, inputs: Array) -> str:
         """Name a member whose plane mechanism cannot be assembled at one of some inputs, or return an empty text."""
         try:
-            return unclosed_at(Positions(self.motion.mechanism, self.box, self.start), inputs) if self.box.size else ""
+            return (
+                unclosed_at(Positions(self.motion.mechanism, self.sizes, self.start), inputs) if self.sizes.size else ""
+            )
         except positions.Unsupported:
             return ""
 
@@ -84,16 +91,43 @@ class Members:
     def mechanism(self, p: Array) -> Mechanism:
         """Return the plane mechanism of a member, rounded to doubles."""
         nominal = self.motion.mechanism
-        return self.box.member(nominal, p) if p.any() else nominal
+        return self.box.member(nominal, p) if p[: self.sizes.size].any() else nominal
+
+    def axes(self, p: Array) -> tuple[Misalignment, ...]:
+        """Return the misalignments of a member; of axes that may lean those of its turns, never more than the largest.
+
+        Turns a and b about x and y lead the axis to ``(sin b, -sin a cos b, cos a cos b)``.
+        """
+        turns, found = iter(p[self.sizes.size :].reshape(-1, 2).tolist()), []
+        for tilt in self.given.misalignments:
+            own = tilt
+            if leaning(tilt):
+                a, b = next(turns)
+                lean = math.asin(math.hypot(math.sin(b), math.sin(a) * math.cos(b)))
+                most = max(map(abs, bounds(tilt, "alpha")))
+                own = tilt.sharp(min(lean, most), math.atan2(math.sin(b), math.sin(a) * math.cos(b)))
+            found.append(own)
+        return tuple(found)
+
+    @cached_property
+    def _spun(self) -> Array:
+        """How far the turns of a leaning axis may spin the seat of a driven joint, (drivers,), rounded up.
+
+        Turns a and b are the least rotation of the axis and a spin ``2 atan(tan(a / 2) tan(b / 2))`` about it.
+        """
+        most = {tilt.pair: largest_turn(tilt) for tilt in self.given.misalignments if leaning(tilt)}
+        driven = {driver.pair for driver in self.motion.mechanism.drivers}
+        size = [most.get(joint.pair, 0.0) for joint in self.motion.mechanism.joints if joint.pair in driven]
+        return 2.0 * np.tan(0.5 * np.array(size)) ** 2 * (1.0 + 1e-12)
 
     def poses(self, u: Interval, p: Interval) -> MemberPoses:
         """Return references for pieces u (N,) of the input and p (N, m) of the dimensions."""
         from graphsynth.kinematics.simulation import simulate
 
         model = self.model
-        driven = driven_at(model, self.motion.mechanism, u)
+        driven = driven_at(model, self.motion.mechanism, u) + Interval.from_bounds(-self._spun, self._spun)
         given = Interval.from_bounds(np.hstack([driven.lo, p.lo]), np.hstack([driven.hi, p.hi]))
-        middles, u_mid = np.clip(p.mid, p.lo, p.hi), u.mid
+        middles, u_mid = np.clip(p.mid, p.lo, p.hi)[:, : self.sizes.size], u.mid
         q, found = np.zeros((len(u_mid), model.width)), np.zeros(len(u_mid), dtype=np.bool_)
         for middle in np.unique(middles, axis=0):
             rows = np.flatnonzero((middles == middle).all(axis=1))
@@ -106,6 +140,18 @@ class Members:
                     q[row] = start(model, mechanism, motion.poses[at])
         q[:, model.size :] = given.mid
         return MemberPoses(q, np.asarray(given.rad), found)
+
+
+def _with_axes(sizes: ParameterBox, tilts: Iterable[Misalignment]) -> ParameterBox:
+    """Return a box of dimensions with two turns, within a disc, of every axis that may lean."""
+    box = sizes
+    for tilt in filter(leaning, tilts):
+        most, k = largest_turn(tilt), box.size
+        names = tuple(f"turn about {axis} of the axis {tilt.base}-{tilt.link} on link {tilt.base}" for axis in "xy")
+        ends, names = np.append(box.high, [most, most]), (*box.names, *names)
+        low = np.append(box.low, [-most, -most])
+        box = replace(box, names=names, low=low, high=ends, discs=(*box.discs, (k, k + 1)))
+    return box
 
 
 def at_end(given: JointProblem, end: int) -> JointProblem:
@@ -170,17 +216,18 @@ def binding_member(
     Limits are taken at their low ends, dimensions at the corner that the multipliers point to.  It is proved as a point
     of the box, and as the mechanism whose dimensions are rounded to doubles.
     """
-    tilts, limits = tuple(tilt.sharp() for tilt in given.misalignments), lowest(given.limits)
+    tilts = tuple(tilt if leaning(tilt) else tilt.sharp() for tilt in given.misalignments)
+    limits = lowest(given.limits)
     own = Members(sharp_problem(motion.mechanism, limits, tilts), motion, box)
     for place in islice(places, _PIECES):
         u, p, scale = _worst(own, place)
         if not scale > 1.0 or own.prove(u, points(p)).state >= 0:
             continue
-        mechanism = own.mechanism(p)
-        alone = sharp_problem(mechanism, limits, tilts), replace(motion, mechanism=mechanism)
+        mechanism, axes = own.mechanism(p), own.axes(p)
+        alone = sharp_problem(mechanism, limits, axes), replace(motion, mechanism=mechanism)
         if Members(*alone, relative_box(mechanism, 0.0)).prove(u, points(np.zeros(0))).state < 0:
-            named = tuple(zip(box.names, p.tolist())), limits_chosen(given, limits)
-            return SpaceWitness(u, 1.0, tilts, limits, mechanism, True, *named, scale)
+            named = tuple(zip(box.names, p[: box.size].tolist())), limits_chosen(given, limits)
+            return SpaceWitness(u, 1.0, axes, limits, mechanism, True, *named, scale)
     return None
 
 

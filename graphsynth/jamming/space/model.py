@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.intervals import Interval, cos, sin, tan
-from graphsynth.jamming.joints.limits import Limits, Misalignment, bounds
+from graphsynth.intervals import Interval, cos, pi, sin, tan
+from graphsynth.jamming.joints.limits import RIGID, Limits, Misalignment, bounds
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
 
 if TYPE_CHECKING:
@@ -37,6 +37,8 @@ MODEL = "exact closure in space: every loop closes in three dimensions, with joi
 TURN, TILT_X, TILT_Y, SHIFT_X, SHIFT_Y, SLIDE = range(6)
 #: Tilts from here on are as good as none: the chart of T ends at pi.
 _FREE = 3.0
+#: So much of a full turn is all directions: a range of them may be rounded.
+_ROUND = 1.0 - 1e-12
 
 
 class Unsupported(Exception):  # noqa: N818 - never leaves the package: it becomes an UNDECIDED with this reason
@@ -72,6 +74,7 @@ class SpaceJoint:
     ``limits``: largest tilt and slide (of a guide roll and pitch, by components of x); ``radial`` the largest shift
     across the axis.  ``driven``: the turn (of a guide the travel along the x axis of seat a) is given.  A guide
     (``guide``) travels along x and does not turn, a slot (``guide`` and ``turns``) does both.
+    ``parameter``: its turn is this parameter of the model, at most ``lean``; no limits, and no joint of the mechanism.
     """
 
     a: int
@@ -83,6 +86,8 @@ class SpaceJoint:
     driven: bool = False
     guide: bool = False
     turns: bool = True
+    parameter: int = -1
+    lean: float = 0.0
 
 
 class Bound(NamedTuple):
@@ -135,7 +140,7 @@ class SpaceModel:
     links : int
     frame : int
     parameters : int
-        Parameters that move points of links: dimensions within tolerances.
+        Parameters that move points of links or turn axes: dimensions within tolerances.
 
     Attributes
     ----------
@@ -165,7 +170,7 @@ class SpaceModel:
         for k, joint in enumerate(self.joints):
             tilts = [bounds(joint.limits, name)[1] > 0.0 for name in joint.limits.tilts]
             sizes = {
-                TURN: joint.turns and not (joint.driven and not joint.guide),
+                TURN: joint.turns and joint.parameter < 0 and not (joint.driven and not joint.guide),
                 TILT_X: tilts[0],
                 TILT_Y: tilts[-1],
                 SHIFT_X: (joint.guide and not joint.driven) or joint.radial > 0.0,
@@ -178,17 +183,21 @@ class SpaceModel:
         for k, joint in enumerate(self.joints):
             if joint.driven:
                 found[k, SHIFT_X if joint.guide else TURN], count = count, count + 1
+        for k, joint in enumerate(self.joints):
+            if joint.parameter >= 0:
+                found[k, TURN] = count + joint.parameter
         return found
 
     @property
     def width(self) -> int:
         """Number of unknowns and given coordinates."""
-        return int(self.column.max(initial=-1)) + 1 + self.parameters
+        return self.size + sum(joint.driven for joint in self.joints) + self.parameters
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of unknowns."""
-        return self.width - self.parameters - sum(joint.driven for joint in self.joints)
+        given = sum(joint.driven + (joint.parameter >= 0) for joint in self.joints)
+        return int((self.column >= 0).sum()) - given
 
     @cached_property
     def bounds(self) -> tuple[Bound, ...]:
@@ -221,6 +230,9 @@ class SpaceModel:
         """Upper bounds of the tilt of every joint and of the misalignment of its seats, (joints,) each, in radians."""
         tilt, seat = np.full(len(self.joints), math.inf), np.zeros(len(self.joints))
         for k, joint in enumerate(self.joints):
+            if joint.parameter >= 0:
+                tilt[k] = joint.lean
+                continue
             tilt[k] = math.hypot(*(bounds(joint.limits, name)[1] for name in joint.limits.tilts))
             for own in (joint.seat_a, joint.seat_b):
                 turn = own.turn[:2] if own.turn_box is None else own.turn_box.mag[:2].tolist()
@@ -374,16 +386,34 @@ def rotation(vector: Interval) -> Interval:
     return Interval.stack(rows)
 
 
+def leaning(tilt: Misalignment) -> bool:
+    """Whether an axis may lean in any direction by any angle up to the largest: the tolerance of an axis."""
+    (low, high), (first, last) = bounds(tilt, "alpha"), bounds(tilt, "direction")
+    return low <= 0.0 <= high and low < high and last - first >= math.tau * _ROUND
+
+
+def largest_turn(tilt: Misalignment) -> float:
+    """Radius of a disc of turns about x, then y, that holds all leans of an axis: rounded up.
+
+    The axis leans by ``acos(cos x cos y)``.  Of one lean ``x^2 + y^2`` is largest where both are equal, because
+    ``log cos sqrt`` is concave; there ``sin x`` is the square root of 2 times the sine of half the lean.
+    """
+    half = 0.5 * max(map(abs, bounds(tilt, "alpha")))
+    return math.sqrt(2.0) * math.asin(math.sqrt(2.0) * math.sin(half)) * (1.0 + 1e-12)
+
+
 def in_space(given: JointProblem, box: ParameterBox | None = None) -> SpaceModel:
     """Put a plane mechanism with limits and misaligned axes into space, and the parameters of a box of dimensions.
 
-    Raises `Unsupported` for gears, cams and driven slots.
+    The last parameters are two turns of every axis that is `leaning`; without a box all are nominal.  Raises
+    `Unsupported` for gears, cams and driven slots.
     """
     mechanism = given.mechanism
     box = box if box is not None and box.size else None
     by_pair = {tilt.pair: tilt for tilt in given.misalignments}
+    lean = [] if box is None else [tilt.pair for tilt in given.misalignments if leaning(tilt)]
     driven = {driver.pair for driver in mechanism.drivers}
-    joints = []
+    joints, mounts = [], []
     for k, (joint, limits) in enumerate(zip(mechanism.joints, given.limits)):
         if not isinstance(joint, Revolute | Prismatic | PinSlot) or (
             isinstance(joint, PinSlot) and joint.pair in driven
@@ -392,14 +422,38 @@ def in_space(given: JointProblem, box: ParameterBox | None = None) -> SpaceModel
         tilt = by_pair.get(joint.pair)
         guide = not isinstance(joint, Revolute)
         seats: list[Seat] = []
+        links = [joint.a, joint.b]
         for link, at, angle in ((joint.a, joint.at_a, "angle_a"), (joint.b, joint.at_b, "angle_b")):
             own = tilt if tilt is not None and tilt.base == link else None
-            seat = _plane_seat(at, getattr(joint, angle, 0.0), own)
-            seats.append(seat if box is None else _toleranced(seat, box.points[k][len(seats)], box))
+            loose = own is not None and joint.pair in lean
+            seat = _plane_seat(at, getattr(joint, angle, 0.0), None if loose else own)
+            seat = seat if box is None else _toleranced(seat, box.points[k][len(seats)], box)
+            if own is not None and box is not None and loose:
+                if guide:
+                    raise Unsupported(
+                        f"an axis that may lean at the guide {joint.a}-{joint.b} is not described in space"
+                    )
+                place = lean.index(joint.pair)
+                first, mount = box.size - 2 * (len(lean) - place), mechanism.graph.links + 2 * place
+                mounts += _leaning_seat(seat, (link, mount, mount + 1), first, largest_turn(own))
+                seat, links[len(seats)] = Seat(), mount + 1
+            seats.append(seat)
         own_driven = joint.pair in driven
         turns = not isinstance(joint, Prismatic)
-        joints.append(SpaceJoint(joint.a, joint.b, seats[0], seats[1], limits, 0.0, own_driven, guide, turns))
-    return SpaceModel(tuple(joints), mechanism.graph.links, mechanism.frame, 0 if box is None else box.size)
+        joints.append(SpaceJoint(links[0], links[1], seats[0], seats[1], limits, 0.0, own_driven, guide, turns))
+    count = mechanism.graph.links + len(mounts)
+    return SpaceModel((*joints, *mounts), count, mechanism.frame, 0 if box is None else box.size)
+
+
+def _leaning_seat(seat: Seat, links: tuple[int, int, int], first: int, most: float) -> list[SpaceJoint]:
+    """Two joints from a seat to a link that turns about its x axis, then y, by the parameters from ``first`` on."""
+    half, none, joints = pi() / 2, Interval(0), []
+    for k, turn in enumerate(([none, half, none], [-half, none, none])):  # z to x, z to y
+        box = Interval.stack(turn)
+        own = Seat(turn=tuple(box.mid.tolist()), turn_box=box)
+        base = own if k else replace(seat, turn=own.turn, turn_box=box)
+        joints.append(SpaceJoint(links[k], links[k + 1], base, own, RIGID, parameter=first + k, lean=most))
+    return joints
 
 
 def _toleranced(seat: Seat, point: LinkPoint, box: ParameterBox) -> Seat:
@@ -426,6 +480,7 @@ def _plane_seat(at: tuple[float, float], angle: float, tilt: Misalignment | None
         return Seat((*at, 0.0), (0.0, 0.0, angle))
     if angle != 0.0:
         raise Unsupported("a misaligned guide whose direction is turned is not described in space; use small tilts")
+    tilt = tilt.sharp() if leaning(tilt) else tilt
     alpha, direction = (Interval.from_bounds(*bounds(tilt, name)) for name in ("alpha", "direction"))
     if alpha.contains(0.0) and tilt.alpha_range != (0.0, 0.0):
         raise Unsupported("a range of misalignments around zero has no single direction; use small tilts")

@@ -28,7 +28,7 @@ from graphsynth.jamming.joints.scale import ScaleCertificate
 from graphsynth.jamming.joints.search import limits_chosen, sharp_problem
 from graphsynth.jamming.space.along import NOTHING, Along, Change, changed
 from graphsynth.jamming.space.members import Members, at_end, extreme_member
-from graphsynth.jamming.space.model import MODEL, Unsupported
+from graphsynth.jamming.space.model import MODEL, Unsupported, leaning
 from graphsynth.jamming.space.turn import Stint, certify_members
 from graphsynth.jamming.verdict import Verdict
 
@@ -155,7 +155,8 @@ def _proved(asked: _Asked, gap: float, end: float) -> _Sides:
     side = _SIDE * gap
     for _ in range(_TRIES):
         factor = asked.jam * (1.0 + side) ** asked.up
-        proof = Members(at_end(changed(asked.given, asked.change(factor)), 1), motion, box).prove(u, box.whole)
+        members = Members(at_end(changed(asked.given, asked.change(factor)), 1), motion, box)
+        proof = members.prove(u, members.box.whole)
         if proof.state < 0:
             binds = factor
             break
@@ -180,15 +181,17 @@ def _proved(asked: _Asked, gap: float, end: float) -> _Sides:
 
 def _of_members(asked: _Asked, estimate: Callable[[Along], tuple[_Worst, float]]) -> _Asked:
     """Correct the estimates of the nominal mechanism by those of the members that bind first and last."""
-    if not asked.box.size and not limits_chosen(asked.given, asked.given.limits):
+    given = asked.given
+    if not (asked.box.size or limits_chosen(given, given.limits) or any(map(leaning, given.misalignments))):
         return asked
     found = []
     for end, side in ((0, 1.0), (1, -1.0)):
         given = at_end(asked.given, end)
         members = Members(changed(given, asked.change(asked.free)), asked.motion, asked.box)
-        mechanism = members.mechanism(extreme_member(members, asked.worst.u, side))
+        p = extreme_member(members, asked.worst.u, side)
+        mechanism, axes = members.mechanism(p), members.axes(p)
         motion = replace(asked.motion, mechanism=mechanism)
-        found.append(estimate(Along(sharp_problem(mechanism, given.limits, given.misalignments), motion)))
+        found.append(estimate(Along(sharp_problem(mechanism, given.limits, axes), motion)))
     (_, free), (worst, jam) = found
     return asked._replace(worst=worst, jam=jam, free=free)
 

@@ -153,6 +153,7 @@ def certify_members(given: JointProblem, motion: Motion, box: ParameterBox, effo
             Verdict.UNDECIDED, str(error), *nothing, False, None, 0, perf_counter() - begin, model=MODEL
         )
     pieces, stopped = work.search(effort)
+    box = work.members.box
     decided = _decided(pieces, box)
     witness = None if decided == 1.0 else work.witness(pieces)
     verdict, reason = _verdict(motion, pieces, stopped, witness)
@@ -175,7 +176,7 @@ class _Work:
         ranges = bool(limits_chosen(given, given.limits))
         self.members = Members(at_end(given, 0) if ranges else given, motion, box)
         self.loose = Members(at_end(given, 1), motion, box) if ranges else self.members
-        self.given, self.several = given, ranges or box.size > 0
+        self.given, self.several = given, ranges or self.members.box.size > 0
         self.likely: list[_Piece] = []
         self.evaluated = 0
 
@@ -255,7 +256,7 @@ class _Work:
         sure = [p for p in pieces if p.proof.state < 0]
         left = sure + sorted(self.likely, key=lambda p: -p.ends[1])
         places = (Place(p.low, p.high, 0.5 * (p.p_low + p.p_high)) for p in left)
-        return binding_member(self.given, self.members.motion, self.members.box, places)
+        return binding_member(self.given, self.members.motion, self.members.sizes, places)
 
     def _round(self, spans: list[_Span], end: float, boxes: int = 0) -> list[_Piece]:
         """Prove what can be proved about pieces."""
@@ -279,7 +280,7 @@ class _Work:
                 own = self.loose.poses(*(part[k : k + 1] for part in box))
                 other = settle_pose(self.loose.model, own.q[0], own.given[0], boxes, reaches)
                 proof, least = replace(proof, state=min(other.state, 0)), other.scale
-            piece = _Piece(*span, proof, *self._worth(proof, least, poses.given[k]))
+            piece = _Piece(*span, proof, *self._worth(proof, least, poses.given[k], span))
             pieces.append(self._apart(piece, poses.given[k]))
         return pieces
 
@@ -303,7 +304,9 @@ class _Work:
             found |= zip(part.tolist(), free_poses(self.members.model, poses.q[part], poses.given[part]))
         return found
 
-    def _worth(self, proof: PoseProof, least: float, given: Array) -> tuple[Array, tuple[float, float], float]:
+    def _worth(
+        self, proof: PoseProof, least: float, given: Array, span: _Span
+    ) -> tuple[Array, tuple[float, float], float]:
         """Estimate what is worth cutting of an undecided piece, the ends of its factors, their spread by the input.
 
         ``least`` is the factor with limits at their high ends.
@@ -311,13 +314,25 @@ class _Work:
         m = self.members.box.size
         if proof.state or not self.several or proof.optimum is None:
             return np.ones(1 + m), (least, proof.scale), 0.0
-        spread = np.abs(slopes(self.members.model, proof.optimum)) * given
+        rises = slopes(self.members.model, proof.optimum)
+        spread = np.abs(rises) * given
         moved = np.abs(rates(self.members.floats, proof.optimum.q)) * given[None]
         worth = spread / max(abs(proof.scale - 1.0), 1e-9) + moved.max(0, initial=0.0) / _MOVED
         drivers = len(given) - m
-        by_input, side = float(spread[:drivers].sum()), float(spread[drivers:].sum())
+        by_input = float(spread[:drivers].sum())
+        down, up = _rises(self.members.box, rises[drivers:], *span[2:])
         worth = np.append(worth[:drivers].max(initial=0.0), worth[drivers:])
-        return worth, (least - side, proof.scale + side), by_input
+        return worth, (least - down, proof.scale + up), by_input
+
+
+def _rises(box: ParameterBox, rises: Array, low: Array, high: Array) -> tuple[float, float]:
+    """How far a linear function falls and rises from the middle of a part of the box; no further than on its discs."""
+    middle, sides = 0.5 * (low + high), 0.5 * np.abs(rises) * (high - low)
+    ends = [float(sides.sum())] * 2
+    for pair in map(list, box.discs):
+        most, at, flat = box.high[pair[0]] * math.hypot(*rises[pair]), rises[pair] @ middle[pair], sides[pair].sum()
+        ends = [end - max(0.0, float(flat - most - side * at)) for end, side in zip(ends, (1.0, -1.0))]
+    return ends[0], ends[1]
 
 
 def _split(pieces: list[_Piece], single: _Piece) -> list[_Piece]:
