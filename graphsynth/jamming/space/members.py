@@ -39,6 +39,8 @@ Mask = NDArray[np.bool_]
 _BOXES, _ROUNDS, _INPUTS = 300, 2, 7
 #: Pieces in which a binding member is sought; a closure that is missed by more is none.
 _PIECES, _MISSED = 4, 1e-9
+#: Part of their largest turns that leaning axes have where it is asked in which direction they count.
+_ASIDE = 0.3
 
 
 class MemberPoses(NamedTuple):
@@ -96,7 +98,7 @@ class Members:
     def axes(self, p: Array) -> tuple[Misalignment, ...]:
         """Return the misalignments of a member; of axes that may lean those of its turns, never more than the largest.
 
-        Turns a and b about x and y lead the axis to ``(sin b, -sin a cos b, cos a cos b)``.
+        Turns a and b about x and y lead the axis to ``(sin b, -sin a cos b, cos a cos b)``, x in the direction given.
         """
         turns, found = iter(p[self.sizes.size :].reshape(-1, 2).tolist()), []
         for tilt in self.given.misalignments:
@@ -105,7 +107,8 @@ class Members:
                 a, b = next(turns)
                 lean = math.asin(math.hypot(math.sin(b), math.sin(a) * math.cos(b)))
                 most = max(map(abs, bounds(tilt, "alpha")))
-                own = tilt.sharp(min(lean, most), math.atan2(math.sin(b), math.sin(a) * math.cos(b)))
+                way = math.atan2(math.sin(b), math.sin(a) * math.cos(b))
+                own = tilt.sharp(min(lean, most), tilt.direction + way)
             found.append(own)
         return tuple(found)
 
@@ -152,6 +155,28 @@ def _with_axes(sizes: ParameterBox, tilts: Iterable[Misalignment]) -> ParameterB
         low = np.append(box.low, [-most, -most])
         box = replace(box, names=names, low=low, high=ends, discs=(*box.discs, (k, k + 1)))
     return box
+
+
+def aligned(given: JointProblem, motion: Motion, sizes: ParameterBox) -> JointProblem:
+    """Return a problem whose leaning axes are turned first in the direction that counts most at the middle input.
+
+    There the boxes into which the disc of turns is cut fit its rim (estimated; any direction is as valid).
+    """
+    if not any(map(leaning, given.misalignments)):
+        return given
+    own, tilts = Members(given, motion, sizes), []
+    u, p = points(np.array([0.5 * (own.low + own.high)])), _ASIDE * own.box.high
+    poses = own.poses(u, points(p[None]))
+    rises = slopes(own.model, least_scale(own.floats, poses.q[0]))
+    pairs = iter(rises[len(rises) - own.box.size + sizes.size :].reshape(-1, 2).tolist())
+    for tilt in given.misalignments:
+        if leaning(tilt):
+            a, b = next(pairs)
+            low, way = bounds(tilt, "direction")[0], tilt.direction + math.atan2(b, a)
+            way = low + (way - low) % math.tau
+            tilt = replace(tilt, direction=min(way, bounds(tilt, "direction")[1])) if math.isfinite(way) else tilt
+        tilts.append(tilt)
+    return replace(given, misalignments=tuple(tilts))
 
 
 def at_end(given: JointProblem, end: int) -> JointProblem:

@@ -435,7 +435,7 @@ def in_space(given: JointProblem, box: ParameterBox | None = None) -> SpaceModel
                     )
                 place = lean.index(joint.pair)
                 first, mount = box.size - 2 * (len(lean) - place), mechanism.graph.links + 2 * place
-                mounts += _leaning_seat(seat, (link, mount, mount + 1), first, largest_turn(own))
+                mounts += _leaning_seat(seat, (link, mount, mount + 1), first, own)
                 seat, links[len(seats)] = Seat(), mount + 1
             seats.append(seat)
         own_driven = joint.pair in driven
@@ -445,10 +445,15 @@ def in_space(given: JointProblem, box: ParameterBox | None = None) -> SpaceModel
     return SpaceModel((*joints, *mounts), count, mechanism.frame, 0 if box is None else box.size)
 
 
-def _leaning_seat(seat: Seat, links: tuple[int, int, int], first: int, most: float) -> list[SpaceJoint]:
-    """Two joints from a seat to a link that turns about its x axis, then y, by the parameters from ``first`` on."""
-    half, none, joints = pi() / 2, Interval(0), []
-    for k, turn in enumerate(([none, half, none], [-half, none, none])):  # z to x, z to y
+def _leaning_seat(seat: Seat, links: tuple[int, int, int], first: int, tilt: Misalignment) -> list[SpaceJoint]:
+    """Two joints from a seat to a link that turns about x, then y, by the parameters from ``first`` on.
+
+    The x axis points in the direction of the misalignment.
+    """
+    way, half, joints = Interval(tilt.direction), pi() / 2, []
+    c, s, none = half * cos(way), half * sin(way), Interval(0)
+    most = largest_turn(tilt)
+    for k, turn in enumerate(([-s, c, none], [-c, -s, none])):  # z to x, z to y
         box = Interval.stack(turn)
         own = Seat(turn=tuple(box.mid.tolist()), turn_box=box)
         base = own if k else replace(seat, turn=own.turn, turn_box=box)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.drawing import Tolerances, drawn
-from graphsynth.jamming.joints.limits import Misalignment
+from graphsynth.jamming.joints.limits import Misalignment, bounds
 from graphsynth.jamming.joints.pieces import check_range
 from graphsynth.jamming.joints.program import Bearings, JointProblem, problem
 from graphsynth.jamming.joints.scale import ScaleCertificate
@@ -189,7 +189,8 @@ def _of_members(asked: _Asked, estimate: Callable[[Along], tuple[_Worst, float]]
         given = at_end(asked.given, end)
         members = Members(changed(given, asked.change(asked.free)), asked.motion, asked.box)
         p = extreme_member(members, asked.worst.u, side)
-        mechanism, axes = members.mechanism(p), members.axes(p)
+        mechanism, pairs = members.mechanism(p), zip(given.misalignments, members.axes(p))
+        axes = tuple(t.sharp(bounds(t, "alpha")[1], own.direction) if leaning(t) else t for t, own in pairs)
         motion = replace(asked.motion, mechanism=mechanism)
         found.append(estimate(Along(sharp_problem(mechanism, given.limits, axes), motion)))
     (_, free), (worst, jam) = found

@@ -22,7 +22,16 @@ from graphsynth.jamming.joints.pieces import check_range
 from graphsynth.jamming.joints.program import Bearings, JointProblem, problem
 from graphsynth.jamming.joints.search import limits_chosen
 from graphsynth.jamming.space.apart import closes_apart
-from graphsynth.jamming.space.members import MemberPoses, Members, Place, SpaceWitness, at_end, binding_member, slopes
+from graphsynth.jamming.space.members import (
+    MemberPoses,
+    Members,
+    Place,
+    SpaceWitness,
+    aligned,
+    at_end,
+    binding_member,
+    slopes,
+)
 from graphsynth.jamming.space.model import MODEL, Unsupported
 from graphsynth.jamming.space.pose import REACHES, PoseProof, free_poses, rates, settle_pose
 from graphsynth.jamming.verdict import Verdict
@@ -39,9 +48,9 @@ _Span: TypeAlias = tuple[float, float, Array, Array]
 _FIRST, _FEWEST, _PARTS, _REACH = 96, 4, 3, 0.03
 #: Boxes into which the unknowns at a single input are cut.
 _BOXES = 300
-#: So many times the parameters of a piece are halved at most; how far (radians, units) a coordinate may lead the
-#: unknowns; how near to 1 a factor is for a member to be looked at; spread by the input, beside that by the dimensions,
-#: from which on a piece with members of both kinds is cut.
+#: So many times the parameters of a piece are halved at most; how far (radians, units), or as far as their limits, a
+#: coordinate may lead the unknowns; how near to 1 a factor is for a member to be looked at; spread by the input, beside
+#: that by the dimensions, from which on a piece with members of both kinds is cut.
 _CUTS, _MOVED, _NEAR, _CLEAR = 12, 0.03, 1e-3, 0.3
 #: Factor of the linearised closure below which a piece is cut rather than solved for; pieces taken at once.
 _SURE, _CHUNK = 0.999, 64
@@ -144,7 +153,7 @@ def certify_members(given: JointProblem, motion: Motion, box: ParameterBox, effo
     """Prove as `certify_in_space`, of a problem and a box of dimensions."""
     begin = perf_counter()
     try:
-        work = _Work(given, motion, box)
+        work = _Work(aligned(given, motion, box), motion, box)
     except Unsupported as error:
         ends = motion.inputs[motion.assembled]
         unknown = PoseProof.unknown(str(error))
@@ -316,8 +325,12 @@ class _Work:
             return np.ones(1 + m), (least, proof.scale), 0.0
         rises = slopes(self.members.model, proof.optimum)
         spread = np.abs(rises) * given
-        moved = np.abs(rates(self.members.floats, proof.optimum.q)) * given[None]
-        worth = spread / max(abs(proof.scale - 1.0), 1e-9) + moved.max(0, initial=0.0) / _MOVED
+        model, q = self.members.model, proof.optimum.q
+        far = np.full(model.size, _MOVED)
+        for bound in model.bounds:
+            far[list(bound.columns)] = min(bound.chart(1.0), _MOVED)
+        moved = np.abs(rates(self.members.floats, q)) * given[None] / far[:, None]
+        worth = spread / max(abs(proof.scale - 1.0), 1e-9) + moved.max(0, initial=0.0)
         drivers = len(given) - m
         by_input = float(spread[:drivers].sum())
         down, up = _rises(self.members.box, rises[drivers:], *span[2:])

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from coupled_oracles import four_bar
-from space_oracles import rotation
+from space_oracles import moved, product, rotation
 from test_turn import one_bearing
 
 from graphsynth import Driver, Mechanism, MechanismGraph, Prismatic, Revolute, simulate
@@ -25,7 +25,7 @@ from graphsynth.jamming.joints.program import problem
 from graphsynth.jamming.joints.search import sharp_problem
 from graphsynth.jamming.space import certify_in_space, largest_scale, prove_pose
 from graphsynth.jamming.space.binding import at, coordinates
-from graphsynth.jamming.space.bodies import Bodies, walked
+from graphsynth.jamming.space.bodies import Bodies
 from graphsynth.jamming.space.closure import Closure
 from graphsynth.jamming.space.members import Members
 from graphsynth.jamming.space.model import in_space, largest_turn, start
@@ -83,9 +83,9 @@ def test_two_turns_lead_the_axis_anywhere_within_its_angle():
     for angle in (1e-7, 1e-3, 0.1, 0.5):
         tilt = Misalignment(2, 3, 0.0, rigid=False, alpha_range=(0.0, angle), direction_range=(0.0, math.tau))
         radius = largest_turn(tilt)
-        assert angle < radius < angle * (1.0 + angle**2 / 40.0 + 1e-11)
+        assert angle < radius < angle * (1.0 + angle**2 / 22.0 + 1e-11)
         for lean, way in zip(angle * np.append(1.0, rng.random(20)), [math.pi / 4, *rng.uniform(0.0, 6.28, 20)]):
-            z = np.array(rotation([lean * math.cos(way), lean * math.sin(way), 0.0]).tolist(), dtype=float)[2::3]
+            z = np.array(rotation([lean * math.cos(way), lean * math.sin(way), 0.0]).tolist(), dtype=float)[:, 2]
             a, b = math.atan2(-z[1], z[2]), math.asin(z[0])
             assert math.hypot(a, b) <= radius
     own = members([AxisAngle(2, 3, 0.2)], JointLimits(0.1), Misalignment(0, 1, 0.01))
@@ -93,17 +93,14 @@ def test_two_turns_lead_the_axis_anywhere_within_its_angle():
     for p in rng.uniform(-0.13, 0.13, (5, 2)):
         q[-2:] = p
         sharp = own.axes(p)[1]
-        links = walked(own.model, q)
         lean = np.array(rotation([sharp.alpha * math.cos(sharp.direction), sharp.alpha * math.sin(sharp.direction),
-                                  0.0]).tolist(), dtype=float).reshape(3, 3)  # fmt: skip
-        mount = own.model.joints[2].a
-        assert links[2].T @ links[mount][:, 2] == pytest.approx(lean[:, 2], abs=1e-14)
-        # the seat spins a little about its axis, which a given turn makes up for
-        spin = lean.T @ links[2].T @ links[mount]
-        assert (
-            abs(math.atan2(spin[1, 0], spin[0, 0]))
-            <= 2.0 * math.tan(0.5 * largest_turn(own.given.misalignments[1])) ** 2
-        )
+                                  0.0]).tolist(), dtype=float)  # fmt: skip
+        two = product(*(moved(own.model, k, q.tolist()) for k in (4, 5)))
+        mount = np.array(two[0].tolist(), dtype=float)
+        assert mount[:, 2] == pytest.approx(lean[:, 2], abs=1e-14)
+        spin = lean.T @ mount  # of the seat about its axis, which a given turn makes up for
+        most = 2.0 * math.tan(0.5 * largest_turn(own.given.misalignments[1])) ** 2
+        assert abs(math.atan2(spin[1, 0], spin[0, 0])) <= most
 
 
 def test_the_turn_of_a_driven_joint_is_enclosed_with_the_spin_of_its_seat():
@@ -170,10 +167,11 @@ def test_no_angle_is_the_sharp_mechanism():
 
 
 def test_tiny_angles_are_as_small_tilts_say():
-    motion, limits, parts = simulate(four_bar(), [1.3, 1.31]), JointLimits(0.0015), [AxisAngle(2, 3, 1e-4)]
+    """The bearing takes 0.4e-3 (1 +- 0.5) sin(u): with small tilts it binds for all members from a factor of 8 on."""
+    motion, limits, parts = simulate(four_bar(), [1.3, 1.31]), one_bearing(JointLimits(0.0015)), [AxisAngle(2, 3, 2e-4)]
     ends = small_scale(motion, limits, Misalignment(0, 1, 1e-3), tolerances=parts, relative_gap=1e-2)
-    for factor, verdict in ((0.98 * ends.low, FREE), (1.02 * ends.low, SOME)):
-        tilt, own = Misalignment(0, 1, 1e-3 * factor), [AxisAngle(2, 3, 1e-4 * factor)]
+    for factor, verdict in ((0.99 * ends.low, FREE), (1.01 * ends.low, SOME), (8.5, JAMMED)):
+        tilt, own = Misalignment(0, 1, 1e-3 * factor), [AxisAngle(2, 3, 2e-4 * factor)]
         assert certify_in_space(motion, limits, tilt, tolerances=own).verdict is verdict
         assert certify_coupled(motion, limits, tilt, tolerances=own).verdict is verdict
 
@@ -188,7 +186,7 @@ def test_the_scale_is_that_of_the_worst_direction():
                           relative_gap=1e-2)  # fmt: skip
     worst = brentq(lambda f: math.asin(math.sin(f * ALPHA) / 2.5) + f * 0.004 - 0.05, 0.1, 9.0)
     best = brentq(lambda f: math.asin(math.sin(f * ALPHA) / 2.5) - f * 0.004 - 0.05, 0.1, 9.0)
-    assert 0.97 * worst < found.low < worst and best < found.high < 1.05 * best
+    assert 0.97 * worst < found.low < worst and best < found.high < 1.1 * best
 
 
 def test_a_guide_that_may_lean_is_undecided_with_a_reason():
