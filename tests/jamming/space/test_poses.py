@@ -207,6 +207,7 @@ def spherical(limit, off):
     return model, q
 
 
+@pytest.mark.slow
 def test_a_spherical_linkage_closes_by_nature_and_binds_when_an_axis_is_off():
     model, q = spherical(1e-6, 0.0)
     assert least_scale(Closure(model, False), q).scale < 1e-2 and prove_pose(model, q).state == 1
@@ -227,6 +228,7 @@ def test_all_rigid_jams_and_no_misalignment_is_free():
     assert prove_pose(model, q).state == 1
 
 
+@pytest.mark.slow
 def test_a_limit_that_touches_is_never_wrong():
     """Limits a few units in the last place beside the closed form; the box of a jam must hold the spherical tilt."""
     u = math.pi / 2

@@ -41,6 +41,7 @@ def allowed(u, direction=0.0, limit=LIMIT):
     return math.asin(math.sin(limit) / (1.5 * abs(math.sin(u - direction)))) / ALPHA
 
 
+@pytest.mark.slow
 def test_the_scale_of_one_bearing_lies_between_its_bounds():
     motion, wanted = moved(1.5, 1.6), allowed(math.pi / 2)
     found = largest_scale(motion, one_bearing(), ALPHA, model="exact")
@@ -50,6 +51,7 @@ def test_the_scale_of_one_bearing_lies_between_its_bounds():
     assert small.low > found.high and "small tilts" in small.model  # they differ by more than the bounds leave
 
 
+@pytest.mark.slow
 def test_with_tolerances_the_scale_is_that_of_the_worst_and_of_the_best_member():
     """Crank and coupler within 1 %: the bearing tilts by asin(l2 sin(alpha) sin(u) / l3)."""
     parts = [LengthTolerance(1, (0, 2), 0.03), LengthTolerance(2, (1, 3), 0.02)]
@@ -79,6 +81,7 @@ def test_no_scale_where_nothing_binds_or_everything_does():
     assert "any limits will do" in least_factor(motion, JointLimits(0.1), Misalignment(0, 1, 0.0)).reason
 
 
+@pytest.mark.slow
 def test_the_map_of_directions_is_the_closed_form():
     motion = moved(1.25, 1.5)
     found = direction_map(motion, one_bearing(), ALPHA, model="exact", directions=3)
@@ -104,6 +107,7 @@ def test_gain_and_promise_of_one_bearing():
     assert row.without == math.inf  # the joint is then as good as spherical
 
 
+@pytest.mark.slow
 def test_prices_are_slopes_of_the_least_factor():
     """Differences of the exact factor; all joints tilt and slide."""
     motion, tilt = moved(0.7, 0.71, lengths=(2, 1, 2.5, 2.5)), Misalignment(0, 1, 0.2, 0.3)
@@ -137,6 +141,7 @@ def test_the_factor_on_the_misalignments_is_that_of_a_search_with_rotation_matri
     assert missed < 1e-9 and least == pytest.approx(1.0, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_arcs_end_where_the_closed_form_has_them():
     alpha, motion = 1 / 30, moved(0.4, 0.5, lengths=(2, 1, 2.5, 2.5))
     joints = one_bearing(math.asin(0.4 * math.sin(alpha) * math.sin(0.45)))
@@ -146,6 +151,7 @@ def test_arcs_end_where_the_closed_form_has_them():
         assert first == 0.4 and last == 0.5 and low == free < 0.45 < binds == high and high - low < 0.04
 
 
+@pytest.mark.slow
 def test_reports_say_what_they_are_about_and_how_far_small_tilts_are_off():
     motion, alpha = moved(1.57, 1.571), 0.2
     small = assess_jamming(motion, tilt=alpha, joints=one_bearing(0.4), certify=False)

@@ -30,6 +30,7 @@ def test_between_small_and_exact_tilts_the_exact_ones_decide():
     assert report.verdict is JAMMED and "exact closure" in report.model
 
 
+@pytest.mark.slow
 def test_the_ends_of_a_range_of_limits_count():
     motion = simulate(four_bar(1, 3, 2, 3.5), [1.57, 1.571])
     tilt, wanted = Misalignment(0, 1, 0.02), math.asin(1.5 * math.sin(0.02))
