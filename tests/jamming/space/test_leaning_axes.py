@@ -48,7 +48,8 @@ def members(parts, limits, tilt, u=1.3):
 
 @pytest.mark.parametrize(("axis", "limit", "verdict"),
                          [((2, 3), 1.005 * (TILT + ANGLE), FREE), ((2, 3), 0.995 * (TILT + ANGLE), SOME),
-                          ((3, 2), 1.02 * (TILT + ANGLE), FREE), pytest.param((3, 2), 0.995 * (TILT + ANGLE), SOME, marks=SLOW),
+                          ((3, 2), 1.02 * (TILT + ANGLE), FREE),
+                          pytest.param((3, 2), 0.995 * (TILT + ANGLE), SOME, marks=SLOW),
                           ((2, 3), 0.97 * (TILT - ANGLE), JAMMED)])  # fmt: skip
 def test_an_axis_that_may_lean_adds_its_angle_to_the_tilt_of_one_bearing(axis, limit, verdict):
     """The coupler is free to turn about AB, so that only the lean along it counts: added, or taken off for the best."""
