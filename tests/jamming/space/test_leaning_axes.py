@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from coupled_oracles import four_bar
-from space_oracles import moved, product, rotation
+from space_oracles import case, joint_limits, moved, product, rotation
 from test_turn import one_bearing
 
 from graphsynth import Driver, Mechanism, MechanismGraph, Prismatic, Revolute, simulate
@@ -189,6 +189,31 @@ def test_the_scale_is_that_of_the_worst_direction():
     worst = brentq(lambda f: math.asin(math.sin(f * ALPHA) / 2.5) + f * 0.004 - 0.05, 0.1, 9.0)
     best = brentq(lambda f: math.asin(math.sin(f * ALPHA) / 2.5) - f * 0.004 - 0.05, 0.1, 9.0)
     assert 0.97 * worst < found.low < worst and best < found.high < 1.1 * best
+
+
+@SLOW
+@pytest.mark.parametrize("links", [4, 6])
+def test_random_mechanisms_with_leaning_axes_never_contradict_their_members(links):
+    rng, decided = np.random.default_rng(links), 0
+    for _ in range(8):
+        mechanism, motion, tilt, limits, factor = case(rng, links, 0.05)
+        given = joint_limits(limits, factor * rng.choice([0.6, 0.9, 1.1, 1.5]), tilt)
+        free = [joint for joint in mechanism.joints if joint.pair != tilt.pair]
+        ends = [own.pair[:: rng.choice([-1, 1])] for own in rng.choice(np.array(free, dtype=object), 2, replace=False)]
+        angle = tilt.alpha * 10.0 ** rng.uniform(-2.5, -1.0)
+        motion = simulate(mechanism, motion.inputs[0] + np.array([0.0, 1e-3]), start=motion.poses[0])
+        parts = [AxisAngle(int(a), int(b), angle) for a, b in ends]
+        found = certify_in_space(motion, given, tilt, tolerances=parts, seconds=15.0, resolution=0.5)
+        decided += found.verdict is not Verdict.UNDECIDED
+        if found.verdict not in (FREE, JAMMED):
+            continue
+        sharp = problem(mechanism, given, tilt).limits
+        for _ in range(3):
+            axes = [Misalignment(own.link, own.to, angle, rng.uniform(0.0, 6.28), rigid=False) for own in parts]
+            model = in_space(sharp_problem(mechanism, sharp, (tilt, *axes)))
+            state = prove_pose(model, start(model, mechanism, motion.poses[0])).state
+            assert state != (-1 if found.verdict is FREE else 1)
+    assert decided >= 5
 
 
 def test_a_guide_that_may_lean_is_undecided_with_a_reason():
