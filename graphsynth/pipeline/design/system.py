@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from graphsynth.evidence.rows import plans
 from graphsynth.pipeline.design.tables import DesignTable
 from graphsynth.pipeline.system import Stage, System
 
@@ -18,4 +19,5 @@ SYSTEM = System(
         Stage("plot", f"{_HERE}:curves", ("designs",), ("plots",)),
         Stage("mechanisms", f"{_HERE}:mechanisms", ("designs",), ("mechanisms",)),
     ),
+    evidence=plans("graphsynth.evidence.designs", "hidden-task", "nine-points"),
 )

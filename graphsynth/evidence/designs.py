@@ -1,0 +1,67 @@
+"""From a task to mechanisms: error against run time, where a mechanism that does the task exactly is known."""
+
+from __future__ import annotations
+
+import math
+from statistics import median
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from graphsynth.evidence.rows import Effort, Problem, Row
+from graphsynth.mechanism.four_bar import TiltedFourBar
+
+
+def hidden_task(context: Any, effort: Effort) -> Problem:
+    """Find four- and six-bars with a given pivot through twelve points of a four-bar: none need be missed."""
+    from graphsynth.design import DesignTask, PathTarget, design
+
+    inputs = np.linspace(0.0, 4.0, 12)
+    M = TiltedFourBar(2.2, 1.0, 2.4, 2.3, k=0.7).positions(inputs).M
+    target = PathTarget(points=[(float(x), float(y)) for x, y, _ in M], tolerance=0.002)
+    task = DesignTask(targets=[target], pivots=[(0.0, 0.0)], transmission=math.radians(15))
+    seeds = 1 if effort.quick else 3
+    design(task, seconds=0.1)  # compiled and loaded
+    rows = []
+    for limit in (1.0, 3.0) if effort.quick else (1.0, 2.0, 4.0, 8.0):
+        errors, times = [], []
+        for seed in range(seeds):
+            begin = perf_counter()
+            found = design(task, seconds=limit, count=1, seed=seed)
+            times.append(perf_counter() - begin)
+            errors.append(found[0].errors[0] if found.accepted else math.inf)
+        middle, why = median(errors), "" if math.isfinite(median(errors)) else "no answer within the time"
+        more = {"kind": f"largest distance from a point over the size of the set, median of {seeds} seeds"}
+        wrong = middle if math.isfinite(middle) else math.nan
+        timed = median(times), seeds
+        rows.append(Row.of("design", f"{limit:g} s at most", wrong, timed, why, reference="exact", **more))
+    note = "A search is random; it ends where answers were found and long no better one. The task is a fixed one."
+    question = "Mechanisms with a given pivot through twelve points of a four-bar"
+    return Problem("hidden-task", question, "relative", tuple(rows), "design", note)
+
+
+def nine_points(context: Any, effort: Effort) -> Problem:
+    """Find every four-bar through points of a coupler curve, with two, one and no given pivots; proved."""
+    from graphsynth.design import four_bars_through
+
+    inputs = np.linspace(0.2, 5.6, 9)
+    M = TiltedFourBar(2.2, 1.0, 2.4, 2.3, k=0.7).positions(inputs).M
+    points, pivots = [complex(x, y) for x, y, _ in M], [0j, 2.2 + 0j]
+    size, rows = max(abs(p - points[0]) for p in points), []
+    for held in (2, 1, 0):
+        count = 9 - 2 * held
+        given = points[:count], pivots[:held]
+        four_bars_through(*given)  # compiled and loaded
+        begin = perf_counter()
+        found = four_bars_through(*given)
+        timed = perf_counter() - begin, 1
+        radius = median(linkage.radius for linkage in found.linkages) / size
+        setting = f"{count} points, {held} pivots: {found.certified} of {found.expected}"
+        why = "" if found.complete else f"{found.expected - found.certified} solutions are not certified"
+        rows.append(Row.of("homotopy", setting, radius, timed, why, kind="proved radius, median", proved=True))
+    note = (
+        "Radius in which an exact linkage is proved, over the size of the points: of half of the real ones it is less."
+    )
+    question = "Every four-bar whose coupler passes given points"
+    return Problem("nine-points", question, "relative", tuple(rows), "homotopy", note)
