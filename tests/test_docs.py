@@ -334,3 +334,14 @@ def test_the_site_builds_without_warnings_and_other_sites_can_link_to_it(tmp_pat
     assert all(
         f'href="{page}.html"' in front for page in ("explanation/errata", "reference/api", "tutorial/first-mechanism")
     )
+
+
+def test_every_formula_can_be_read():
+    pytest.importorskip("docutils")
+    read, checked = of_docs("mathml").mathml, 0
+    for page in PAGES:
+        text = re.sub(r"`[^`]*`", "", FENCE.sub("", page.read_text(encoding="utf-8")))
+        for block, tex in re.findall(r"(\$\$|\$)(.+?)\1", text, re.DOTALL):
+            read(tex.strip(), block == "$$")  # a ValueError names the formula
+            checked += 1
+    assert checked > 1000
