@@ -26,6 +26,7 @@ def test_bounds_that_miss_are_failures(monkeypatch):
     assert {row.reason for row in rows} == {"the reference lies outside of what is proved"}
 
 
+@pytest.mark.slow
 def test_allocation_costs_no_more_than_the_best_by_quadrature():
     problem = chance.allocation(None, QUICK)
     default = next(row for row in problem.rows if row.default)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import pytest
+
 from graphsynth.evidence.designs import hidden_task, nine_points
 from graphsynth.evidence.rows import Effort
 
@@ -16,6 +18,7 @@ def test_nine_points_are_all_found_and_proved() -> None:
     assert all(row.proved and row.good and 0.0 < row.error < 1e-6 for row in problem.rows)
 
 
+@pytest.mark.slow
 def test_a_hidden_task_is_found_or_called_failed() -> None:
     problem = hidden_task(None, Effort(quick=True))
     for row in problem.rows:

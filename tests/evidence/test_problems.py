@@ -98,6 +98,7 @@ def test_the_torque_of_binding_has_errors_of_its_sampling():
     assert by(problem, "derivative of the energy")[-1].error < 1e-4
 
 
+@pytest.mark.slow
 def test_small_tilts_err_by_their_square():
     """Against the exact closure of the shipped press, tilted ten times as much."""
     from graphsynth.evidence.binding import small_tilts_problem

@@ -194,6 +194,7 @@ PARTS = [
 ]
 
 
+@pytest.mark.slow
 def test_tolerances_of_parts_are_those_of_python(tmp_path: Path) -> None:
     from graphsynth.jamming.joints import Misalignment, bearing_limits, certify_coupled
     from graphsynth.kinematics import simulate

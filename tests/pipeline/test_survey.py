@@ -195,6 +195,7 @@ def brute_force(scene: Scene) -> tuple[list[int], list[float]]:
     return order, [score[number] for number in order]
 
 
+@pytest.mark.slow
 def test_the_best_are_the_best_of_all_rows_whatever_is_certified() -> None:
     """Against a ranking of all rows, one by one, on random scenes."""
     random = np.random.default_rng(13)

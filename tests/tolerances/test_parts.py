@@ -366,6 +366,7 @@ def test_a_member_that_binds_is_named_and_binds():
     assert factor.max() >= found.witness.factor * (1.0 - 1e-9) > 1.0
 
 
+@pytest.mark.slow
 def test_a_named_member_has_its_hole_inside_the_circle():
     """Of a square round the circle the corners bind by far: pieces there are proved to bind, but hold no member."""
     mechanism, radius = Mechanism.four_bar(2, 0.7, 1.6, 1.9), 0.45

@@ -305,6 +305,7 @@ def test_a_dwell_stands_still_while_the_crank_turns() -> None:
     assert np.ptp(window, axis=1).min() < 2 * still * 1.05 and np.ptp(theta) > math.radians(24.9)
 
 
+@pytest.mark.slow
 def test_the_same_answers_for_any_executor_and_none_twice() -> None:
     task = DesignTask(targets=[PathTarget.segment((0, 0), (4, 0), count=12)], pivots=[(1, -3)], links=[4])
     one = design(task, count=4, seed=3)
@@ -363,6 +364,7 @@ def test_a_search_that_finds_nothing_says_only_that() -> None:
     assert found.rejected
 
 
+@pytest.mark.slow
 def test_given_bars_are_used_and_a_misalignment_is_forgiven() -> None:
     """A stroke of 4 by a crank, a bar of 2 and one of 5; the margin of binding is that of the jamming room."""
     path = PathTarget.segment((0, 0), (4, 0), count=12)
