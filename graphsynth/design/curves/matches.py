@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,9 +14,8 @@ from graphsynth.design.curves.families import Family
 from graphsynth.design.curves.sampling import TURN, move, reach
 from graphsynth.kinematics.dimensional.design import Design, World
 from graphsynth.kinematics.dimensional.goals import Goals
-from graphsynth.kinematics.dimensional.problem import DimensionProblem, own_frame
-from graphsynth.mechanism.laws import Driver, Linear
-from graphsynth.mechanism.model import Mechanism, TracePoint
+from graphsynth.kinematics.dimensional.problem import DimensionProblem, lying
+from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -131,16 +129,7 @@ class CurveStart:
         """The mechanism, with the tracing point "P"; it draws the curve over the inputs 0 to ``span``."""
         design = self.design
         world = [World.read(row) for row in design.dimensions(self.places[None], self.numbers[None])[0]]
-        own = [own_frame(design, link, world) for link in range(design.graph.links)]
-        origin, angle = own[self.link]
-        local = (self.point - origin) * cmath.exp(-1j * angle)
-        drivers = tuple(
-            Driver(b, k, Linear(float(self.sense), own[k][1] - own[b][1] if design.kinds[j] == "R" else 0.0))
-            for (b, k), j in zip(design.drivers, design.driver_joints)
-        )
-        pose = tuple((z.real, z.imag, angle) for z, angle in own)
-        points = {"P": TracePoint(self.link, (local.real, local.imag))}
-        return Mechanism(design.graph, design.joints(world, own), drivers, points, pose)
+        return lying(design, world, {"P": (self.link, self.point)}, float(self.sense))
 
     def problem(self, goals: Goals) -> tuple[DimensionProblem, Array]:
         """Return the search problem that begins here, and the vector of this mechanism in it.

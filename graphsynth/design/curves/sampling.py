@@ -75,11 +75,8 @@ def _dimensions(family: Family, count: int, random: np.random.Generator) -> tupl
     design = family.design
     sketch = layout(design.graph).positions
     places = sketch + random.normal(0.0, 1.0, (count, *sketch.shape)) * random.uniform(*_SHAKEN, (count, 1, 1))
-    for joint, own in design.cranks:
-        size = np.exp(random.uniform(math.log(_CRANKS[0]), math.log(_CRANKS[1]), (count, 1)))
-        for k in own:
-            if k != joint:
-                places[:, k] = places[:, joint] + size * (places[:, k] - places[:, joint])
+    sizes = random.uniform(math.log(_CRANKS[0]), math.log(_CRANKS[1]), (len(design.cranks), count))
+    places = design.with_cranks(places, np.exp(sizes))
     numbers = random.uniform(0.0, math.pi, (count, len(design.numbers)))
     return places.astype(np.float32).astype(np.float64), numbers.astype(np.float32).astype(np.float64)
 

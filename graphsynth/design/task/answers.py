@@ -22,19 +22,25 @@ from graphsynth.design.task.task import DesignTask
 from graphsynth.jamming.questions import largest_scale
 from graphsynth.kinematics.dimensional.design import World
 from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, matched
-from graphsynth.kinematics.dimensional.problem import carried, own_frame
-from graphsynth.kinematics.dimensional.verify import length_ratio, smallest_transmission
+from graphsynth.kinematics.dimensional.problem import carried, lying
+from graphsynth.kinematics.dimensional.verify import (
+    SAMPLES,
+    SLACK,
+    arm_lengths,
+    faults,
+    length_ratio,
+    side_lengths,
+    smallest_transmission,
+)
 from graphsynth.kinematics.simulation import simulate
-from graphsynth.mechanism.laws import Driver, Linear
-from graphsynth.mechanism.model import Mechanism, TracePoint
+from graphsynth.mechanism.laws import Linear
+from graphsynth.mechanism.model import Mechanism
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.certify.poses import MotionCertificate
     from graphsynth.kinematics.engine.result import Motion
 
 Array = NDArray[np.float64]
-#: Samples of a motion that is judged, slack of bounds, and the largest gap of a joint.
-_SAMPLES, _SLACK, _RESIDUAL = 720, 1e-6, 1e-9
 #: Relative difference of a length from that of a given bar.
 _FIT = 1e-3
 #: Samples of a motion that is certified, and boxes it may take.
@@ -76,22 +82,12 @@ def built(problem: TaskProblem, x: Array) -> tuple[Mechanism, tuple[float, ...]]
         carried(World.read(row), frames[joint.a], frames[joint.b], (1.0 + 0j, 0j))
         for joint, row in zip(design.graph.joints, table)
     ]
-    own = [own_frame(design, link, world) for link in range(design.graph.links)]
-    points: dict[str, TracePoint] = {}
+    points: dict[str, tuple[int, complex]] = {}
     for k, name in enumerate(name for name, of_point in model.task.names.items() if of_point):
-        link = model.carrier(name)
-        x0, y0, c, s = frames[link]
-        at = complex(x0, y0) + complex(c, s) * complex(*u.points[0, k])
-        local = (at - own[link][0]) * np.exp(-1j * own[link][1])
-        points[name] = TracePoint(link, (float(local.real), float(local.imag)))
-    (base, driven), joint = design.drivers[0], design.driver_joints[0]
-    turns = design.kinds[joint] == "R"
-    law = (
-        Linear(float(model.sense), own[driven][1] - own[base][1]) if turns else Linear(model.sense * float(u.stroke[0]))
-    )
-    pose = tuple((z.real, z.imag, angle) for z, angle in own)
+        x0, y0, c, s = frames[model.carrier(name)]
+        points[name] = model.carrier(name), complex(x0, y0) + complex(c, s) * complex(*u.points[0, k])
     starts = tuple(float(x[aim.start]) for aim in problem.aims if isinstance(aim, TimedAim) and aim.start >= 0)
-    return Mechanism(design.graph, design.joints(world, own), (Driver(base, driven, law),), points, pose), starts
+    return lying(design, world, points, model.sense * float(u.stroke[0])), starts
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -168,23 +164,17 @@ class DesignedMechanism(Shown):
 
 def judged(task: DesignTask, found: Candidate) -> DesignedMechanism:
     """Simulate a candidate anew and judge it."""
-    inputs = np.linspace(0.0, task.span, _SAMPLES + 1)
+    inputs = np.linspace(0.0, task.span, SAMPLES + 1)
     motion = simulate(found.mechanism, inputs)
     done = motion.completed
     carriers = dict(zip(task.names, found.plan.carriers))
     errors = _errors(task, motion, carriers, found.starts) if done else (math.inf,) * len(task.targets)
     angle, ratio = smallest_transmission(motion), length_ratio(motion.mechanism)
-    closed = motion.closure.tested and motion.closure.closed
-    meet = any(event.kind in ("change point", "near fold", "fold", "escape", "singular") for event in motion.events)
     places = _places(motion)
     wrong = {
-        "the range is not completed": not done,
-        "not closed after the turn": done and task.drive == "rotation" and not closed,
-        "two assembly modes meet or nearly meet": meet,
-        "an assembly mode changes": done and bool((motion.modes != motion.modes[0]).any()),
-        "a joint opens": done and not motion.residual <= _RESIDUAL,
-        "the transmission angle is too small": not angle >= task.transmission - _SLACK,
-        "the length ratio is too large": not ratio <= task.length_ratio * (1.0 + _SLACK),
+        **faults(motion, task.drive == "rotation"),
+        "the transmission angle is too small": not angle >= task.transmission - SLACK,
+        "the length ratio is too large": not ratio <= task.length_ratio * (1.0 + SLACK),
         **_bounds(task, motion, places),
     }
     for target, error in zip(task.targets, errors):
@@ -223,7 +213,7 @@ def _places(motion: Motion) -> Array:
 
 def _bounds(task: DesignTask, motion: Motion, places: Array) -> dict[str, bool]:
     """Tell which bounds of the task are broken."""
-    slack, mechanism = _SLACK * task.size, motion.mechanism
+    slack, mechanism = SLACK * task.size, motion.mechanism
     broken: dict[str, bool] = {}
 
     def outside(box: tuple[float, ...], points: Array) -> bool:
@@ -235,13 +225,13 @@ def _bounds(task: DesignTask, motion: Motion, places: Array) -> dict[str, bool]:
     frame = [k for k, joint in enumerate(mechanism.joints) if mechanism.frame in joint.pair]
     if task.pivot_region is not None:
         broken["a pivot leaves its region"] = outside(task.pivot_region, places[:1, frame])
-    lengths = _lengths(mechanism)
+    lengths = side_lengths(mechanism) or [1.0]
     if task.lengths is not None:
         broken["a length is out of its bounds"] = bool(
-            min(lengths) < task.lengths[0] * (1 - _SLACK) or max(lengths) > task.lengths[1] * (1 + _SLACK)
+            min(lengths) < task.lengths[0] * (1 - SLACK) or max(lengths) > task.lengths[1] * (1 + SLACK)
         )
     if task.bars:
-        lengths = _lengths(mechanism, moving=True)
+        lengths = side_lengths(mechanism, {*range(mechanism.graph.links)} - {mechanism.frame}) or [1.0]
         for bar in task.bars:
             k = min(range(len(lengths)), key=lambda k: abs(math.log(lengths[k] / bar)), default=-1)
             fits = k >= 0 and abs(math.log(lengths.pop(k) / bar)) <= _FIT
@@ -250,20 +240,9 @@ def _bounds(task: DesignTask, motion: Motion, places: Array) -> dict[str, bool]:
         law = mechanism.drivers[0].law
         stroke = abs(law.rate) if isinstance(law, Linear) else math.nan
         broken["the stroke is out of its bounds"] = not (
-            task.stroke[0] * (1 - _SLACK) <= stroke <= task.stroke[1] * (1 + _SLACK)
+            task.stroke[0] * (1 - SLACK) <= stroke <= task.stroke[1] * (1 + SLACK)
         )
     return broken
-
-
-def _lengths(mechanism: Mechanism, moving: bool = False) -> list[float]:
-    """Distances of revolute joints on one link, the frame left out or not."""
-    found = []
-    for link in range(mechanism.graph.links):
-        if moving and link == mechanism.frame:
-            continue
-        own = [j.at_a if j.a == link else j.at_b for j in mechanism.joints if link in j.pair and j.kind == "R"]
-        found += [math.dist(p, q) for i, p in enumerate(own) for q in own[i + 1 :]]
-    return found or [1.0]
 
 
 def signature(task: DesignTask, answer: DesignedMechanism) -> Array:
@@ -271,10 +250,7 @@ def signature(task: DesignTask, answer: DesignedMechanism) -> Array:
 
     So have, for a task without a length, those of another size.
     """
-    mechanism, found = answer.mechanism, _lengths(answer.mechanism)
-    for point in mechanism.points.values():
-        own = [j.at_a if j.a == point.link else j.at_b for j in mechanism.joints if point.link in j.pair]
-        found += [math.dist(point.at, p) for p in own]
+    found = side_lengths(answer.mechanism) + arm_lengths(answer.mechanism)
     logarithms = np.log(np.maximum(np.sort(found), 1e-12))
     return np.asarray(logarithms if task.sized else logarithms - logarithms.mean())
 

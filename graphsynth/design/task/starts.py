@@ -99,10 +99,8 @@ def random_starts(model: Model, count: int, random: np.random.Generator) -> Unkn
         random.uniform(0.0, 0.4, (count, 1, 1)) + wide
     )
     if model.task.drive == "rotation":
-        for joint, own in design.cranks:
-            size = np.exp(random.uniform(math.log(0.12), math.log(2.0), (count, 1)))
-            for k in {*own} - {joint}:
-                places[:, k] = places[:, joint] + size * (places[:, k] - places[:, joint])
+        sizes = random.uniform(math.log(0.12), math.log(2.0), (len(design.cranks), count))
+        places = design.with_cranks(places, np.exp(sizes))
     numbers = random.uniform(0.0, math.pi, (count, len(design.numbers)))
     stroke = np.exp(random.uniform(math.log(0.3), math.log(2.0), count)) if model.task.linear else np.ones(count)
     points = np.zeros((count, sum(model.task.names.values()), 2))

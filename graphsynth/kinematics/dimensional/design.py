@@ -159,6 +159,14 @@ class Design:
                 found.append((k, self.joints_of(b if a == frame else a)))
         return tuple(found)
 
+    def with_cranks(self, places: Array, sizes: Array) -> Array:
+        """Return places (sets, joints, 2) with the links of `cranks` larger or smaller by factors (cranks, sets)."""
+        places = places.copy()
+        for (joint, own), size in zip(self.cranks, sizes, strict=True):
+            for k in {*own} - {joint}:
+                places[:, k] = places[:, joint] + size[:, None] * (places[:, k] - places[:, joint])
+        return places
+
     def joints_of(self, link: int) -> list[int]:
         """Return the indices of the joints of a link that have a place: all but gears."""
         joints = enumerate(self.graph.joints)

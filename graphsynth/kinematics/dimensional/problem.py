@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -131,10 +132,8 @@ class DimensionProblem:
         """Places of the automatic sketch, shifted a little, with the driven links shrunk to cranks."""
         places = layout(self.design.graph).positions.copy()
         places += random.normal(0.0, 0.12, places.shape)
-        for joint, own in self.design.cranks:
-            for k in own:
-                places[k] = places[joint] + 0.3 * (places[k] - places[joint])
-        found, _ = self.design.symmetric(places[None], np.zeros((1, len(self.design.numbers))))
+        places = self.design.with_cranks(places[None], np.full((len(self.design.cranks), 1), 0.3))
+        found, _ = self.design.symmetric(places, np.zeros((1, len(self.design.numbers))))
         return np.asarray(found[0])
 
     # --- from vectors to motions
@@ -162,10 +161,8 @@ class DimensionProblem:
         places = np.repeat(self.sketch[None], count, axis=0)
         places += random.normal(0.0, 1.0, places.shape) * (random.uniform(0.0, 0.35, (count, 1, 1)) + wide)
         places[:, self.design.fixed] = self.sketch[list(self.design.fixed)]
-        for joint, own in self.design.cranks:
-            size = np.exp(random.uniform(math.log(0.15), math.log(2.0), (count, 1)))
-            for k in set(own) - {*self.design.fixed}:
-                places[:, k] = places[:, joint] + size * (places[:, k] - places[:, joint])
+        sizes = random.uniform(math.log(0.15), math.log(2.0), (len(self.design.cranks), count))
+        places = self.design.with_cranks(places, np.exp(sizes))
         numbers = self.numbers + random.normal(0.0, 0.5, (count, len(self.numbers)))
         box = self.bounds()
         ranges = box[len(box) - self.extras :]
@@ -296,19 +293,27 @@ def dimensioned(problem: DimensionProblem, x: Array) -> Mechanism | None:
         carried(World.read(row), frames[joint.a], frames[joint.b], (s, t))
         for joint, row in zip(design.graph.joints, table)
     ]
+    points = {} if problem.fit is None else {"P": (problem.link, s * point_at + t)}
+    return lying(design, world, points, float(problem.sense))
+
+
+def lying(design: Design, world: list[World], points: Mapping[str, tuple[int, complex]], rate: float) -> Mechanism:
+    """Return the mechanism whose joints and named points (link, place) lie at some places at the first input.
+
+    The law of a driver that turns begins at the angle of its links' frames, so that inputs begin at 0.
+    """
     own = [own_frame(design, link, world) for link in range(design.graph.links)]
-    joints = design.joints(world, own)
-    points: dict[str, TracePoint] = {}
-    if problem.fit is not None:
-        origin, angle = own[problem.link]
-        local = (s * point_at + t - origin) * cmath.exp(-1j * angle)
-        points["P"] = TracePoint(problem.link, (local.real, local.imag))
-    pose = [(z.real, z.imag, angle) for z, angle in own]
+    named: dict[str, TracePoint] = {}
+    for name, (link, place) in points.items():
+        origin, angle = own[link]
+        local = (place - origin) * cmath.exp(-1j * angle)
+        named[name] = TracePoint(link, (local.real, local.imag))
     drivers = tuple(
-        Driver(b, k, Linear(float(problem.sense), own[k][1] - own[b][1] if design.kinds[j] == "R" else 0.0))
+        Driver(b, k, Linear(rate, own[k][1] - own[b][1] if design.kinds[j] == "R" else 0.0))
         for (b, k), j in zip(design.drivers, design.driver_joints)
     )
-    return Mechanism(design.graph, joints, drivers, points, tuple(pose))
+    pose = tuple((z.real, z.imag, angle) for z, angle in own)
+    return Mechanism(design.graph, design.joints(world, own), drivers, named, pose)
 
 
 def carried(at: World, frame_a: Array, frame_b: Array, by: tuple[complex, complex]) -> World:

@@ -7,8 +7,9 @@ constraint matrix of the group's core links, one row per bar: the unit vector al
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -26,10 +27,13 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_SAMPLES = 720
+#: Samples of a motion that is judged.
+SAMPLES = 720
 _RESIDUAL = 1e-9
 #: Slack on stated bounds: they are met on a grid, and a smallest value lies between samples.
-_SLACK = 1e-6
+SLACK = 1e-6
+#: Events at which two assembly modes meet or nearly meet.
+_MEETINGS = ("change point", "near fold", "fold", "escape", "singular")
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,7 @@ class Figures:
 def verify(mechanism: Mechanism, goals: Goals) -> tuple[Motion, Figures, tuple[str, ...]]:
     """Simulate the range anew and return the motion, its figures, and every reason to reject it (none: accepted)."""
     # a fine grid that contains the inputs of the target, and where they are
-    inputs, target, own = np.linspace(0.0, goals.span, _SAMPLES + 1), goals.target, np.zeros(0)
+    inputs, target, own = np.linspace(0.0, goals.span, SAMPLES + 1), goals.target, np.zeros(0)
     if isinstance(target, LineGoal):
         own = np.array([target.span])
     elif target is not None and target.inputs is not None:
@@ -73,16 +77,10 @@ def verify(mechanism: Mechanism, goals: Goals) -> tuple[Motion, Figures, tuple[s
     done = motion.completed
     angle, ratio = smallest_transmission(motion), length_ratio(mechanism)
     error = _goal_error(motion, goals, inputs, at) if done else math.nan
-    closed = motion.closure.tested and motion.closure.closed
-    meetings = ("change point", "near fold", "fold", "escape", "singular")
     missed = {
-        "the range is not completed": not done,
-        "not closed after the turn": done and goals.full_turn and not closed,
-        "two assembly modes meet or nearly meet": any(event.kind in meetings for event in motion.events),
-        "an assembly mode changes": done and bool((motion.modes != motion.modes[0]).any()),
-        "a joint opens": done and not motion.residual <= _RESIDUAL,
-        "the transmission angle is too small": not angle >= goals.min_transmission_angle - _SLACK,
-        "the length ratio is too large": not ratio <= goals.max_length_ratio * (1.0 + _SLACK),
+        **faults(motion, goals.full_turn),
+        "the transmission angle is too small": not angle >= goals.min_transmission_angle - SLACK,
+        "the length ratio is too large": not ratio <= goals.max_length_ratio * (1.0 + SLACK),
         "the target is missed": target is not None and not error <= target.tolerance,
     }
     figures = Figures(
@@ -94,6 +92,18 @@ def verify(mechanism: Mechanism, goals: Goals) -> tuple[Motion, Figures, tuple[s
         closure=motion.closure.error,
     )
     return motion, figures, tuple(reason for reason, wrong in missed.items() if wrong)
+
+
+def faults(motion: Motion, full_turn: bool) -> dict[str, bool]:
+    """Tell what is wrong with a motion, whatever it is for: it ends early, changes its branch, or opens."""
+    done, closed = motion.completed, motion.closure.tested and motion.closure.closed
+    return {
+        "the range is not completed": not done,
+        "not closed after the turn": done and full_turn and not closed,
+        "two assembly modes meet or nearly meet": any(event.kind in _MEETINGS for event in motion.events),
+        "an assembly mode changes": done and bool((motion.modes != motion.modes[0]).any()),
+        "a joint opens": done and not motion.residual <= _RESIDUAL,
+    }
 
 
 def smallest_transmission(motion: Motion) -> float:
@@ -112,21 +122,30 @@ def smallest_transmission(motion: Motion) -> float:
     return float(np.arcsin(min(1.0, sines.min(initial=1.0))))
 
 
+def side_lengths(mechanism: Mechanism, links: Iterable[int] | None = None) -> list[float]:
+    """Distances of revolute joints on one link, of all links or some."""
+    found = []
+    for link in range(mechanism.graph.links) if links is None else links:
+        own = [j.at_a if j.a == link else j.at_b for j in mechanism.joints if link in j.pair and j.kind == "R"]
+        found += [math.dist(p, q) for p, q in combinations(own, 2)]
+    return found
+
+
+def arm_lengths(mechanism: Mechanism) -> list[float]:
+    """Distances of named points from the joints of their links."""
+    found = []
+    for point in mechanism.points.values():
+        own = [j.at_a if j.a == point.link else j.at_b for j in mechanism.joints if point.link in j.pair]
+        found += [math.dist(point.at, p) for p in own]
+    return found
+
+
 def length_ratio(mechanism: Mechanism) -> float:
     """Longest over shortest distance of two revolute joints on one link; named points count among the long ones."""
-    lengths, arms = [], []
-    for link in range(mechanism.graph.links):
-        at = [
-            complex(*(joint.at_a if joint.a == link else joint.at_b))
-            for joint in mechanism.joints
-            if isinstance(joint, Revolute) and link in (joint.a, joint.b)
-        ]
-        lengths += [abs(p - q) for i, p in enumerate(at) for q in at[i + 1 :]]
-        every = [complex(*(j.at_a if j.a == link else j.at_b)) for j in mechanism.joints if link in (j.a, j.b)]
-        arms += [abs(complex(*p.at) - z) for p in mechanism.points.values() if p.link == link for z in every]
+    lengths = side_lengths(mechanism)
     if not lengths:
         return 1.0
-    return max([*lengths, *arms]) / min(lengths) if min(lengths) > 0.0 else math.inf
+    return max([*lengths, *arm_lengths(mechanism)]) / min(lengths) if min(lengths) > 0.0 else math.inf
 
 
 def _goal_error(motion: Motion, goals: Goals, inputs: Array, at: NDArray[np.intp]) -> float:
