@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Any, overload
+from collections.abc import Callable, Sequence
+from typing import Any, Generic, Self, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import finite, finite_array
 from graphsynth.core.errors import GeometryError
 
+G = TypeVar("G")  # as it may be given
+K = TypeVar("K")  # as it is kept
 #: Radians of a unit.
 _UNITS = {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0, "turn": math.tau, "turns": math.tau}
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -71,6 +74,53 @@ def angles(name: str, values: Any) -> NDArray[np.float64]:
     if isinstance(values, list | tuple) and any(isinstance(value, str) for value in values):
         return np.array([angle(f"{name}[{k}]", value) for k, value in enumerate(values)])
     return finite_array(name, values)
+
+
+class Kept(Generic[G, K]):
+    """A field of a dataclass that may be given in other words than it is kept: type checkers see both types.
+
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Arm:
+    ...     direction: Kept[float | str, float] = Kept(angle, "90 deg")
+    >>> Arm().direction, Arm("180 deg").direction, Arm(0.5)
+    (1.5707963267948966, 3.141592653589793, Arm(direction=0.5))
+    """
+
+    def __init__(self, read: Callable[[str, G], K], *default: G) -> None:
+        self.read, self.default = read, default
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, instance: object, owner: type) -> K: ...
+    def __get__(self, instance: object | None, owner: type) -> Any:
+        """Return the value; of the class the default, which is what a dataclass asks for."""
+        if instance is not None:
+            return instance.__dict__[self.name]
+        if not self.default:
+            raise AttributeError(self.name)
+        return self.default[0]
+
+    def __set__(self, instance: object, value: G) -> None:
+        instance.__dict__[self.name] = self.read(self.name, value)
+
+
+def optional(read: Callable[[str, G], K]) -> Callable[[str, G | None], K | None]:
+    """Return what reads a value or keeps None."""
+    return lambda name, value: None if value is None else read(name, value)
+
+
+def listed(name: str, values: Sequence[float | str]) -> tuple[float, ...]:
+    """Return angles or lengths as a tuple, read as `angles` does.
+
+    >>> listed("inputs", [0, "180 deg"])
+    (0.0, 3.141592653589793)
+    """
+    return tuple(angles(name, values if isinstance(values, str) else list(values)).tolist())
 
 
 def _read(name: str, text: str) -> NDArray[np.float64]:

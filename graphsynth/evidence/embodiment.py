@@ -6,6 +6,7 @@ A search is random: rows of one setting are several seeds, of which the median c
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cache
 from inspect import signature
 from statistics import median
@@ -55,20 +56,30 @@ def _rows(
     default = given["effort"].default, given["tries"].default
     rows = []
     for effort, tries in settings:
-        errors, times, lost = [], [], ""
-        for seed in range(seeds):
-            begin = perf_counter()
+
+        def once(seed: int, effort: float = effort, tries: int = tries) -> tuple[float, str]:
             found = embody(graph, goals, seed, driver=1, tries=tries, effort=effort)
-            times.append(perf_counter() - begin)
-            errors.append(error(found) if found.accepted else math.inf)
-            lost = lost if found.accepted else found.statement
-        middle = median(errors)
-        more = {"kind": kind, "reference": reference, "default": (effort, tries) == default}
-        more["more"] = {"seeds accepted": float(sum(map(math.isfinite, errors)))}
+            return (error(found), "") if found.accepted else (math.inf, found.statement)
+
         setting = f"effort {effort:g}, {tries} tr{'y' if tries == 1 else 'ies'}"
-        wrong, why = (middle, "") if math.isfinite(middle) else (math.nan, lost)
-        rows.append(Row.of("search", setting, wrong, (median(times), seeds), why, **more))
+        more = {"kind": kind, "reference": reference, "default": (effort, tries) == default}
+        rows.append(median_row("search", setting, once, seeds, **more))
     return tuple(rows)
+
+
+def median_row(method: str, setting: str, once: Callable[[int], tuple[float, str]], seeds: int, **more: Any) -> Row:
+    """Return the row of a random search: medians over seeds of its error, infinite with a reason, and of its time."""
+    errors, times, why = [], [], ""
+    for seed in range(seeds):
+        begin = perf_counter()
+        error, lost = once(seed)
+        times.append(perf_counter() - begin)
+        errors.append(error)
+        why = lost or why
+    middle = median(errors)
+    found = {"seeds accepted": float(sum(map(math.isfinite, errors)))}
+    wrong, why = (middle, "") if math.isfinite(middle) else (math.nan, why)
+    return Row.of(method, setting, wrong, (median(times), seeds), why, more=found, **more)
 
 
 def line_problem(effort: Effort | None = None) -> Problem:

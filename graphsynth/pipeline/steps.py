@@ -7,6 +7,7 @@ import time
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from operator import le
 from typing import TYPE_CHECKING, Any
 
@@ -66,6 +67,14 @@ def spec_of(context: Context) -> StructuralSpec:
         raise place.error(f"cannot be read: {error}", key) from error
 
 
+@lru_cache
+def count_of(spec: StructuralSpec) -> int:
+    """Return how many mechanisms answer a structural question, counted once."""
+    from graphsynth.synthesis import count_mechanisms
+
+    return count_mechanisms(spec)
+
+
 def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> Iterator[Candidate]:
     """Yield the mechanisms of the question, each once up to isomorphism, filtered as ``[structure.generate]`` says.
 
@@ -107,13 +116,13 @@ def mechanisms(context: Context, solutions: tuple[LinkAssortment, ...]) -> Itera
 
 def _filtered(context: Context) -> Iterator[MechanismGraph]:
     """Yield of the graphs that are given, or drawn, or answer the question those that pass the filters."""
-    from graphsynth.synthesis import count_mechanisms, enumerate_mechanisms, sample_mechanisms
+    from graphsynth.synthesis import enumerate_mechanisms, sample_mechanisms
 
     table, options = _structure(context), _structure(context).generate
     found: Iterable[MechanismGraph]
     if table.graphs:
         found = (_read(context, i, text) for i, text in enumerate(table.graphs))
-    elif options.sample is not None and count_mechanisms(spec_of(context)) > options.sample:
+    elif options.sample is not None and count_of(spec_of(context)) > options.sample:
         drawn = sample_mechanisms(spec_of(context), options.sample, context.scene.scene.seed)
         found = {graph.key: graph for graph in drawn}.values()
     else:

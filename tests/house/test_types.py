@@ -54,3 +54,25 @@ def test_a_wrong_call_is_seen(tmp_path: Path) -> None:
     said = checked('import graphsynth as gs\n\nx: str = gs.count_chains("twelve", nonsense=3)\n', tmp_path)
     assert sum(": error:" in line and "script.py" in line for line in said) >= 2, said
     assert any("str" in line for line in said) and any("nonsense" in line for line in said)
+
+
+def test_angles_are_given_as_texts_and_read_as_numbers(tmp_path: Path) -> None:
+    said = checked(
+        """from graphsynth.design import DesignTask, DwellTarget, PathTarget, PosesTarget, SwingTarget
+
+path = PathTarget(points=[(0, 0), (1, 1)], inputs=["0 deg", 1.0])
+poses = PosesTarget(poses=[(0, 0, "3 deg"), (1, 1, 0.1)])
+task = DesignTask(targets=[path, poses, SwingTarget(most="40 deg")], transmission="30 deg", misalignment="1 deg")
+reveal_type(task.transmission)
+reveal_type(task.misalignment)
+reveal_type(path.inputs)
+reveal_type(poses.poses[0][2])
+reveal_type(DwellTarget(span="40 deg").span)
+DesignTask(targets=[], transmission=[30])
+""",
+        tmp_path,
+    )
+    said = [line for line in said if "script.py" in line]
+    kept = [line.partition("Revealed type is ")[2].strip('"').replace("builtins.", "") for line in said[:5]]
+    assert kept == ["float", "float | None", "tuple[float, ...] | None", "float", "float"]
+    assert len(said) == 6 and "transmission" in said[5] and ": error:" in said[5]

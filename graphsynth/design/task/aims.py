@@ -91,7 +91,7 @@ class PointAim(TimedAim):
     """A point passes points, or a link poses; for poses one more unknown, the line from which angles are measured."""
 
     def __init__(self, model: Model, at: int, target: PathTarget | PosesTarget) -> None:
-        super().__init__(model, at, target.weight / target.tolerance, target.inputs, target.own_start)  # type: ignore[arg-type]
+        super().__init__(model, at, target.weight / target.tolerance, target.inputs, target.own_start)
         self.goal, self.size = target.goal, target.size
         self.turn = target.turn if isinstance(target, PosesTarget) else None
         self.unknowns += self.turn is not None
@@ -228,7 +228,7 @@ class FunctionAim(TimedAim):
         else:
             inputs = tuple(((target.start or 0.0) + np.linspace(0.0, target.span, _STILL)).tolist())
             outputs, own_start = np.zeros(_STILL), target.start is None
-        super().__init__(model, at, target.weight / target.tolerance / math.sqrt(len(outputs)), inputs, own_start)  # type: ignore[arg-type]
+        super().__init__(model, at, target.weight / target.tolerance / math.sqrt(len(outputs)), inputs, own_start)
         self.outputs, self.measure = outputs, Measure(model, target.link)
         self.unknowns += 1
 

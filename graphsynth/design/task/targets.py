@@ -15,11 +15,15 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.angles import angle, angles
+from graphsynth.core.angles import Kept, angle, angles, listed, optional
 from graphsynth.core.checks import finite, point, positive, whole
 from graphsynth.core.errors import GeometryError
 
 Point = tuple[float, float]
+#: Place and angle.
+Pose = tuple[float, float, float]
+#: Angles or parts of a stroke, if any; type checkers forget what is kept of a frozen field that is inherited.
+Inputs = Kept[Sequence[float | str] | None, tuple[float, ...] | None]
 #: Points of a curve that is given as a whole: a segment, an arc, a drawing.
 _COUNT = 48
 #: Most points, poses or values of a target.
@@ -68,7 +72,7 @@ class TimedTarget(Target):
         The inputs count from a start of their own, which is free; else from the start that all targets share.
     """
 
-    inputs: Sequence[float] | None = None
+    inputs: Inputs = Kept(optional(listed), None)
     own_start: bool = False
 
     @property
@@ -85,12 +89,11 @@ class TimedTarget(Target):
         """Check and keep the inputs of a target with so many values."""
         if self.inputs is None:
             return
-        found = tuple(angles("inputs", list(self.inputs)).tolist())
+        found = self.inputs
         if len(found) != count:
             raise GeometryError(f"the target has {count} values but {len(found)} inputs; give one input for each")
         if any(b <= a for a, b in pairwise(found)) or found[-1] - found[0] > math.tau + 1e-12:
             raise GeometryError("inputs must increase, over at most one turn, 2 pi; sort them and remove duplicates")
-        object.__setattr__(self, "inputs", found)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,6 +118,7 @@ class PathTarget(TimedTarget):
     """
 
     points: Sequence[Point]
+    inputs: Inputs = Kept(optional(listed), None)
     closed: bool = False
     point: str = "P"
 
@@ -218,6 +222,11 @@ def _read_svg(data: str, fine: int = 64) -> NDArray[np.complex128]:
     return np.array([w.conjugate() for w in z])
 
 
+def _poses(name: str, given: Sequence[tuple[float, float, float | str]]) -> tuple[Pose, ...]:
+    """Read poses: places, and angles as numbers or texts."""
+    return tuple((*point(f"{name}[{k}]", (p[0], p[1])), angle(f"{name}[{k}]", p[2])) for k, p in enumerate(given))
+
+
 @dataclass(frozen=True, kw_only=True)
 class PosesTarget(TimedTarget):
     """A link passes poses, in order (motion generation).
@@ -233,16 +242,15 @@ class PosesTarget(TimedTarget):
         Name of the point.
     """
 
-    poses: Sequence[tuple[float, float, float]]
+    poses: Kept[Sequence[tuple[float, float, float | str]], tuple[Pose, ...]] = Kept(_poses)
+    inputs: Inputs = Kept(optional(listed), None)
     point: str = "P"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        rows = [(*point(f"poses[{k}]", (p[0], p[1])), angle(f"poses[{k}]", p[2])) for k, p in enumerate(self.poses)]
-        if not 2 <= len(rows) <= MOST:
-            raise GeometryError(f"a motion needs 2 to {MOST} poses; it has {len(rows)}")
-        object.__setattr__(self, "poses", tuple(rows))
-        self._time(len(rows))
+        if not 2 <= len(self.poses) <= MOST:
+            raise GeometryError(f"a motion needs 2 to {MOST} poses; it has {len(self.poses)}")
+        self._time(len(self.poses))
 
     @property
     def unknowns(self) -> int:
@@ -279,7 +287,8 @@ class FunctionTarget(TimedTarget):
         It slides on the frame: outputs and tolerance are lengths.
     """
 
-    outputs: Sequence[float]
+    outputs: Kept[Sequence[float | str], tuple[float, ...]] = Kept(listed)
+    inputs: Inputs = Kept(optional(listed), None)
     link: str = "output"
     slides: bool = False
 
@@ -287,7 +296,6 @@ class FunctionTarget(TimedTarget):
         super().__post_init__()
         if self.inputs is None:
             raise GeometryError("a function needs inputs; give one for each output")
-        object.__setattr__(self, "outputs", tuple(angles("outputs", list(self.outputs)).tolist()))
         self._time(len(self.outputs))
 
     @property
@@ -339,26 +347,27 @@ class DwellTarget(Target):
         As of a function.
     """
 
-    span: float
-    start: float | None = None
+    span: Kept[float | str, float] = Kept(angle)
+    start: Kept[float | str | None, float | None] = Kept(optional(angle), None)
     link: str = "output"
     slides: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        span = positive("span", angle("span", self.span))
-        if span > math.tau:
+        if positive("span", self.span) > math.tau:
             raise GeometryError(
-                f"span = {span:.6g} is longer than a turn, 2 pi; give the part of it that is to be still"
+                f"span = {self.span:.6g} is longer than a turn, 2 pi; give the part of it that is to be still"
             )
-        object.__setattr__(self, "span", span)
-        if self.start is not None:
-            object.__setattr__(self, "start", angle("start", self.start))
 
     @property
     def unknowns(self) -> int:
         """One for the output, one for where it begins."""
         return 1 + (self.start is None)
+
+
+def _limit(name: str, value: float | str) -> float:
+    """Read an angle or length, which may be infinite."""
+    return math.inf if value == math.inf else angle(name, value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -375,20 +384,18 @@ class SwingTarget(Target):
         As of a function.
     """
 
-    least: float = 0.0
-    most: float = math.inf
+    least: Kept[float | str, float] = Kept(angle, 0.0)
+    most: Kept[float | str, float] = Kept(_limit, math.inf)
     time_ratio: float | None = None
     link: str = "output"
     slides: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        least = angle("least", self.least)
-        most = math.inf if self.most == math.inf else angle("most", self.most)
-        if not 0.0 <= least <= most or most <= 0.0:
-            raise GeometryError(f"least = {least:.6g} and most = {most:.6g} must be 0 <= least <= most; correct them")
-        object.__setattr__(self, "least", least)
-        object.__setattr__(self, "most", most)
+        if not 0.0 <= self.least <= self.most or self.most <= 0.0:
+            raise GeometryError(
+                f"least = {self.least:.6g} and most = {self.most:.6g} must be 0 <= least <= most; correct them"
+            )
         if self.time_ratio is not None and not 1.0 <= finite("time_ratio", self.time_ratio) <= 20.0:
             raise GeometryError(f"time_ratio = {self.time_ratio} must lie in 1 to 20: slow over quick")
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Literal
 
-from graphsynth.core.angles import angle
+from graphsynth.core.angles import Kept, angle, optional
 from graphsynth.core.checks import choice, finite, point, positive, whole
 from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import Shown
@@ -73,7 +73,7 @@ class DesignTask(Shown):
 
     targets: Sequence[Target]
     drive: Drive = "rotation"
-    span: float = math.tau
+    span: Kept[float | str, float] = Kept(angle, math.tau)
     stroke: tuple[float, float] | None = None
     links: Sequence[int] = (4, 6)
     sliders: int = 0
@@ -84,9 +84,9 @@ class DesignTask(Shown):
     crank: float | None = None
     bars: Sequence[float] = ()
     length_ratio: float = 8.0
-    transmission: float = math.radians(25.0)
-    misalignment: float | None = None
-    joint_tilt: float = math.radians(0.3)
+    transmission: Kept[float | str, float] = Kept(angle, math.radians(25.0))
+    misalignment: Kept[float | str | None, float | None] = Kept(optional(angle), None)
+    joint_tilt: Kept[float | str, float] = Kept(angle, math.radians(0.3))
     rank: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -96,7 +96,7 @@ class DesignTask(Shown):
             raise GeometryError(f"targets = {self.targets!r} must be one or more targets, such as a PathTarget")
         put(self, "targets", targets)
         choice("drive", self.drive, ("rotation", "rocking", "cylinder", "slide"))
-        span = 1.0 if self.linear else positive("span", angle("span", self.span))
+        span = 1.0 if self.linear else positive("span", self.span)
         if span > math.tau or (self.drive == "rotation" and span < math.tau):
             raise GeometryError(
                 f"span = {span:.6g} must be at most 2 pi, and a turn for a rotation; use drive 'rocking'"
@@ -124,12 +124,11 @@ class DesignTask(Shown):
         put(self, "bars", tuple(positive(f"bars[{k}]", bar) for k, bar in enumerate(self.bars)))
         for name in ("misalignment", "joint_tilt"):
             if getattr(self, name) is not None:
-                put(self, name, positive(name, angle(name, getattr(self, name))))
+                positive(name, getattr(self, name))
         if self.misalignment is not None and self.linear:
             raise GeometryError("misalignment is that of an axis that is driven; a linear drive has none: leave it out")
         if finite("length_ratio", self.length_ratio) < 1.0:
             raise GeometryError(f"length_ratio = {self.length_ratio} must be 1 or more")
-        put(self, "transmission", angle("transmission", self.transmission))
         if not 0.0 <= self.transmission < 0.5 * math.pi:
             raise GeometryError(f"transmission = {self.transmission:.6g} must lie in [0, pi/2); give radians")
         for name, value in self.rank.items():

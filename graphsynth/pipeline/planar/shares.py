@@ -27,10 +27,9 @@ def shares(context: Context, records: tuple[Record, ...]) -> tuple[Table, ...]:
     """
     from scipy.stats import binomtest
 
-    from graphsynth.pipeline.steps import spec_of
-    from graphsynth.synthesis import count_mechanisms
+    from graphsynth.pipeline.steps import count_of, spec_of
 
-    every, drawn = count_mechanisms(spec_of(context)), len(records)
+    every, drawn = count_of(spec_of(context)), len(records)
     rows: list[tuple[object, ...]] = []
     moving = sum(record.status == "assessed" for record in records)
     told = Counter(_told(record) for record in records)

@@ -17,7 +17,7 @@ from graphsynth.systems.platform.stages import platform_of
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.pipeline.planar.stages_pictures import Best
-    from graphsynth.pipeline.products import Candidate, Outcome, Picture, Record, Table
+    from graphsynth.pipeline.products import Candidate, Outcome, Picture, Ranking, Record, Table
     from graphsynth.pipeline.stages import Context
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
@@ -54,24 +54,23 @@ def sketches(
     return draw(inner(context), written, best, records)
 
 
-def comparison(context: Context, records: tuple[Record, ...]) -> tuple[Table, ...]:
-    """Compare the platform of the scene with all others, objective by objective."""
+def comparison(context: Context, ranking: Ranking, records: tuple[Record, ...]) -> tuple[Table, ...]:
+    """Compare the platform of the scene with all others, objective by objective, by the places of the ranking."""
     from graphsynth.pipeline.display import table
     from graphsynth.pipeline.units import behind
 
     key = platform_of(context).graph().key
-    known = next((record for record in records if record.key == key and record.status == "assessed"), None)
-    ranking = context.scene.ranking
-    if known is None or ranking is None:
+    known = next((record for record in records if record.key == key and record.number in ranking.numbers), None)
+    if known is None:
         return ()
+    at = ranking.numbers.index(known.number)
     rows, told = [], []
-    for objective in ranking.objectives:
-        values = {r.number: m for r in records for m in r.margins if m.name == objective.quantity}
-        own, sign = values[known.number], 1.0 if objective.goal == "max" else -1.0
-        best = max(values.values(), key=lambda margin: sign * margin.value)
-        better = sum(sign * margin.value > sign * own.value for margin in values.values())
-        rows.append((own.name, f"{own.value:.4g}{behind(own.unit)}", better, f"{best.value:.4g}{behind(best.unit)}"))
-        told.append(f"{own.name} {own.value:.4g}{behind(own.unit)}, {better} of {len(values) - 1} others are better")
+    for k, objective in enumerate(ranking.objectives):
+        own = next(margin for margin in known.margins if margin.name == objective.quantity)
+        value, better, unit = ranking.values[at][k], ranking.places[at][k], behind(own.unit)
+        best = next(row[k] for row, places in zip(ranking.values, ranking.places) if not places[k])
+        rows.append((own.name, f"{value:.4g}{unit}", better, f"{best:.4g}{unit}"))
+        told.append(f"{own.name} {value:.4g}{unit}, {better} of {ranking.ranked - 1} others are better")
     said = Finding(f"The platform of the scene (no. {known.number}): {'; '.join(told)}.")
     columns = ("objective", "platform of the scene", "others that are better", "best")
     return (table("The platform beside the others", columns, rows, "", said),)

@@ -51,7 +51,7 @@ _EVERY = (
     Stage("embody", f"{_HERE}.others:embody", ("candidates",), ("built",), each=True),
     Stage("move", f"{_HERE}.others:move", ("built",), ("moved",), each=True),
     Stage("write", "graphsynth.pipeline.planar.stages:write", ("moved",), ("written",), each=True, cost=9.0),
-    Stage("compare", f"{_HERE}.others:comparison", ("records",), ("comparison",)),
+    Stage("compare", f"{_HERE}.others:comparison", ("ranking", "records"), ("comparison",)),
     Stage("sketch best", f"{_HERE}.others:sketches", ("written", "ranking", "records"), ("best_pictures",)),
     COLLECT,
 )
