@@ -123,13 +123,16 @@ class Members:
         size = [most.get(joint.pair, 0.0) for joint in self.motion.mechanism.joints if joint.pair in driven]
         return 2.0 * np.tan(0.5 * np.array(size)) ** 2 * (1.0 + 1e-12)
 
+    def coordinates(self, u: Interval, p: Interval) -> Interval:
+        """Enclose the given coordinates (N, ...) for pieces u (N,) of the input and p (N, m) of the dimensions."""
+        driven = driven_at(self.model, self.motion.mechanism, u) + Interval.from_bounds(-self._spun, self._spun)
+        return Interval.from_bounds(np.hstack([driven.lo, p.lo]), np.hstack([driven.hi, p.hi]))
+
     def poses(self, u: Interval, p: Interval) -> MemberPoses:
         """Return references for pieces u (N,) of the input and p (N, m) of the dimensions."""
         from graphsynth.kinematics.simulation import simulate
 
-        model = self.model
-        driven = driven_at(model, self.motion.mechanism, u) + Interval.from_bounds(-self._spun, self._spun)
-        given = Interval.from_bounds(np.hstack([driven.lo, p.lo]), np.hstack([driven.hi, p.hi]))
+        model, given = self.model, self.coordinates(u, p)
         middles, u_mid = np.clip(p.mid, p.lo, p.hi)[:, : self.sizes.size], u.mid
         q, found = np.zeros((len(u_mid), model.width)), np.zeros(len(u_mid), dtype=np.bool_)
         for middle in np.unique(middles, axis=0):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +18,37 @@ from graphsynth.jamming.space.optimum import Optimum, least_scale, some_closures
 from graphsynth.jamming.space.proof import (
     Box,
     Certificate,
+    Tubes,
     branch_box,
     certificates,
-    closes,
     closings,
     contract,
     lower_bounds,
 )
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.intp]
 #: Half widths of the box of a branch in unlimited turns (radians) and travels (units); the last one is LEAST, or more.
 REACHES = (0.1, 0.03)
 LEAST = 0.005
+CLOSES = "closes within all limits"
+
+
+class Lead(NamedTuple):
+    """The one closure that is proved for each of the given coordinates in a box, continuous in them.
+
+    It is at the optimum of its proof, led by ``rate`` (size, given) from the middle of the box, corrected in the
+    unknowns ``basic`` by less than ``reach``.
+    """
+
+    rate: Array
+    basic: Ints
+    reach: Array
+
+    @classmethod
+    def of(cls, found: Tubes, rate: Array, k: int) -> Lead | None:
+        """Return that of one of several, where it is proved to be the only one."""
+        return cls(rate[k], found.basic[k], found.reach[k]) if found.single[k] else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +57,7 @@ class PoseProof:
 
     ``state``: +1 free, -1 jammed, 0 undecided.  ``scale``: least factor on all limits (estimated).  ``reach``: a jam is
     proved for all closures in which the spins of links (where `stands_apart`; else unlimited turns, radians) and
-    unlimited travels (units) lie within it of the reference.
+    unlimited travels (units) lie within it of the reference.  ``lead``: closures that are proved to be continuous.
     """
 
     state: int
@@ -45,6 +65,7 @@ class PoseProof:
     reach: float
     reason: str
     optimum: Optimum | None = None
+    lead: Lead | None = None
 
     @classmethod
     def unknown(cls, reason: str) -> PoseProof:
@@ -94,14 +115,15 @@ def free_poses(model: SpaceModel, q: Array, given: Array) -> list[PoseProof]:
     floats, enclosed = closures(model)
     found = some_closures(floats, q)
     good = np.flatnonzero(found.used < 1.0)
-    free = np.zeros(len(q), dtype=np.bool_)
-    free[good] = closings(enclosed, found.q[good], all_rates(floats, found.q[good]), given[good])
+    rate = all_rates(floats, found.q[good])
+    closed = closings(enclosed, found.q[good], rate, given[good])
+    leads = {int(good[n]): Lead.of(closed, rate, n) for n in np.flatnonzero(closed.proved).tolist()}
     proofs, none = [], np.zeros(len(model.bounds))
     for k, own in enumerate(found.q):
         missed = 0.0 if found.used[k] < math.inf else math.inf
         optimum = Optimum(float(found.used[k]), own, found.by[k], none, missed, False)
-        if free[k]:
-            proofs.append(PoseProof(1, float(found.used[k]), math.inf, "closes within all limits", optimum))
+        if k in leads:
+            proofs.append(PoseProof(1, float(found.used[k]), math.inf, CLOSES, optimum, leads[k]))
         else:
             reason = (
                 "a closure is found, but not proved"
@@ -117,9 +139,11 @@ def settle_pose(model: SpaceModel, q: Array, given: Array, boxes: int, reaches: 
     floats, enclosed = closures(model)
     found = least_scale(floats, q)
     if found.scale < 1.0 and found.missed < 1e-9:
-        free = closes(enclosed, found.q, rates(floats, found.q), given)
-        reason = "closes within all limits" if free else "a closure is found, but not proved"
-        return PoseProof(int(free), found.scale, math.inf, reason, found)
+        rate = all_rates(floats, found.q[None])
+        closed = closings(enclosed, found.q[None], rate, given[None])
+        if closed.proved[0]:
+            return PoseProof(1, found.scale, math.inf, CLOSES, found, Lead.of(closed, rate, 0))
+        return PoseProof(0, found.scale, math.inf, "a closure is found, but not proved", found)
     if stands_apart(model):
         reach = _bound_apart(model, q, found, given, reaches, boxes)
         boxes = 0  # where this fails, cuts of the coordinates of the joints do not help

@@ -31,40 +31,80 @@ Mask = NDArray[np.bool_]
 #: More than what rounding loses in sums of fewer than a thousand nonnegative numbers.
 _UP = 1.0 + 1e-12
 _FREE_STEPS = 6
+#: Least half width of the box of a piece, in which narrower ones at its faces find place.
+_LEAST = 1e-12
 _CONTRACTIONS = 8
 _GAIN = 0.9
 #: Curvature given to unknowns without a loaded limit, in parts of that of the loaded ones.
 _PARTS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 
-def closes(closure: Closure, at: Array, rate: Array, given: Array) -> bool:
-    """Whether the mechanism is proved to close within its limits for all given coordinates within a box (certified).
+class Tubes(NamedTuple):
+    """Closures round N points, one for each of the given coordinates in a box: ``proved`` (N,), within all limits.
 
-    ``at`` (width,) is near a closure with room in all limits, its given coordinates the middle of the box; ``given``
-    (given coordinates,) are the half widths of the box; ``rate`` (size, given) the change of the unknowns.
+    ``basic`` (N, equations) are the unknowns that are solved for, within ``reach`` of where the others lead them;
+    ``single`` (N,): there is only one such closure, which is then continuous in the given coordinates.
     """
-    return bool(closings(closure, at[None], rate[None], given[None])[0])
+
+    proved: Mask
+    single: Mask
+    basic: Ints
+    reach: Array
 
 
-def closings(closure: Closure, at: Array, rate: Array, given: Array) -> Mask:
-    """Tell of N boxes whether the mechanism is proved to close within its limits, as `closes` (certified)."""
+def closings(closure: Closure, at: Array, rate: Array, given: Array) -> Tubes:
+    """Tell of N boxes whether the mechanism is proved to close within its limits for all of them (certified).
+
+    ``at`` (N, width) are near closures with room in all limits, their given coordinates the middles of the boxes;
+    ``given`` (N, given coordinates) are the half widths; ``rate`` (N, size, given) the changes of the unknowns.
+    """
+    eye = np.broadcast_to(np.eye(given.shape[1]), (len(at), given.shape[1], given.shape[1]))
+    return tubes(closure, at, np.concatenate([rate, eye], 1), given)
+
+
+def tubes(
+    closure: Closure, at: Array, along: Array, given: Array, basic: Ints | None = None, loose: Array | None = None
+) -> Tubes:
+    """Prove closures at ``at + along c``, for all c (N, k) within ``given``, corrected in the basic unknowns.
+
+    Parameters
+    ----------
+    closure : Closure
+    at, along, given : ndarray, shapes (N, width), (N, width, k), (N, k)
+    basic : ndarray, shape (N, equations), optional
+        Unknowns to solve for; otherwise chosen.
+    loose : ndarray, shape (N, size), optional
+        Half widths by which the unknowns may lie elsewhere besides: what is proved holds for all of these values of
+        those that are not basic, and the basic ones are sought as far at least.
+    """
     model, count = closure.model, len(at)
-    eye = np.broadcast_to(np.eye(given.shape[1]), (count, given.shape[1], given.shape[1]))
-    along = np.concatenate([rate, eye], 1)
-    still = sides(np.abs(along), given)
+    each = np.arange(count)[:, None]
     if not closure.rows:
-        return _within(model, at, still)
+        still = sides(np.abs(along), given)
+        return Tubes(
+            _within(model, at, still), np.ones(count, dtype=np.bool_), np.zeros((count, 0), dtype=np.intp), still[:, :0]
+        )
     loops = closure.loops(exact(at))
     value, J = closure.values(loops), closure.jacobian(loops)
-    basic, fine = _basics(model, at, J.mid)
-    each = np.arange(count)[:, None]
+    if basic is None:
+        basic, fine = _basics(model, at, J.mid)
+    else:
+        fine = np.ones(count, dtype=np.bool_)
+    least = np.full(basic.shape, _LEAST)
+    if loose is not None:
+        least, loose = loose[each, basic] + 1e-15, loose.copy()
+        loose[each, basic] = 0.0
+        unit = np.broadcast_to(np.eye(model.width, model.size), (count, model.width, model.size))
+        along, given = np.concatenate([along, unit], 2), np.concatenate([given, loose], 1)
+    still = sides(np.abs(along), given)
     own = Balls(*(part[each, :, basic].swapaxes(1, 2) for part in (J.mid, J.rad)))
     inverse = exact(np.linalg.pinv(np.where(fine[:, None, None], own.mid, 0.0)))
     start = times(inverse, value[..., None])[..., 0].size
     start = start + sides(times(inverse, times(J, exact(along))).size, given)
     rest = (exact(np.eye(len(closure.rows))) - times(inverse, own)).size
-    reach = 2.0 * start + 1e-15
-    proved, live = np.zeros(count, dtype=np.bool_), np.flatnonzero(fine)
+    reach = 2.0 * start + least
+    proved, single = np.zeros((2, count), dtype=np.bool_)
+    live = np.flatnonzero(fine)
     for _ in range(_FREE_STEPS):
         live = live[np.isfinite(reach[live]).all(1) & (reach[live].max(1) <= 1.0)]
         if live.size == 0:
@@ -78,16 +118,17 @@ def closings(closure: Closure, at: Array, rate: Array, given: Array) -> Mask:
         # of the given coordinates alone, of both kinds, of the basic ones alone
         both = times(exact(along[live].swapaxes(1, 2)[:, None]), turned).size
         bend = sides(sides(both, gamma[:, None]), gamma)
-        mixed = sides(turned.size, gamma[:, None])[rows, :, columns].swapaxes(1, 2)
+        mixed = sides(sides(turned.size, gamma[:, None])[rows, :, columns].swapaxes(1, 2), reach[live])
         square = H.size[rows[..., None], :, columns[:, :, None], columns[:, None, :]]
-        square = sides(square.transpose(0, 3, 1, 2), reach[live][:, None])
-        bend = bend + 2.0 * sides(mixed, reach[live]) + sides(square, reach[live])
-        image = (start[live] + sides(rest[live], reach[live]) + 0.5 * bend) * _UP
+        square = sides(sides(square.transpose(0, 3, 1, 2), reach[live][:, None]), reach[live])
+        left = sides(rest[live], reach[live]) + mixed
+        image = (start[live] + left + 0.5 * (bend + square)) * _UP
         inside = (image < reach[live]).all(1)
         proved[live[inside]] = (_identity(around) & _within(model, at[live], whole))[inside]
-        reach[live] = np.maximum(1.5 * image, reach[live]) + 1e-300
+        single[live] = ((left + square) * _UP < reach[live]).all(1)
+        reach[live[~inside]] = (np.maximum(1.5 * image, reach[live]) + 1e-300)[~inside]
         live = live[~inside]
-    return proved
+    return Tubes(proved, single & proved, basic, reach)
 
 
 def bend_of(H: Balls, along: Array, given: Array, basic: Ints, reach: Array) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals import Interval
 from graphsynth.intervals.reading import shortened
+from graphsynth.jamming.assembly.positions import points
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.certify import TurnCertificate
 from graphsynth.jamming.joints.drawing import Tolerances, drawn
@@ -22,6 +23,8 @@ from graphsynth.jamming.joints.pieces import check_range
 from graphsynth.jamming.joints.program import Bearings, JointProblem, problem
 from graphsynth.jamming.joints.search import limits_chosen
 from graphsynth.jamming.space.apart import closes_apart
+from graphsynth.jamming.space.branch import Free, faces, joined
+from graphsynth.jamming.space.closure import closures
 from graphsynth.jamming.space.members import (
     MemberPoses,
     Members,
@@ -54,6 +57,7 @@ _BOXES = 300
 _CUTS, _MOVED, _NEAR, _CLEAR = 12, 0.03, 1e-3, 0.3
 #: Factor of the linearised closure below which a piece is cut rather than solved for; pieces taken at once.
 _SURE, _CHUNK = 0.999, 64
+NOT_LED = "; that one continuous motion leads through them is not proved"
 #: Worth of cutting a parameter from which on links are tried as bodies, which takes as long as thirty pieces.
 _WIDE = 1.0
 
@@ -166,12 +170,15 @@ def certify_members(given: JointProblem, motion: Motion, box: ParameterBox, effo
     decided = _decided(pieces, box)
     witness = None if decided == 1.0 else work.witness(pieces)
     verdict, reason = _verdict(motion, pieces, stopped, witness)
+    branch = verdict is Verdict.CERTIFIED_FREE and work.one_branch(pieces, effort.end)
+    if verdict is Verdict.CERTIFIED_FREE:
+        reason += ", through which one continuous motion is proved to lead" if branch else NOT_LED
     if box.size and verdict is not Verdict.CERTIFIED_FREE:
         u = np.unique([0.5 * (p.low + p.high) for p in pieces if p.proof.state == 0])
         share = f"of all inputs and dimensions together {shortened(100.0 * decided, -1, 3)} % are decided"
         reason = "; ".join(filter(None, (reason, work.members.unclosed(u), share)))
     columns, spent = _columns(pieces), perf_counter() - begin
-    found = TurnCertificate(verdict, reason, *columns, False, witness, work.evaluated, spent, model=MODEL)
+    found = TurnCertificate(verdict, reason, *columns, branch, witness, work.evaluated, spent, model=MODEL)
     return replace(found, decided=decided)
 
 
@@ -266,6 +273,24 @@ class _Work:
         left = sure + sorted(self.likely, key=lambda p: -p.ends[1])
         places = (Place(p.low, p.high, 0.5 * (p.p_low + p.p_high)) for p in left)
         return binding_member(self.given, self.members.motion, self.members.sizes, places)
+
+    def one_branch(self, pieces: list[_Piece], end: float) -> bool:
+        """Whether one continuous motion of every member is proved to lead through pieces that are all free."""
+        members, found = self.members, []
+        for p in pieces:
+            if p.proof.lead is None or p.proof.optimum is None:
+                return False
+            found.append((p.proof.optimum.q, p.proof.lead))
+        (low, high), (p_low, p_high) = (np.array([(p[k], p[k + 1]) for p in pieces]).swapaxes(0, 1) for k in (0, 2))
+        free, (first, second) = Free.of(found, members.model.size), faces(low, high, p_low, p_high)
+        floats, enclosed = closures(members.model)
+        for k in range(0, len(first), _CHUNK):
+            a, b = first[k : k + _CHUNK], second[k : k + _CHUNK]
+            shared = np.maximum(p_low[a], p_low[b]), np.minimum(p_high[a], p_high[b])
+            face = members.coordinates(points(high[a]), Interval.from_bounds(*shared))
+            if perf_counter() > end or not joined(enclosed, floats, free.take(a), free.take(b), face).all():
+                return False
+        return True
 
     def _round(self, spans: list[_Span], end: float, boxes: int = 0) -> list[_Piece]:
         """Prove what can be proved about pieces."""
