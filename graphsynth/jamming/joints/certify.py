@@ -120,7 +120,8 @@ class TurnCertificate:
     decided : float
         Share of all inputs and dimensions together (by volume of the boxes) for which free or jammed is proved.
     one_branch : bool
-        All pieces are proved to belong to one continuous branch.
+        All pieces are proved to belong to one continuous branch; with exact closure in space: one continuous motion
+        of every member is proved to lead through the whole range within all limits.
     """
 
     verdict: Verdict

@@ -108,6 +108,14 @@ class SlideLimits:
 
 
 Limits: TypeAlias = JointLimits | SlideLimits
+
+
+def chosen(own: Limits, value: Callable[[Limits, str], float]) -> Limits:
+    """Return limits without ranges, each the value that is chosen of it by name."""
+    values: Any = {name: value(own, name) for name in (*own.tilts, "axial_clearance")}
+    return type(own)(**values)
+
+
 #: No clearance at all.
 RIGID = JointLimits(0.0)
 SPHERICAL = JointLimits(math.inf)  #: Any tilt, but no displacement along the axis.

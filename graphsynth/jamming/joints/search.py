@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from graphsynth.intervals import Interval
 from graphsynth.intervals.reading import shortened
 from graphsynth.jamming.assembly.tubes import joined, shortest_reach
-from graphsynth.jamming.joints.limits import Limits, Misalignment, bounds
+from graphsynth.jamming.joints.limits import Limits, Misalignment, bounds, chosen
 from graphsynth.jamming.joints.pieces import PARTS, Found, Work, cut
 from graphsynth.jamming.joints.program import JointProblem, problem
 
@@ -303,11 +303,8 @@ def _of_a_piece(work: Work, pieces: Found, row: int) -> MemberWitness | None:
     low, high = pieces.p_lo[row], pieces.p_hi[row]
     for p in (np.clip(0.5 * (low + high), low, high), np.clip(0.0, low, high)):
         if work.box.holds(p):
-            limits: list[Limits] = []
-            for own in work.given.limits:
-                values: Any = {name: getattr(own, name) for name in (*own.tilts, "axial_clearance")}
-                limits.append(type(own)(**values))
-            member = _member(work, p, tuple(limits), tuple(tilt.sharp() for tilt in work.given.misalignments))
+            limits = tuple(chosen(own, getattr) for own in work.given.limits)
+            member = _member(work, p, limits, tuple(tilt.sharp() for tilt in work.given.misalignments))
             return _named(work, member, p, (u, float(pieces.lower[row])))
     return None
 
@@ -332,12 +329,12 @@ def limits_chosen(given: JointProblem, limits: tuple[Limits, ...]) -> tuple[tupl
 
 def lowest(limits: tuple[Limits, ...]) -> tuple[Limits, ...]:
     """Return limits at the low ends of their ranges, a little above where those only enclose a critical tilt."""
-    found = []
-    for limit in limits:
-        ranges = {name: bounds(limit, name) for name in (*limit.tilts, "axial_clearance")}
-        least: dict[str, Any] = {name: min(low * (1.0 + 1e-9), high) for name, (low, high) in ranges.items()}
-        found.append(type(limit)(**least))
-    return tuple(found)
+
+    def least(own: Limits, name: str) -> float:
+        low, high = bounds(own, name)
+        return min(low * (1.0 + 1e-9), high)
+
+    return tuple(chosen(own, least) for own in limits)
 
 
 def _in_a_piece(pieces: Found, own: Mask, at: Array, p: Array, points: Found) -> Mask:

@@ -60,7 +60,7 @@ class _Ends(NamedTuple):
 def joined(closure: Closure, floats: Closure, first: Free, second: Free, face: Interval) -> Mask:
     """Tell which of N pairs of pieces are joined by closures at their common given coordinates (certified).
 
-    ``closure`` in balls, ``floats`` the same in floats; ``face`` (N, given coordinates) encloses what both pieces share.
+    ``closure`` in balls, ``floats`` the same in floats; ``face`` (N, given coordinates) encloses what both share.
     """
     if not closure.rows:
         return np.ones(len(first.at), dtype=np.bool_)  # any motion is one, and limits are convex
@@ -158,4 +158,3 @@ def faces(low: Array, high: Array, p_low: Array, p_high: Array) -> tuple[Ints, I
     wide = p_low[first] < p_high[first]
     meet = np.where(wide, below < above, below <= above).all(1)
     return first[meet], second[meet]
-

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from graphsynth.intervals import Interval
 from graphsynth.jamming.assembly import positions
 from graphsynth.jamming.assembly.positions import Positions, points
-from graphsynth.jamming.joints.limits import Misalignment, bounds
+from graphsynth.jamming.joints.limits import Misalignment, bounds, chosen
 from graphsynth.jamming.joints.program import JointProblem
 from graphsynth.jamming.joints.search import MemberWitness, limits_chosen, lowest, sharp_problem, unclosed_at
 from graphsynth.jamming.space.closure import Closure, closures
@@ -184,11 +184,8 @@ def aligned(given: JointProblem, motion: Motion, sizes: ParameterBox) -> JointPr
 
 def at_end(given: JointProblem, end: int) -> JointProblem:
     """Return a problem with all limits at the low (0) or high (1) ends of their ranges."""
-    limits = []
-    for own in given.limits:
-        values: Any = {name: bounds(own, name)[end] for name in (*own.tilts, "axial_clearance")}
-        limits.append(type(own)(**values))
-    return replace(given, limits=tuple(limits))
+    limits = tuple(chosen(own, lambda one, name: bounds(one, name)[end]) for own in given.limits)
+    return replace(given, limits=limits)
 
 
 def slopes(model: SpaceModel, found: Optimum) -> Array:

@@ -57,6 +57,8 @@ _BOXES = 300
 _CUTS, _MOVED, _NEAR, _CLEAR = 12, 0.03, 1e-3, 0.3
 #: Factor of the linearised closure below which a piece is cut rather than solved for; pieces taken at once.
 _SURE, _CHUNK = 0.999, 64
+#: Rounds in which free pieces are cut once more, to know their closures as continuous.
+_FINER = 3
 NOT_LED = "; that one continuous motion leads through them is not proved"
 #: Worth of cutting a parameter from which on links are tried as bodies, which takes as long as thirty pieces.
 _WIDE = 1.0
@@ -277,6 +279,7 @@ class _Work:
     def one_branch(self, pieces: list[_Piece], end: float) -> bool:
         """Whether one continuous motion of every member is proved to lead through pieces that are all free."""
         members, found = self.members, []
+        pieces = self._led(pieces, end)
         for p in pieces:
             if p.proof.lead is None or p.proof.optimum is None:
                 return False
@@ -291,6 +294,18 @@ class _Work:
             if perf_counter() > end or not joined(enclosed, floats, free.take(a), free.take(b), face).all():
                 return False
         return True
+
+    def _led(self, pieces: list[_Piece], end: float) -> list[_Piece]:
+        """Cut free pieces in which closures are not proved to be single, as far as that is not most of the work."""
+        for _ in range(_FINER):
+            wide = [p for p in pieces if p.proof.lead is None]
+            if not wide or len(wide) > _FEWEST + len(pieces) // 4:
+                break
+            own = self._round([(a, b, p.p_low, p.p_high) for p in wide for a, b in _thirds(p)], end)
+            if not all(p.proof.state > 0 for p in own):
+                break
+            pieces = [*(p for p in pieces if p.proof.lead is not None), *own]
+        return pieces
 
     def _round(self, spans: list[_Span], end: float, boxes: int = 0) -> list[_Piece]:
         """Prove what can be proved about pieces."""
