@@ -51,6 +51,14 @@ class Linear:
         """Coordinate and rate in any arithmetic with its sine and cosine."""
         return u * self.rate + self.offset, u * 0.0 + self.rate
 
+    def times(self, factor: float) -> Linear:
+        """Return the law with all coordinates multiplied, inputs as they are.
+
+        >>> Linear(2.0, 1.0).times(3.0)
+        Linear(rate=6.0, offset=3.0)
+        """
+        return Linear(self.rate * factor, self.offset * factor)
+
 
 @dataclass(frozen=True)
 class Harmonic:
@@ -78,6 +86,10 @@ class Harmonic:
         angle = u * self.order + self.phase
         return sin(angle) * self.amplitude + self.mean, cos(angle) * self.amplitude * self.order
 
+    def times(self, factor: float) -> Harmonic:
+        """Return the law with all coordinates multiplied."""
+        return Harmonic(self.mean * factor, self.amplitude * factor, self.order, self.phase)
+
 
 @dataclass(frozen=True)
 class Polynomial:
@@ -101,6 +113,10 @@ class Polynomial:
         for c in reversed(self.coefficients):
             value, rate = value * u + c, rate * u + value
         return value, rate
+
+    def times(self, factor: float) -> Polynomial:
+        """Return the law with all coordinates multiplied."""
+        return Polynomial(tuple(c * factor for c in self.coefficients))
 
 
 @dataclass(frozen=True)
@@ -132,6 +148,10 @@ class Table:
         """Coordinate and derivatives."""
         u = _inputs(u)
         return (np.asarray(self._spline(u)), np.asarray(self._spline(u, 1)), np.asarray(self._spline(u, 2)))
+
+    def times(self, factor: float) -> Table:
+        """Return the law with all coordinates multiplied."""
+        return Table(self.inputs, tuple(value * factor for value in self.values))
 
 
 def _inputs(u: ArrayLike) -> Array:

@@ -160,6 +160,19 @@ class Mechanism(Constructors, Shown):
                 return joint
         raise GeometryError(f"links {a} and {b} have no joint")
 
+    def scaled(self, factor: float) -> Mechanism:
+        """Return the mechanism with every length multiplied, as in another unit; inputs stay as they are.
+
+        Lengths are points, radii, harmonics of cams, poses and the coordinates of sliding drivers.  A `GeometryError`
+        refuses a law of a sliding driver that is none of `graphsynth.mechanism.laws`.
+
+        >>> Mechanism.four_bar(2.0, 1.0, 2.5, 2.5).scaled(0.5).joint(2, 3).at_a
+        (1.25, 0.0)
+        """
+        from graphsynth.mechanism.scaling import scaled
+
+        return scaled(self, factor)
+
     def mobility(self, pose: ArrayLike | None = None) -> MobilityReport:
         """Mobility by count and by rank of the constraint matrix at a pose.
 

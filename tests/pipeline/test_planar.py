@@ -20,7 +20,6 @@ from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.pipeline.planar import stages as stages
-from graphsynth.pipeline.planar.stages import scaled
 from graphsynth.pipeline.runner import execute, run
 from graphsynth.pipeline.scene import Scene
 from graphsynth.structure.graph import MechanismGraph
@@ -307,15 +306,6 @@ def test_a_table_of_goals_is_passed_on() -> None:
     poses = {"poses": {"points": points, "angles_deg": [0, 90, 180], "inputs_deg": [0, 10, 20]}}
     goal = goals_of(Scene.from_mapping(question(["records"], embody=poses)).mechanism.embody).target
     assert isinstance(goal, PosesGoal) and goal.poses[1] == pytest.approx((1.0, 0.0, math.pi / 2))
-
-
-def test_scaling_changes_lengths_only() -> None:
-    from graphsynth.kinematics import simulate
-
-    u = np.linspace(0.0, 2 * np.pi, 13)
-    small, large = simulate(linkage(), u), simulate(scaled(linkage(), 1000.0), u)
-    np.testing.assert_allclose(large.poses[..., :2], 1000.0 * small.poses[..., :2], atol=1e-9)
-    np.testing.assert_allclose(large.poses[..., 2], small.poses[..., 2], atol=1e-12)
 
 
 def test_scenes_that_make_no_sense(tmp_path: Path) -> None:

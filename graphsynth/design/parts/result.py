@@ -12,16 +12,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from graphsynth.core.checks import positive
-from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import Shown, work
 from graphsynth.design.parts.collisions import Collision
 from graphsynth.design.parts.outline import Moments
 from graphsynth.design.parts.plan import PartsPlan, Sizes
 from graphsynth.dynamics.model import Body, DynamicModel
 from graphsynth.kinematics.engine.result import Motion
-from graphsynth.mechanism.joints import JointGeometry, Prismatic
-from graphsynth.mechanism.laws import Driver, Harmonic, Linear, Polynomial, Table
-from graphsynth.mechanism.model import Mechanism, TracePoint
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -146,7 +142,7 @@ class Parts(Shown):
 
     def dynamics(self, density: float = PLYWOOD, **options: Any) -> DynamicModel:
         """Return the mechanism in metres with these bodies; ``options`` are those of `DynamicModel`."""
-        return DynamicModel(_scaled(self.motion.mechanism, self.unit * _MM), self.bodies(density), **options)
+        return DynamicModel(self.motion.mechanism.scaled(self.unit * _MM), self.bodies(density), **options)
 
     @cached_property
     def bill(self) -> tuple[BillRow, ...]:
@@ -265,35 +261,3 @@ def _body(moments: Moments, sheet: float) -> Body:
     """Return the body of a sheet of a mass per area; mm to m."""
     centre = moments.centroid * _MM
     return Body(sheet * moments.area * _MM**2, sheet * moments.central * _MM**4, (centre.real, centre.imag))
-
-
-def _scaled(mechanism: Mechanism, factor: float) -> Mechanism:
-    """Return the mechanism with all lengths times a factor."""
-
-    def joint(own: JointGeometry) -> JointGeometry:
-        a, b = ((x * factor, y * factor) for x, y in (own.at_a, own.at_b))
-        return replace(own, at_a=a, at_b=b)
-
-    def driver(own: Driver) -> Driver:
-        slides = isinstance(mechanism.joint(*own.pair), Prismatic)
-        return replace(own, law=_law(own.law, factor)) if slides else own
-
-    points = {name: TracePoint(link, (at[0] * factor, at[1] * factor)) for name, (link, at) in mechanism.points.items()}
-    pose = mechanism.pose and tuple((x * factor, y * factor, angle) for x, y, angle in mechanism.pose)
-    return Mechanism(
-        mechanism.graph, tuple(map(joint, mechanism.joints)), tuple(map(driver, mechanism.drivers)), points, pose
-    )
-
-
-def _law(law: Any, factor: float) -> Any:
-    """Return the law of a sliding driver with its values times a factor."""
-    lengths = {Linear: ("rate", "offset"), Harmonic: ("mean", "amplitude")}
-    if type(law) in lengths:
-        return replace(law, **{name: getattr(law, name) * factor for name in lengths[type(law)]})
-    if isinstance(law, Polynomial):
-        return Polynomial(tuple(c * factor for c in law.coefficients))
-    if isinstance(law, Table):
-        return Table(law.inputs, tuple(v * factor for v in law.values))
-    raise GeometryError(
-        f"the law {law!r} of a sliding driver is not known, so it cannot be put in metres; give one of laws"
-    )

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from graphsynth.jamming.joints.limits import JointLimits, Misalignment
     from graphsynth.kinematics.dimensional.goals import Goals, Target
     from graphsynth.kinematics.engine.result import Motion
-    from graphsynth.mechanism.joints import JointGeometry
     from graphsynth.mechanism.laws import Driver
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
@@ -112,7 +111,7 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
     margins = [Quantity("length ratio", found.figures.length_ratio)]
     if math.isfinite(found.figures.goal_error):
         margins.insert(0, Quantity("deviation", found.figures.goal_error))
-    mechanism = scaled(found.mechanism, (table.crank or 1.0) / _crank(found.mechanism))
+    mechanism = found.mechanism.scaled((table.crank or 1.0) / _crank(found.mechanism))
     return Built(f"No. {design.number}", mechanism, tuple(margins))
 
 
@@ -153,28 +152,6 @@ def _crank(mechanism: Mechanism) -> float:
     first = next(p for p, joint in zip(at, joints, strict=True) if driver.base in joint.pair)
     others = [math.dist(p, first) for p, joint in zip(at, joints, strict=True) if driver.base not in joint.pair]
     return others[0] if others and others[0] > 0.0 else 1.0
-
-
-def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
-    """Return the mechanism with all lengths multiplied (all joints but cams with harmonics).
-
-    >>> from graphsynth.mechanism.model import Mechanism
-    >>> scaled(Mechanism.four_bar(2.0, 1.0, 2.5, 2.5), 0.5).joint(2, 3).at_a
-    (1.25, 0.0)
-    """
-    from graphsynth.mechanism.model import Mechanism
-
-    def times(point: tuple[float, float]) -> tuple[float, float]:
-        return point[0] * factor, point[1] * factor
-
-    def larger(joint: JointGeometry) -> JointGeometry:
-        radii = {name: factor * value for name, value in vars(joint).items() if name.startswith("radius")}
-        return replace(joint, at_a=times(joint.at_a), at_b=times(joint.at_b), **radii)
-
-    joints = tuple(map(larger, mechanism.joints))
-    points = {name: (point.link, times(point.at)) for name, point in mechanism.points.items()}
-    pose = mechanism.pose and tuple((x * factor, y * factor, angle) for x, y, angle in mechanism.pose)
-    return Mechanism(mechanism.graph, joints, mechanism.drivers, points, pose)  # type: ignore[arg-type]
 
 
 def move(context: Context, built: Built) -> Moved:

@@ -27,7 +27,6 @@ from graphsynth.design.task.model import Model
 from graphsynth.design.task.plans import plans
 from graphsynth.design.task.problem import TaskProblem
 from graphsynth.design.task.starts import placed_starts, random_starts
-from graphsynth.pipeline.planar.stages import scaled
 
 POINTS = [(0.0, 0.0), (1.0, 0.5), (2.0, 0.2), (3.0, -0.5)]
 POSES = [(x, y, 0.2 * k) for k, (x, y) in enumerate(POINTS)]
@@ -172,7 +171,7 @@ def test_errors_of_angles_are_those_of_a_fine_motion() -> None:
     wanted = [0.2, 0.3, abs(slow - 0.75 * math.tau), 0.5 * np.ptp(window), 0.5 * np.ptp(at)]
     assert found.errors == pytest.approx(wanted, abs=1e-4) and not found.accepted
     assert {"the swing is missed", "the dwell is missed", "the function is missed"} <= {*found.reasons}
-    other = replace(found, mechanism=scaled(found.mechanism, 3.0))
+    other = replace(found, mechanism=found.mechanism.scaled(3.0))
     assert np.allclose(signature(task, found), signature(task, other))  # no target has a length
     sized = DesignTask(targets=targets, links=[4], crank=1.0)
     assert np.abs(signature(sized, found) - signature(sized, other)).min() > 1.0
