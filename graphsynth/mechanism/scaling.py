@@ -39,9 +39,7 @@ def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
 
 def _joint(joint: JointGeometry, factor: float) -> JointGeometry:
     """Points, radii and harmonics are lengths; directions, offsets of gears and numbers of links are not."""
-    lengths: dict[str, Any] = {
-        name: value * factor for name, value in vars(joint).items() if name.startswith("radius")
-    }
+    lengths: dict[str, Any] = {name: value * factor for name, value in vars(joint).items() if name.startswith("radius")}
     if isinstance(joint, Cam):
         lengths["harmonics"] = tuple(_times(pair, factor) for pair in joint.harmonics)
     return replace(joint, at_a=_times(joint.at_a, factor), at_b=_times(joint.at_b, factor), **lengths)

@@ -58,7 +58,17 @@ def facts(report: Report) -> tuple[Finding, ...]:
                 found.append(Finding(status, good, str(counts[status])))
     fronts = [value.front_size for value in products.values() if isinstance(value, Ranking) and value.front]
     found += [Finding("on the Pareto front", value=str(size)) for size in fronts]
-    return (*found, Finding("run time", value=f"{report.seconds:.1f} s"))
+    return (*found, *_per_candidate(report), Finding("run time", value=f"{report.seconds:.1f} s"))
+
+
+def _per_candidate(report: Report) -> list[Finding]:
+    """Time of all stages for each candidate over the number of those that this run took up."""
+    each = {stage.name for stage in report.stages if stage.each}
+    spent = [time for time in report.times if time.stage in each]
+    count = max((time.runs for time in spent), default=0)
+    if count < 2:
+        return []
+    return [Finding("time per candidate", value=f"{math.fsum(time.seconds for time in spent) / count:.2g} s")]
 
 
 def _given(report: Report) -> list[Table]:
@@ -152,8 +162,9 @@ def _rejected(records: Sequence[Record]) -> list[Finding]:
     if len(causes) == 1 and total > 1:
         why = causes[0][0].removesuffix(".")
         return [Finding(f"Rejected: {total} of {len(records)}, all for the same reason: {why}.")]
-    listed = "; ".join(f"{count} because {cause}" for cause, count in causes[:_REASONS])
-    more = f"; {len(causes) - _REASONS} more reasons" if len(causes) > _REASONS else ""
+    listed = "; ".join(f"{count} ({cause.removesuffix('.')})" for cause, count in causes[:_REASONS])
+    rest = sum(count for _, count in causes[_REASONS:])
+    more = f"; {rest} for {len(causes) - _REASONS} other reason{'s' * (len(causes) > _REASONS + 1)}" if rest else ""
     return [Finding(f"Rejected: {total} of {len(records)}: {listed}{more}.")]
 
 

@@ -14,10 +14,14 @@ import pytest
 
 from graphsynth.core.errors import GeometryError, SceneError
 from graphsynth.kinematics.dimensional import Goals, embody
-from graphsynth.mechanism.joints import PinSlot
+from graphsynth.mechanism.joints import Gear, PinSlot, Revolute
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
+from graphsynth.pipeline.planar.stages import _crank, _passes
 from graphsynth.pipeline.runner import execute, run
 from graphsynth.pipeline.scene import OutputsTable, Scene, find_scene, load_scene
 from graphsynth.pipeline.steps import threefold_symmetry
+from graphsynth.pipeline.summary import facts
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.system.spec import StructuralSpec
 from graphsynth.synthesis import count_mechanisms
@@ -58,7 +62,7 @@ def test_both_are_assessed_and_ranked(both: Any) -> None:
     records = both["records"]
     assert [record.status for record in records] == ["assessed", "assessed"]
     names = [{margin.name for margin in record.margins} for record in records]
-    assert {"transmission angle", "tilt allowed", "distance to singularity"} <= names[0] & names[1]
+    assert {"transmission angle", "use of the clearances", "distance to singularity"} <= names[0] & names[1]
     assert sorted(both["ranking"].numbers) == [1, 2] and len(both["best_pictures"]) == 2
 
 
@@ -97,9 +101,13 @@ def test_a_sample_speaks_for_all(tmp_path: Path) -> None:
     (shares,) = report["shares"]
     assert "187\u202f985\u202f407" in shares.title and "6 were drawn" in shares.findings[0].text
     moving = sum(record.status == "assessed" for record in report["records"])
-    assert shares.rows[0][:2] == ("moves", str(moving))
+    assert shares.rows[0][:2] == ("moves as asked", str(moving))
     rest = Counter(record.status for record in report["records"])
-    assert sum(int(row[1]) for row in shares.rows[1:]) == 6 == sum(rest.values())
+    verdicts = {record.verdict for record in report["records"] if record.status == "assessed"}
+    # verdicts stand below "moves as asked" where there are several
+    assert sum(int(row[1]) for row in shares.rows) == 6 + moving * (len(verdicts) > 1)
+    assert rest["assessed"] == moving and sum(rest.values()) == 6
+    assert any(fact.text == "time per candidate" and float(fact.value.split()[0]) > 0.0 for fact in facts(report))
     low, high = (float(text) for text in shares.rows[0][2].removesuffix(" %").split(" to "))
     # Clopper and Pearson: with k of n, the chance of k or more at the lower end is 2.5 %, of k or fewer at the upper;
     # one digit behind the point is shown
@@ -108,6 +116,41 @@ def test_a_sample_speaks_for_all(tmp_path: Path) -> None:
     assert 0 < moving < 6
     assert binom.sf(moving - 1, 6, (low - 0.05) / 100) <= 0.025 <= binom.sf(moving - 1, 6, (low + 0.05) / 100)
     assert binom.cdf(moving, 6, (high + 0.05) / 100) <= 0.025 <= binom.cdf(moving, 6, (high - 0.05) / 100)
+
+
+WHEELS = MechanismGraph(5, [(0, 1), (1, 2, 2), (0, 2), (2, 3), (3, 4), (0, 4)], frame=0)
+
+
+def wheels(second: Any) -> Mechanism:
+    """A driven wheel, and a four-bar behind it."""
+    bars = [Revolute(0, 2, (3.0, 0.0)), Revolute(2, 3, (1.0, 0.0)), Revolute(3, 4, (4.0, 0.0), (3.0, 0.0))]
+    return Mechanism(WHEELS, [Revolute(0, 1), second, *bars, Revolute(0, 4, (7.0, 0.0))], [Driver(0, 1)])
+
+
+def test_a_tilt_passes_through_gears_and_slots() -> None:
+    """The driven joint is in a loop with a gear only; driven behind the gear, its loop has bearings only."""
+    before = wheels(Gear(1, 2, radius_a=1.2, radius_b=1.8))
+    assert _passes(before) and not _passes(replace(before, drivers=(Driver(0, 2),)))
+    assert not _passes(Mechanism.four_bar(2.0, 1.0, 2.5, 2.5))
+
+
+def test_what_tilts_freely_has_no_largest_tilt() -> None:
+    scene = tables("worked_example")
+    scene["structure"] = {"graphs": [wheels(Gear(1, 2, radius_a=1.2, radius_b=1.8)).graph.to_text()]}
+    scene["mechanism"]["embody"] |= {"tries": 4, "effort": 0.3, "min_transmission_deg": 5}
+    scene["outputs"]["products"] = ["records"]
+    (record,) = execute(Scene.from_mapping(scene))["records"]
+    assert record.status == "assessed" and "none takes up the tilt" in record.verdict
+    use = next(margin for margin in record.margins if margin.name == "use of the clearances")
+    assert (use.value, use.guarantee) == (0.0, "exact")
+    assert all(np.isfinite(margin.value) for margin in record.margins)
+
+
+def test_the_unit_of_length_is_a_pivot_a_pin_or_a_wheel() -> None:
+    """Never the point by which the line of a slot is given: it may lie anywhere on the line."""
+    assert _crank(wheels(Gear(1, 2, radius_a=1.2, radius_b=1.8))) == 1.2
+    assert _crank(wheels(PinSlot(1, 2, (0.01, 0.0), (0.5, 0.0)))) == 1.0  # a slot alone has no length
+    assert _crank(wheels(PinSlot(2, 1, (0.01, 0.0), (0.5, 0.0)))) == 0.5
 
 
 @pytest.mark.parametrize("name", ["four-link", "geared-five-link", "two-dof-seven-link"])

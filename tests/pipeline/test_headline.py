@@ -80,9 +80,7 @@ def test_reasons_are_counted_the_most_frequent_first(lambda_tables: dict[str, An
     )
     report = report_of(lambda_tables, records)
     told = next(text for text in said(report) if text.startswith("Rejected"))
-    assert told == (
-        "Rejected: 11 of 12: 6 because too weak; 3 because too long; 1 because ZeroDivisionError; 1 more reasons."
-    )
+    assert told == "Rejected: 11 of 12: 6 (too weak); 3 (too long); 1 (ZeroDivisionError); 1 for 1 other reason."
     numbers = {fact.text: (fact.value, fact.good) for fact in facts(report)}
     assert numbers["candidate mechanisms"] == ("12", None) and numbers["failed"] == ("1", False)
     assert (numbers["assessed"][0], numbers["rejected"][0], numbers["on the Pareto front"][0]) == ("1", "10", "1")
@@ -165,7 +163,7 @@ def test_a_run_of_which_nothing_came_through_says_so_first(lambda_tables: dict[s
         report_of(lambda_tables, (failed, rejected(2, "too slow"), rejected(3, "too slow")), False)
     )
     assert first == Finding("None of the 3 candidates came through all stages.", False)
-    assert rest[0].text.startswith("Rejected: 3 of 3: 2 because too slow; 1 because OverflowError")
+    assert rest[0].text.startswith("Rejected: 3 of 3: 2 (too slow); 1 (OverflowError: ")
 
 
 def test_a_candidate_that_came_through_or_none_known_is_no_failure(lambda_tables: dict[str, Any]) -> None:

@@ -39,11 +39,12 @@ def shares(context: Context, records: tuple[Record, ...]) -> tuple[Table, ...]:
         return (
             table("What became of the mechanisms", ("what became of it", "number", "share"), rows, _SEARCHED, said),
         )
-    for name, count in [("moves", moving), *told.most_common()]:
+    verdicts = {record.verdict for record in records if record.status == "assessed"}
+    listed = [(name, count) for name, count in told.most_common() if len(verdicts) > 1 or name not in verdicts]
+    for name, count in [("moves as asked", moving), *listed]:
         low, high = binomtest(count, drawn).proportion_ci(_CONFIDENCE, "exact")
-        rows.append(
-            (name, count, f"{100.0 * low:.1f} to {100.0 * high:.1f} %", f"{low * every:.3g} to {high * every:.3g}")
-        )
+        few, many = (grouped(_rounded(end * every)) for end in (low, high))
+        rows.append((name, count, f"{100.0 * low:.1f} to {100.0 * high:.1f} %", f"{few} to {many}"))
     low, high = (100.0 * end for end in binomtest(moving, drawn).proportion_ci(_CONFIDENCE, "exact"))
     said = Finding(
         f"Of {grouped(every)} mechanisms, {drawn} were drawn at random; {moving} move as asked. So {low:.1f} to "
@@ -52,6 +53,15 @@ def shares(context: Context, records: tuple[Record, ...]) -> tuple[Table, ...]:
     note = f"Intervals of Clopper and Pearson, 95 % each. {_SEARCHED}"
     columns = ("what became of it", "of the sample", "share of all", "mechanisms")
     return (table(f"Shares of {grouped(every)} mechanisms", columns, rows, note, said),)
+
+
+def _rounded(count: float) -> int:
+    """Round to three digits.
+
+    >>> _rounded(57_345_678.9), _rounded(12.3)
+    (57300000, 12)
+    """
+    return int(float(f"{count:.3g}"))
 
 
 def _told(record: Record) -> str:

@@ -107,6 +107,11 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
         best = f"; error {error:.3g}" if math.isfinite(error) else ""
         moves = found.motion is not None and found.motion.completed
         cause = causes[0] if causes else "nothing moves"
+        if found.figures is not None and math.isfinite(found.figures.transmission_angle):
+            angle, ratio = math.degrees(found.figures.transmission_angle), found.figures.length_ratio
+            best = (
+                f"; transmission angle {angle:.3g}°, length ratio {ratio:.3g}{best}" if math.isfinite(angle) else best
+            )
         raise Rejected(f"moves, but {cause}" if moves else f"no dimensions were found: {cause}", found.statement + best)
     margins = [Quantity("length ratio", found.figures.length_ratio)]
     if math.isfinite(found.figures.goal_error):
@@ -145,13 +150,24 @@ def goals_of(table: EmbodyTable) -> Goals:
 
 
 def _crank(mechanism: Mechanism) -> float:
-    """Length of the first driven link: from its driven joint to its next one; 1 for a slider."""
-    driver = mechanism.drivers[0]
-    joints = [joint for joint in mechanism.joints if driver.link in joint.pair]
-    at = [joint.at_a if joint.a == driver.link else joint.at_b for joint in joints]
-    first = next(p for p, joint in zip(at, joints, strict=True) if driver.base in joint.pair)
-    others = [math.dist(p, first) for p, joint in zip(at, joints, strict=True) if driver.base not in joint.pair]
-    return others[0] if others and others[0] > 0.0 else 1.0
+    """Length of the driven link: from its driven joint to its next pivot or pin, else its pitch radius; 1 for a slider.
+
+    >>> from graphsynth.mechanism.model import Mechanism
+    >>> _crank(Mechanism.four_bar(2.0, 0.7, 2.5, 2.5))
+    0.7
+    """
+    driver, arms, radii = mechanism.drivers[0], [], []
+    start = mechanism.joint(*driver.pair)
+    first = start.at_a if start.a == driver.link else start.at_b
+    for joint in mechanism.joints:
+        if driver.link not in joint.pair or joint is start:
+            continue
+        own = joint.a == driver.link
+        if joint.kind in ("R", "P") or (joint.kind in ("pin-slot", "cam") and not own):
+            arms.append(math.dist(joint.at_a if own else joint.at_b, first))
+        if (radius := getattr(joint, "radius_a" if own else "radius_b", None)) is not None:
+            radii.append(radius)
+    return next((length for length in (*arms, *radii) if length > 0.0), 1.0)
 
 
 def move(context: Context, built: Built) -> Moved:
@@ -252,6 +268,8 @@ def jamming(context: Context, moved: Moved) -> Part:
         raise Rejected("the bearings jam" if good is False else "the bearings are not proved free", reason)
     if verdict.is_jammed and context.scene.mechanism.binding is not None:
         good = True  # it may, at the price that the stage `binding` judges
+    if verdict.is_free and _passes(moved.motion.mechanism):
+        return Part(_LEANS, good, (exact("use of the clearances", 0.0),))
     margins = (
         Quantity("use of the clearances", report.worst_factor),
         Quantity.of_si("tilt allowed", table.alpha * report.smallest_scale, "deg"),
@@ -259,6 +277,20 @@ def jamming(context: Context, moved: Moved) -> Part:
     )
     told = verdict in (Verdict.UNDECIDED, Verdict.CERTIFIED_JAMMED_FOR_SOME)  # why, or which member
     return Part(f"bearings: {verdict.value}", good, margins, reason if told else "")
+
+
+_LEANS = "bearings: none takes up the tilt, every loop of the driven joint has a gear, slot or cam"
+
+
+def _passes(mechanism: Mechanism) -> bool:
+    """Whether every loop through the driven joint has a joint of mobility 2, which lets a tilt pass."""
+    driver = mechanism.drivers[0]
+    stiff = [joint.pair for joint in mechanism.joints if joint.mobility == 1 and joint.pair != driver.pair]
+    reached, before = {driver.base}, 0
+    while len(reached) > before:
+        before = len(reached)
+        reached |= {link for pair in stiff if reached & set(pair) for link in pair}
+    return driver.link not in reached
 
 
 def bearings_of(table: BearingsTable, mechanism: Mechanism) -> tuple[JointLimits, Misalignment, list[PartTolerance]]:

@@ -58,7 +58,7 @@ def sketches(
         clear = int(np.fmin(apart.min(axis=(1, 2)), flat).argmax())
         record = by_number[number]
         margins = ", ".join(f"{m.name} {m.value:.3g}{behind(m.unit)}" for m in record.margins[:5])
-        text = f"{record.verdict[:1].upper()}{record.verdict[1:]}: {margins}."
+        text = f"{record.verdict[:1].upper()}{record.verdict[1:]}. {margins[:1].upper()}{margins[1:]}."
         pictures.append(Picture(title, mechanism_svg(motion, clear, width=420, height=320, title=title), text))
     return tuple(pictures)
 
