@@ -6,7 +6,7 @@ import cmath
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import Shown
 from graphsynth.design.poses.curves import burmester_curves
 from graphsynth.design.poses.dyads import PoseDyad, PoseDyads, dyads
+from graphsynth.design.poses.passing import REACHED, passed
 from graphsynth.design.poses.task import Task, read_poses
 from graphsynth.kinematics.certify.poses import MotionCertificate, certify
 from graphsynth.kinematics.engine.result import Motion
@@ -29,8 +30,8 @@ from graphsynth.structure.graph import MechanismGraph
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
-#: Samples between two poses; the largest error of a pose that is reached, over the size; the least sine with a sign.
-_STEPS, _REACHED, _SIGN = 24, 1e-7, 1e-9
+#: The least sine with a sign.
+_SIGN = 1e-9
 #: Centre points that are paired, and how far apart the pivots of two linkages given are, over the size.
 _SAMPLES, _UNLIKE = 200, 0.2
 
@@ -234,19 +235,13 @@ def linkage_of(poses: Array, first: PoseDyad, second: PoseDyad) -> PoseLinkage:
     order = np.arange(len(inputs))
     if "order" in defects or np.ptp(np.sign(np.diff(np.round(inputs, 9)))):  # what a motion can pass: one after another
         order = np.unique(np.round(inputs, 9), return_index=True)[1]
-    grid = [np.linspace(a, b, _STEPS + 1)[:-1] for a, b in pairwise(inputs[order])]
-    mechanism = mechanism_of(first, second, poses[0])
-    begun = mechanism if order[0] == 0 else mechanism_of(first, second, poses[order[0]])
-    motion = begun.simulate(np.concatenate([*grid, inputs[order[-1:]]]), events=False)
-    reached = motion.poses[::_STEPS, 2] - poses[order]
-    turn = np.abs((reached[:, 2] + np.pi) % (2 * np.pi) - np.pi) * np.ptp(poses[:, :2], axis=0).max()
-    miss = float(np.max(np.hypot(reached[:, 0], reached[:, 1]) + turn))
-    if len(order) < len(poses) or not math.isfinite(miss):
-        miss = math.inf
-    if not miss <= _REACHED * _size(poses, first, second):
+    arm = float(np.ptp(poses[:, :2], axis=0).max())
+    motion, miss = passed(lambda k: mechanism_of(first, second, poses[k]), inputs, order, poses, 2, arm)
+    if not miss <= REACHED * _size(poses, first, second):
         defects = defects or ("motion",)
     angles = motion.transmission_angle()
     least = min((float(np.min(own)) for own in angles.values()), default=0.0)
+    mechanism = mechanism_of(first, second, poses[0])
     return PoseLinkage(mechanism, (first, second), defects, rotates, inputs, miss, 0.0 if defects else least, motion)
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import cmath
-import math
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from graphsynth.core.checks import Point, checked, choice, point as read_point, 
 from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import Shown
 from graphsynth.design.poses.dyads import PoseDyad, dyads
+from graphsynth.design.poses.passing import REACHED, passed
 from graphsynth.design.poses.task import read_poses
 from graphsynth.kinematics.certify.poses import MotionCertificate, certify
 from graphsynth.kinematics.engine.result import Motion
@@ -29,9 +29,8 @@ _KINDS = {
     ((0, 2), (1, 3)): "Watt I",
     ((0, 3), (1, 3)): "Stephenson II",
     ((0, 2), (0, 3)): "Stephenson III",
+    ((0, 3), (1, 4)): "Stephenson I",
 }
-#: Samples between two poses; the largest error of a pose that is reached and of a dyad that is a link there already.
-_STEPS, _REACHED = 24, 1e-7
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,7 +39,7 @@ class PoseSixBar(Shown):
 
     Attributes
     ----------
-    kind : {"Watt I", "Stephenson II", "Stephenson III"}
+    kind : {"Watt I", "Stephenson I", "Stephenson II", "Stephenson III"}
     mechanism : Mechanism
         Frame 0, chain 1, 2, 3, links 4 and 5, in the first pose; link 3 has the frame of the poses, its origin is P.
     dyads : (PoseDyad, PoseDyad)
@@ -98,8 +97,8 @@ def six_bars_for_poses(
     -------
     tuple of PoseSixBar
         Two more links hold two of the pairs frame and link 2, link 1 and body, frame and body; of each pair there are
-        at most three, three and four.  So at most 9 Watt I, 12 Stephenson II and 12 Stephenson III, those without
-        defects first.
+        at most three, three and four.  So at most 9 Watt I, 12 Stephenson II and 12 Stephenson III.  Or link 4 holds
+        frame and body and link 5 holds links 1 and 4: at most 12 Stephenson I.  Those without defects first.
 
     Raises
     ------
@@ -116,7 +115,7 @@ def six_bars_for_poses(
     >>> poses = [(0.87, 1.44, 0.6), (0.68, 1.86, 0.44), (-0.08, 2.22, 0.28), (-1.03, 1.92, 0.24), (-1.38, 1.29, 0.32)]
     >>> found = six_bars_for_poses(poses, pivot=(-1, 0), joint=(0, 0), lengths=(2, 2))
     >>> len(found), found[0].defects, bool(found[0].miss < 1e-9)
-    (33, (), True)
+    (43, (), True)
     """
     task = read_poses(poses, 5)
     z, turn = task.poses[:, :2] @ [1.0, 1j], task.poses[:, 2]
@@ -134,16 +133,21 @@ def six_bars_for_poses(
     chain = [(0j * z, 0.0 * turn), (O + 0j * z, one), (A, np.angle(W - A)), (z, turn)]
     rigid = {(0, 2): (O, 0j), (1, 3): (first + 0j, w)}
     held = {pair: _dyads(chain, pair, rigid.get(pair)) for pair in ((0, 2), (1, 3), (0, 3))}
-    made = [
-        _six_bar(task.poses, chain, (first, second), w, pairs, both)
-        for pairs in _KINDS
-        for both in product(held[pairs[0]], held[pairs[1]])
-    ]
+    both: list[tuple[Any, tuple[PoseDyad, PoseDyad]]] = []
+    for pairs in _KINDS:
+        if pairs[1] in held:
+            both += [(pairs, own) for own in product(held[pairs[0]], held[pairs[1]])]
+            continue
+        for own in held[pairs[0]]:  # link 4, whose poses follow; link 5 holds it, beside the frame
+            start, end = complex(*own.pivot), own.at(task.poses) @ [1.0, 1j]
+            moved = [*chain, (start + 0j * z, np.unwrap(np.angle(end - start)))]
+            both += [(pairs, (own, other)) for other in _dyads(moved, pairs[1], (0j, 0j), abs(start - O))]
+    made = [_six_bar(task.poses, chain, (first, second), w, pairs, own) for pairs, own in both]
     return tuple(sorted(made, key=lambda own: (len(own.defects), min(own.miss, 1e300))))
 
 
 def _dyads(
-    chain: list[tuple[Any, Any]], pair: tuple[int, int], known: tuple[complex, complex] | None
+    chain: list[tuple[Any, Any]], pair: tuple[int, int], known: tuple[complex, complex] | None, size: float = 0.0
 ) -> list[PoseDyad]:
     """Links that hold the second link of a pair as seen from the first, without the one that is there."""
     (at, angle), (z, turn) = (chain[link] for link in pair)
@@ -151,9 +155,9 @@ def _dyads(
     found = dyads([(p.real, p.imag, float(t)) for p, t in zip(seen, turn - angle)])
     if known is None:
         return list(found)
-    size = max(abs(part) for part in (*known, *seen))
+    size = max(size, *(abs(part) for part in (*known, *seen)))
     away = [abs(complex(*own.pivot) - known[0]) + abs(complex(*own.point) - known[1]) for own in found]
-    return [own for own, gap in zip(found, away) if gap > 10.0 * _REACHED * size]
+    return [own for own, gap in zip(found, away) if gap > 10.0 * REACHED * size]
 
 
 def _six_bar(
@@ -183,12 +187,7 @@ def _six_bar(
     inputs = np.unwrap(chain[1][1])
     order = np.argsort(inputs) if inputs[-1] >= inputs[0] else np.argsort(-inputs)
     one_way = bool((order == np.arange(len(order))).all())
-    grid = [np.linspace(a, b, _STEPS + 1)[:-1] for a, b in pairwise(inputs[order])]
-    motion = mechanism(int(order[0])).simulate(np.append(np.concatenate(grid), inputs[order[-1]]), events=False)
-    away = motion.poses[::_STEPS, 3] - poses[order]
-    size = max(np.ptp(poses[:, :2], axis=0).max(), *lengths)
-    turned = np.abs((away[:, 2] + np.pi) % (2.0 * np.pi) - np.pi) * size
-    miss = float(np.max(np.hypot(away[:, 0], away[:, 1]) + turned))
-    miss = miss if math.isfinite(miss) else math.inf
-    defects = ("order",) * (not one_way) + ("motion",) * (not miss <= _REACHED * size)
+    size = float(max(np.ptp(poses[:, :2], axis=0).max(), *lengths))
+    motion, miss = passed(mechanism, inputs, order, poses, 3, size)
+    defects = ("order",) * (not one_way) + ("motion",) * (not miss <= REACHED * size)
     return PoseSixBar(_KINDS[pairs], mechanism(0), both, defects, inputs, miss, motion)

@@ -16,6 +16,7 @@ CHAINS = {
     "Watt I": ([(0, 1), (1, 2), (2, 3), (0, 4), (2, 4), (1, 5), (3, 5)], ((0, 2), (1, 3))),
     "Stephenson II": ([(0, 1), (1, 2), (2, 3), (0, 4), (3, 4), (1, 5), (3, 5)], ((0, 3), (1, 3))),
     "Stephenson III": ([(0, 1), (1, 2), (2, 3), (0, 4), (2, 4), (0, 5), (3, 5)], ((0, 2), (0, 3))),
+    "Stephenson I": ([(0, 1), (1, 2), (2, 3), (0, 4), (3, 4), (1, 5), (4, 5)], ((0, 3), (1, 4))),
 }
 
 
@@ -65,7 +66,7 @@ def test_all_stand_in_every_pose_and_those_without_defects_move_through_them():
     assert [len(one.defects) for one in found] == sorted(len(one.defects) for one in found)
     for one in found:
         ternary = [k for k in range(6) if sum(k in pair[:2] for pair in one.mechanism.graph.joints) == 3]
-        wanted = {"Watt I": [1, 2], "Stephenson II": [1, 3], "Stephenson III": [0, 2]}
+        wanted = {"Watt I": [1, 2], "Stephenson II": [1, 3], "Stephenson III": [0, 2], "Stephenson I": [1, 4]}
         assert ternary == wanted[one.kind]
         radians = np.array([(x, y, np.radians(float(turn.split()[0]))) for x, y, turn in POSES])
         if not one.defects:
