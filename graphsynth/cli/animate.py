@@ -35,6 +35,7 @@ class _Found:
 def run(options: argparse.Namespace) -> int:
     """Embody and animate one candidate, or animate a dimensioned mechanism."""
     from graphsynth.drawing.frames import check_frames
+    from graphsynth.formats.registry import write
 
     suffix = options.output.suffix.lower()
     check_place(options.output, _SUFFIXES)
@@ -48,10 +49,7 @@ def run(options: argparse.Namespace) -> int:
     with replacing(options.output) as fresh:
         _write(found, fresh, suffix, count)
     if options.save:
-        mechanism = found.motion.mechanism
-        text = mechanism.to_toml() if options.save.suffix.lower() == ".toml" else mechanism.to_json()
-        with replacing(options.save) as fresh:
-            fresh.write_text(text, "utf-8")
+        write(found.motion.mechanism, options.save)
     motion, closure = found.motion, found.motion.closure
     if not options.json:
         ending = closure.statement if motion.completed else f"not a full rotation: {motion.reason}"

@@ -16,6 +16,7 @@ from graphsynth.core.errors import FormatError, SpecError
 from graphsynth.core.textfiles import read_bytes
 from graphsynth.design.curves.building import build
 from graphsynth.design.curves.index import CurveIndex
+from graphsynth.formats.registry import write
 
 #: Curves from which all cores work; the longest file of points; numbers of a pose.
 _MANY, _LONGEST, _POSE = 20_000, 10**7, 3
@@ -69,8 +70,7 @@ def _find(options: argparse.Namespace) -> int:
     if options.output is not None and found:
         mechanism = found[0].mechanism
         if options.output.suffix.lower() in (".toml", ".json"):
-            text = mechanism.to_toml() if options.output.suffix.lower() == ".toml" else mechanism.to_json()
-            options.output.write_text(text, encoding="utf-8")
+            write(mechanism, options.output)
         else:
             mechanism.draw(options.output)
     rows = [

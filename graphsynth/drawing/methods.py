@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from graphsynth.core.errors import GraphsynthError
+from graphsynth.core.wholefiles import replacing
 from graphsynth.drawing.diagram import draw_mechanism, mechanism_sketch
 from graphsynth.drawing.frames import with_trace_points
 from graphsynth.drawing.plots import Chart
@@ -44,7 +45,8 @@ class Drawing:
         """
         file = Path(path)
         if file.suffix.lower() == ".svg":
-            file.write_text(self.svg, "utf-8")
+            with replacing(file) as fresh:
+                fresh.write_text(self.svg, "utf-8")
         elif self._writer is None:
             raise GraphsynthError(f"{file} must end in .svg")
         else:

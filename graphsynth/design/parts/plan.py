@@ -144,21 +144,24 @@ Travel = Mapping[tuple[int, int], tuple[float, float]]
 def plan(mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel) -> PartsPlan:
     """Return outlines, holes and pins of a mechanism with revolute and prismatic joints and pins in slots.
 
-    If the pin is not given, it is made smaller where holes would be too near to each other.
+    If the pin is not given, it is made smaller where holes would be too near to each other.  If that does not help,
+    guides of a cylinder are moved along its axis.
     """
     told = ""
-    for smaller in _SMALLER if given.pin is None else _SMALLER[:1]:
-        found, near = _planned(mechanism, given, unit, travel, smaller)
-        if not near:
-            return found
-        told = told or near
+    for free in (False, True):
+        for smaller in _SMALLER if given.pin is None else _SMALLER[:1]:
+            found, near = _planned(mechanism, given, unit, travel, (smaller, free))
+            if not near:
+                return found
+            told = told or near
     raise GeometryError(f"{told}; make the pin or the wall smaller, or the unit larger")
 
 
 def _planned(
-    mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel, smaller: float
+    mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel, tried: tuple[float, bool]
 ) -> tuple[PartsPlan, str]:
-    """Return the plan with the pin made smaller, and which holes are too near to each other."""
+    """Return the plan and which holes are too near; tried: the pin so much smaller, guides of cylinders moved."""
+    smaller, free = tried
     for joint in mechanism.joints:
         if not isinstance(joint, Revolute | Prismatic | PinSlot):
             raise GeometryError(
@@ -192,20 +195,23 @@ def _planned(
     for joint in mechanism.joints:
         if not isinstance(joint, Prismatic | PinSlot):
             continue
-        name, reach = f"{joint.a}-{joint.b}", 0.0
+        name, reach, (low, high) = f"{joint.a}-{joint.b}", 0.0, travel[joint.pair]
         A, B = complex(*joint.at_a) * unit, complex(*joint.at_b) * unit
         along, guides = cmath.exp(1j * joint.angle_a), [B]
         if isinstance(joint, Prismatic):
             reach = 2.0 * sizes.boss
-            way = cmath.exp(1j * joint.angle_b) * reach
-            guides = [B - way, B + way]
+            way = cmath.exp(1j * joint.angle_b)
+            own = (places[joint.a], places[joint.b])
+            driven = any({d.base, d.link} == {joint.a, joint.b} for d in mechanism.drivers)
+            shift = _guides_at(A, along, B, way, (low, high), own, sizes) if free and driven else 0.0
+            B, low, high = B + shift * way, low + shift, high + shift
+            guides = [B - reach * way, B + reach * way]
         for k, pin in enumerate(pins):  # what is jointed to the slider in its middle may reach through the slot
             if pin.kind != "guide" and joint.b in pin.sheets and _near(pin.places[pin.sheets.index(joint.b)], B):
                 pins[k] = pin._replace(passes=(*pin.passes, joint.a))
         for at in guides:
             pins.append(Pin((joint.a, joint.b), (A, at), joint.b, at, "guide", name))
             holes[joint.b].append((Rounded((at,), sizes.pin / 2.0), name))
-        low, high = travel[joint.pair]
         reach += sizes.clearance
         ends = [A + along * (low - reach), A + along * (high + reach)]
         places[joint.a] += ends
@@ -219,6 +225,42 @@ def _planned(
     outlines = tuple(Rounded.around(own, r) for own, r in zip(places, radius))
     shapes = tuple(tuple(hole for hole, _ in own) for own in holes)
     return PartsPlan(tuple(links), outlines, shapes, tuple(pins), sizes), _near_holes(holes, sizes)
+
+
+def _guides_at(
+    A: complex,
+    along: complex,
+    B: complex,
+    way: complex,
+    travel: tuple[float, float],
+    places: tuple[Sequence[complex], Sequence[complex]],
+    sizes: Sizes,
+) -> float:
+    """Return how far along the axis the guides are moved from B, so that slot and guides are clear of other holes.
+
+    Any place on the axis guides alike: the one with the shortest links is taken; 0 if none is clear.  ``A``, ``along``
+    and ``places[0]`` belong to the link with the slot, ``B``, ``way`` and ``places[1]`` to that with the guides.
+    """
+    from graphsynth.design.parts.gaps import apart
+
+    reach, room = 2.0 * sizes.boss, sizes.wall / 2.0 + sizes.hole + sizes.clearance
+    low, high = travel[0] - reach - sizes.clearance, travel[1] + reach + sizes.clearance
+    on_slot = [((p - A) * along.conjugate()).real for p in places[0]]
+    on_guide = [((p - B) * way.conjugate()).real for p in places[1]]
+    tried = [t for c in on_slot for t in (c + room - low, c - room - high)]
+    tried += [c + side * (reach + room) for c in on_guide for side in (-1.0, 1.0)]
+
+    def clear(t: float) -> bool:
+        slot, guides = (A + (low + t) * along, A + (high + t) * along), (B + (t - reach) * way, B + (t + reach) * way)
+        return all(apart(slot, (p,)) >= room * (1.0 - _SAME) for p in places[0]) and all(
+            abs(g - p) >= 2.0 * sizes.spacer for g in guides for p in places[1]
+        )
+
+    def length(t: float) -> float:
+        slot, guide = [*on_slot, low + t, high + t], [*on_guide, t - reach, t + reach]
+        return max(slot) - min(slot) + max(guide) - min(guide)
+
+    return min(filter(clear, tried), key=length, default=0.0)
 
 
 def divided(whole: PartsPlan, frame: int) -> Iterator[PartsPlan]:

@@ -12,7 +12,7 @@ import graphsynth as gs
 from graphsynth import testing
 from graphsynth.core.errors import GeometryError
 from graphsynth.design import PartSizes, Rounded
-from graphsynth.design.parts.gaps import Solid, Tube, gaps, proved_gap, proved_travel
+from graphsynth.design.parts.gaps import Solid, Tube, apart, gaps, proved_gap, proved_travel
 from graphsynth.dynamics import DynamicModel
 from graphsynth.mechanism.joints import Prismatic
 
@@ -70,11 +70,13 @@ def outside_slots(made, inputs):
     motion = made.motion.mechanism.simulate(inputs, start=made.motion.poses[0])
     for joint in made.motion.mechanism.joints:
         if isinstance(joint, Prismatic):
-            way = motion.point(joint.b, joint.at_b).position - motion.point(joint.a, joint.at_a).position
+            guides = [pin.at for pin in made.plan.pins if pin.kind == "guide" and pin.name == f"{joint.a}-{joint.b}"]
+            middle = sum(guides) / (2 * made.unit)
+            way = motion.point(joint.b, (middle.real, middle.imag)).position
+            way = way - motion.point(joint.a, joint.at_a).position
             s = made.unit * (way @ [1, 1j] * np.exp(-1j * (motion.poses[:, joint.a, 2] + joint.angle_a))).real
             [slot] = [hole for hole in made.plan.holes[joint.a] if len(hole.hull) > 1]
             ends = (np.array(slot.hull) - made.unit * complex(*joint.at_a)) * np.exp(-1j * joint.angle_a)
-            guides = [pin.at for pin in made.plan.pins if pin.kind == "guide"]
             half = abs(guides[0] - guides[1]) / 2
             if s.min() - half < ends.real.min() or s.max() + half > ends.real.max():
                 yield joint
@@ -247,6 +249,24 @@ def test_a_slider_has_a_slot_with_two_guides():
     apart = abs(guides[1].at - guides[0].at)
     assert length == pytest.approx(2 * 40.0 + apart + 2 * made.sizes.clearance, rel=1e-4)
     assert not list(contradictions(made, np.linspace(0, 2 * np.pi, 41)))
+
+
+def test_guides_of_a_cylinder_move_along_its_axis_until_the_slot_is_clear_of_its_eye():
+    """At its shortest, the rod of the cylinder from B to C ends in the eye of the barrel, so the guides lie elsewhere."""
+    places = {"A": (0, 0), "B": (3, 0), "C": (2, 2)}
+    crane = gs.Mechanism.from_points(places, ["AC"], "AB", ["BC"], cylinders=["BC"])
+    inputs = np.linspace(0, 1, 41)
+    made = gs.parts(gs.simulate(crane, inputs), unit=50.0)
+    assert made.certified and list(outside_slots(made, np.linspace(0, 1, 97))) == []
+    guides = [pin for pin in made.plan.pins if pin.kind == "guide"]
+    eye = next(joint for joint in crane.joints if joint.kind == "P")
+    [slot] = [hole for hole in made.plan.holes[eye.a] if len(hole.hull) > 1]
+    round_holes = [hole for hole in made.plan.holes[eye.a] if len(hole.hull) == 1]
+    assert round_holes
+    for hole in round_holes:
+        assert apart(slot.hull, hole.hull) >= slot.radius + hole.radius + made.sizes.wall / 2
+    way = np.exp(1j * eye.angle_b)  # the guides stay on the axis
+    assert [((pin.at / 50 - complex(*eye.at_b)) / way).imag for pin in guides] == pytest.approx([0, 0], abs=1e-12)
 
 
 def test_a_pin_by_default_is_small_enough_for_the_holes():
