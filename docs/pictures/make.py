@@ -1,7 +1,7 @@
 """Draw the pictures of the README and of the pages anew: ``python docs/pictures/make.py [FOLDER]``.
 
 Examples of the gallery and of some pages write their own pictures.  Those of other pages are taken from the reports of
-shipped scenes, three minutes in all; tribometer-error-time.svg is measured on a quiet machine, by ``graphsynth
+shipped scenes, five minutes in all; tribometer-error-time.svg is measured on a quiet machine, by ``graphsynth
 accuracy tribometer``.
 """
 
@@ -29,6 +29,12 @@ CHOSEN = 5  # of the sixteen chains: the one that becomes a mechanism
 CELL, GAP, COLUMNS = 150, 10, 8
 #: Pages whose examples write pictures.
 WITH_EXAMPLES = ("gallery.md", "explanation/jamming-in-space.md", "how-to/build-it.md")
+#: Parts of the best answer of a task: file, millimetres of its unit, inputs (a full rotation if none).
+PARTS: dict[str, tuple[str, float, tuple[float, float] | None]] = {
+    "excavator_bucket": ("design-bucket-parts", 100.0, (0.0, 1.0)),
+    "walking_leg": ("design-leg-parts", 3.0, None),
+    "windscreen_wiper": ("design-wiper-parts", 1.0, None),
+}
 #: Pictures of the pages: scene, file, title in the report.
 FROM_SCENES = {
     "antenna": {
@@ -48,6 +54,18 @@ FROM_SCENES = {
         "drive-speed": "Crank speed",
         "drive-dead-centres": "Without inertia: speed of the platform",
         "drive-claim": "The claim about the resistance as a map",
+    },
+    "excavator_bucket": {
+        "design-bucket": "Place 1: 6 links",
+        "design-bucket-function": "Target and answers: function",
+    },
+    "walking_leg": {
+        "design-leg": "Place 1: 6 links",
+        "design-leg-path": "Target and answers: path 1",
+    },
+    "windscreen_wiper": {
+        "design-wiper": "Place 1: 4 links",
+        "design-wiper-swing": "Target and answers: swing",
     },
     "tribometer": {
         "tribometer-motion": "In motion",
@@ -78,15 +96,21 @@ def chains_picture(chains: list[gs.MechanismGraph]) -> str:
 def scene_pictures(scene: str, wanted: dict[str, str]) -> dict[str, str]:
     """Run a scene; return the chosen pictures of its report by file name."""
     with TemporaryDirectory() as place:
-        products = run(scene, out=Path(place)).products.values()
+        report = run(scene, out=Path(place))
     found = {
         item.title: item.svg
-        for product in products
+        for product in report.products.values()
         if isinstance(product, tuple)
         for item in product
         if isinstance(item, Picture)
     }
-    return {f"{name}.svg": found[title] + "\n" for name, title in wanted.items()}
+    made = {f"{name}.svg": found[title] + "\n" for name, title in wanted.items()}
+    if scene in PARTS:
+        name, unit, reach = PARTS[scene]
+        best = gs.Mechanism.from_json(report["mechanisms"].columns["mechanism"][0])
+        motion = best.simulate() if reach is None else best.simulate(np.linspace(*reach, 361))
+        made[f"{name}.svg"] = gs.parts(motion, unit=unit).draw().svg + "\n"
+    return made
 
 
 def pictures_of_examples(page: str, folder: Path) -> None:

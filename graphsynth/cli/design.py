@@ -8,13 +8,13 @@ from pathlib import Path
 
 from graphsynth.cli import console
 from graphsynth.core.errors import SpecError
-from graphsynth.core.wholefiles import replacing
 
 
 def run(options: argparse.Namespace) -> int:
     """Search, write the report and the mechanisms, print the ranked answers; Ctrl-C ends the search, not the report."""
     from graphsynth.core.checks import positive
     from graphsynth.core.ordered import processes
+    from graphsynth.formats.registry import write
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.pipeline.design.tables import DesignTable
     from graphsynth.pipeline.report import print_summary
@@ -42,8 +42,7 @@ def run(options: argparse.Namespace) -> int:
     files = []
     for place, text in enumerate(report["mechanisms"].columns["mechanism"], 1):
         files.append(folder / f"mechanism-{place}.toml")
-        with replacing(files[-1]) as fresh:
-            fresh.write_text(Mechanism.from_json(text).to_toml(), "utf-8")
+        write(Mechanism.from_json(text), files[-1])
     good = sum(record.good is True for record in report["records"])
     if options.json:
         answers = [
@@ -53,5 +52,9 @@ def run(options: argparse.Namespace) -> int:
         ]
         console.put_json({"scene": scene.name, "folder": str(report.folder), "accepted": good, "answers": answers})
     else:
-        print_summary(report, console.screen())
+        print_summary(report, console.screen(), report["tables"])
+        if files:
+            reach = "" if scene.mechanism.drive == "rotation" else f" --range 0 {scene.mechanism.task().span:.6g}"
+            console.put(f"See them move: {folder / 'report.html'}")
+            console.put(f"Make one: graphsynth parts {files[0]}{reach}")
     return 0

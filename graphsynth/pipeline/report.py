@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -56,10 +57,10 @@ def scene_json(report: Report) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False, default=str) + "\n"
 
 
-def print_summary(report: Report, console: Console) -> None:
+def print_summary(report: Report, console: Console, tables: Sequence[Table] | None = None) -> None:
     """Print the summary of a run on a rich console: the answer, the tables, and where the files are.
 
-    The answer stands first; on a terminal that shows only the end of a long report it is said again at the end.
+    Without ``tables`` all of the report.  The answer stands first; on a terminal that shows only the end of a long report it is said again at the end.
     """
     from rich.markup import escape
 
@@ -69,7 +70,7 @@ def print_summary(report: Report, console: Console) -> None:
     answer.append(" · ".join(f"[bold]{escape(fact.value)}[/bold] {escape(fact.text)}" for fact in facts(report)))
     for line in (f"[bold]{escape(report.scene.scene.title)}[/bold]", *answer):
         console.print(line, highlight=False)
-    shown = [_fitted(table, console.width) for table in summary_tables(report)]
+    shown = [_fitted(table, console.width) for table in (summary_tables(report) if tables is None else tables)]
     for table in shown:
         console.print(table)
     room = console.height - 1 - len(answer)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -72,8 +73,13 @@ def test_inputs_of_a_cylinder_are_parts_of_its_stroke() -> None:
 def test_the_page_shows_every_answer_over_its_target() -> None:
     report = execute(scene(("records", "tables", "animations", "plots", "mechanisms"), paths=[SEGMENT], answers=2))
     assert [record.good for record in report["records"]] == [True, True]
-    answers, *_ = report["tables"]
-    assert len(answers.rows) == 2 and answers.rows[0][-2:] == ("certified", "yes")
+    answers, verdicts, *_ = report["tables"]
+    assert len(answers.rows) == 2 and answers.rows[0][-1] == "yes"
+    assert verdicts.rows[0][1:3] == ("turns fully, proved", "one branch, proved")
+    best = gs.Mechanism.from_json(report["mechanisms"].columns["mechanism"][0]).simulate()
+    forgiven = np.radians(float(verdicts.rows[0][3]))
+    assert best.assess_jamming(tilt=0.98 * forgiven, joints="0.3 deg").verdict.name == "CERTIFIED_FREE"
+    assert best.assess_jamming(tilt=1.05 * forgiven, joints="0.3 deg").verdict.name.startswith("CERTIFIED_JAMMED")
     assert all("<animate" in picture.svg for picture in report["animations"])
     assert "2 mechanisms do the task" in " ".join(finding.text for finding in sentences(report))
     (plot,) = report["plots"]
@@ -135,6 +141,15 @@ products = ["tables"]
 def test_mistakes_are_told_with_their_place(mechanism: dict[str, Any], words: str) -> None:
     with pytest.raises(SceneError, match=words):
         execute(scene(**mechanism))
+
+
+def test_the_chart_of_a_stroke_shows_its_limits_and_the_caption_what_is_reached() -> None:
+    swing = {"least_deg": 50, "most_deg": 55, "time_ratio": 1, "link": "blade"}
+    report = execute(scene(("tables", "animations", "plots"), swings=[swing], pivots=[[0, 0], [4, 1]]))
+    (chart,), (picture,) = report["plots"], report["animations"]
+    assert "least" in chart.svg and "most" in chart.svg and "lowest place" in chart.caption
+    told = re.search(r"Blade: link \d, which turns through ([\d.]+)°", picture.caption)
+    assert told and 50 - 0.5 <= float(told[1]) <= 55 + 0.5
 
 
 def test_an_impossible_task_gives_a_report_that_says_why() -> None:

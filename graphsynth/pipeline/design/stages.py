@@ -6,7 +6,11 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from graphsynth.core.errors import GeometryError
+from graphsynth.design.task.targets import FunctionTarget, PathTarget, PosesTarget, SwingTarget, Target
 from graphsynth.pipeline.display import table
 from graphsynth.pipeline.products import Columns, Finding, Picture, Quantity, Record, Table, exact
 from graphsynth.pipeline.stages import Context
@@ -15,7 +19,6 @@ from graphsynth.pipeline.steps import read_mechanism
 if TYPE_CHECKING:
     from graphsynth.design.task.answers import DesignedMechanism
     from graphsynth.design.task.search import Designs, Progress
-    from graphsynth.design.task.targets import Target
     from graphsynth.design.task.task import DesignTask
     from graphsynth.drawing.plots import Line
     from graphsynth.drawing.shapes import Shape
@@ -25,6 +28,8 @@ if TYPE_CHECKING:
 #: Frames of a picture in motion; answers in one chart.
 _FRAMES, _CURVES = 90, 3
 _WIDE, _HIGH = 460.0, 400.0
+#: Distance of the bounds of the misalignment that is forgiven, and the time of its proof.
+_GAP, _SECONDS = 0.02, 5.0
 
 
 def search(context: Context) -> Designs:
@@ -65,7 +70,10 @@ def records(context: Context, designs: Designs) -> tuple[Record, ...]:
     for number, answer in enumerate(designs.answers, 1):
         proof = "its motion is certified" if answer.certified else "its motion is estimated"
         margins = (
-            *(Quantity(f"error {name}", e) for name, e in zip(_titles(designs), answer.errors)),
+            *(
+                Quantity.of_si(f"error {name}", error, "deg" if angular else "")
+                for name, error, angular in zip(_titles(designs), answer.errors, _angular(designs))
+            ),
             exact("links", answer.links),
             Quantity("size", answer.size),
             Quantity.of_si("transmission angle", answer.transmission, "deg"),
@@ -82,16 +90,12 @@ def records(context: Context, designs: Designs) -> tuple[Record, ...]:
 
 
 def tables(context: Context, designs: Designs) -> tuple[Table, ...]:
-    """Return the ranked answers, and why others were rejected."""
-    names = _titles(designs)
-    columns = (
-        "place",
-        "links",
-        "sliders",
-        *(f"error {n} | .3g" for n in names),
-        "transmission [°] | .1f",
-        "size | .4g",
+    """Return the ranked answers, what is proved of them, and why others were rejected."""
+    errors = (
+        f"error {name} [°] | .2g" if angular else f"error {name} | .2g"
+        for name, angular in zip(_titles(designs), _angular(designs))
     )
+    columns = ("place", "links", "sliders", *errors, "transmission [°] | .1f", "size | .4g", "does the task")
     rows = [
         (
             str(place),
@@ -100,24 +104,73 @@ def tables(context: Context, designs: Designs) -> tuple[Table, ...]:
             *a.errors,
             a.transmission,
             a.size,
-            "certified" if a.certified else "estimated",
             "yes" if a.accepted else "; ".join(a.reasons),
         )
         for place, a in enumerate(designs.answers, 1)
     ]
     answers = Finding(f"{designs.statement[:1].upper()}{designs.statement[1:]}.", designs.accepted)
-    note = "Errors are the largest over each target: of paths and poses over their size, else radians or lengths."
-    found = [table("Answers", (*columns, "motion", "does the task"), rows, note, answers)]
+    note = "Errors are the largest over each target; of paths and poses over their size. Simulated anew, estimated."
+    found = [table("Answers", columns, rows, note, answers)]
+    if designs.answers:
+        found.append(_verdicts(designs))
     if designs.rejected:
         reasons = [(reason, str(count)) for reason, count in designs.rejected.items()]
         found.append(table("Why others were rejected", ("reason", "how often"), reasons))
     return tuple(found)
 
 
+def _verdicts(designs: Designs) -> Table:
+    """Say of every answer whether it turns, stays on its branch, and how much misalignment its joints forgive."""
+    task, rows = designs.task, []
+    for place, answer in enumerate(designs.answers, 1):
+        proof = answer.certificate
+        proved = proof is not None and proof.certified
+        whole = task.drive == "rotation"
+        turns = proved and (not whole or (proof is not None and proof.closed))
+        moves = "turns fully" if whole else "moves over its range"
+        row: list[object] = [str(place), f"{moves}, {_known(turns)}", f"one branch, {_known(proved)}"]
+        rows.append([*row, _forgiven(designs, answer)] if not task.linear else row)
+    columns = ["place", "drive", "branch"] + (["forgives a tilted axis [°] | .2f"] if not task.linear else [])
+    note = "Proved: over the whole range, between the samples too, for the dimensions as they are. "
+    if not task.linear:
+        tilt = f"Tilt of the driver's axis that the joints can share if each tilts by {_degrees(task.joint_tilt)}"
+        note += f"{tilt}, certified for small tilts."
+    return table("Verdicts", columns, rows, note.strip())
+
+
+def _known(proved: bool) -> str:
+    return "proved" if proved else "estimated"
+
+
+def _forgiven(designs: Designs, answer: DesignedMechanism) -> float | None:
+    """Return the tilt of the driver's axis at which joints begin to bind, a certified lower bound; None if rejected."""
+    from graphsynth.jamming.questions import largest_scale
+
+    task = designs.task
+    if task.misalignment is not None and math.isfinite(answer.jam_margin):
+        return answer.jam_margin * task.misalignment
+    if not answer.accepted:
+        return None
+    unit = task.joint_tilt
+    return unit * largest_scale(answer.motion, task.joint_tilt, unit, relative_gap=_GAP, seconds=_SECONDS).low
+
+
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle):.3g}°"
+
+
 def _titles(designs: Designs) -> list[str]:
     """Name every target; numbers tell those of one kind apart."""
     kinds = [type(target).__name__.removesuffix("Target").lower() for target in designs.task.targets]
     return [kind if kinds.count(kind) == 1 else f"{kind} {kinds[: k + 1].count(kind)}" for k, kind in enumerate(kinds)]
+
+
+def _angular(designs: Designs) -> list[bool]:
+    """Whether the error of every target is an angle: not over a size, nor a length of a slider."""
+    return [
+        not isinstance(target, PathTarget | PosesTarget) and not getattr(target, "slides", False)
+        for target in designs.task.targets
+    ]
 
 
 def pictures(context: Context, designs: Designs) -> tuple[Picture, ...]:
@@ -133,17 +186,27 @@ def pictures(context: Context, designs: Designs) -> tuple[Picture, ...]:
 
 
 def _caption(designs: Designs, answer: DesignedMechanism) -> str:
-    errors = ", ".join(f"{name} {error:.2g}" for name, error in zip(_titles(designs), answer.errors))
-    degrees = math.degrees(answer.transmission)
+    errors = ", ".join(
+        f"{name} {_degrees(error) if angular else format(error, '.2g')}"
+        for name, error, angular in zip(_titles(designs), answer.errors, _angular(designs))
+    )
     motion = "certified" if answer.certified else "estimated"
-    links = ", ".join(f"{name}: link {link}" for name, link in answer.carriers.items())
-    figures = f"Smallest transmission angle {degrees:.1f}°, size {answer.size:.3g}; motion {motion}"
-    return f"Errors: {errors}. {figures}. {links[:1].upper()}{links[1:]}."
+    links = ", ".join(f"{name}: link {link}{_swing(designs, answer, name)}" for name, link in answer.carriers.items())
+    figures = f"Smallest transmission angle {_degrees(answer.transmission)}, size {answer.size:.3g}; motion {motion}"
+    wanted = "Orange: what is wanted. " if _drawn_targets(designs) else ""
+    return f"{wanted}Errors: {errors}. {figures}. {links[:1].upper()}{links[1:]}."
+
+
+def _swing(designs: Designs, answer: DesignedMechanism, name: str) -> str:
+    """How far a link turns on the frame, if a target names it."""
+    if designs.task.names.get(name, True) or name in designs.task.sliding:
+        return ""
+    angle = np.unwrap(answer.motion.poses[:, answer.carriers[name], 2])
+    return f", which turns through {math.degrees(float(np.ptp(angle))):.4g}°"
 
 
 def _drawn_targets(designs: Designs) -> tuple[Shape, ...]:
     """Return the targets that have places, to be drawn behind the mechanism."""
-    from graphsynth.design.task.targets import PathTarget, PosesTarget
     from graphsynth.drawing.shapes import Path, Style
 
     found: list[Shape] = []
@@ -162,42 +225,56 @@ def _drawn_targets(designs: Designs) -> tuple[Shape, ...]:
 
 def curves(context: Context, designs: Designs) -> tuple[Picture, ...]:
     """Draw what the best answers do over what is wanted: paths, or angles of links over the input."""
-    import numpy as np
-
     from graphsynth.drawing.plots import Chart, Line
 
     found, task = [], designs.task
     unit = 1.0 if task.linear else math.degrees(1.0)
     for name, target in zip(_titles(designs), task.targets):
-        lines, point = list(_wanted(target, unit)), str(getattr(target, "point", ""))
+        wanted = list(_wanted(target, unit, task.span))
+        lines, point = list(wanted), str(getattr(target, "point", ""))
         for k, answer in enumerate(designs.answers[:_CURVES]):
             if point:
                 x, y = answer.motion.point(point).position.T
             else:
-                link = answer.carriers[str(getattr(target, "link", ""))]
-                x, y = unit * answer.motion.inputs, np.degrees(np.unwrap(answer.motion.poses[:, link, 2]))
-                y = y - y[0]
+                x, y = unit * answer.motion.inputs, _output(designs, answer, target)
+                y = y - (y.min() if isinstance(target, SwingTarget) else y[0])
             lines.append(Line(x, y, f"place {k + 1}", "acd"[k]))
-        labels = ("x", "y") if point else ("part of the stroke" if task.linear else "input [°]", "output [°]")
+        output = "output" if getattr(target, "slides", False) else "output [°]"
+        labels = ("x", "y") if point else ("part of the stroke" if task.linear else "input [°]", output)
         chart = Chart(lines, *labels, equal=bool(point), size=(5.4, 3.8))
-        found.append(Picture(f"Target and answers: {name}", chart.svg(), "What is wanted dashed, the answers over it."))
+        said = "Dashed: what is wanted; over it the best answers." if wanted else "The best answers over the input."
+        if isinstance(target, SwingTarget) and wanted:
+            said = "Dashed: the least and the most that is wanted; the best answers from their lowest place on."
+        found.append(Picture(f"Target and answers: {name}", chart.svg(), said))
     return tuple(found) if designs.answers else ()
 
 
-def _wanted(target: Target, unit: float) -> Iterator[Line]:
-    """Yield the line of a target over its points, or over inputs in a unit; none for strokes and free starts."""
-    import numpy as np
+def _output(designs: Designs, answer: DesignedMechanism, target: Target) -> NDArray[np.float64]:
+    """Angle of the link of a target in degrees, or the way of a slider from where it begins."""
+    poses = answer.motion.poses[:, answer.carriers[str(getattr(target, "link", ""))]]
+    if not getattr(target, "slides", False):
+        return np.degrees(np.unwrap(poses[:, 2]))
+    way = poses[:, :2] - poses[0, :2]
+    far = way[np.hypot(*way.T).argmax()]
+    return np.asarray(way @ far / max(math.hypot(*far), 1e-300))
 
-    from graphsynth.design.task.targets import FunctionTarget, PathTarget, PosesTarget
+
+def _wanted(target: Target, unit: float, span: float) -> Iterator[Line]:
+    """Yield the lines of a target over its points, or over inputs in a unit; none for dwells and free starts."""
     from graphsynth.drawing.plots import Line
 
+    scale = 1.0 if getattr(target, "slides", False) else math.degrees(1.0)
     if isinstance(target, PathTarget | PosesTarget):
         z = target.goal
         z = np.append(z, z[0]) if isinstance(target, PathTarget) and target.closed else z
         yield Line(z.real, z.imag, "target", "jam", "--")
     elif isinstance(target, FunctionTarget) and not target.own_start and target.inputs is not None:
-        outputs = np.degrees(np.array(target.outputs))
+        outputs = scale * np.array(target.outputs)
         yield Line(unit * np.array(target.inputs), outputs - outputs[0], "target", "jam", "--")
+    elif isinstance(target, SwingTarget):
+        for limit, label in ((target.least, "least"), (target.most, "most")):
+            if 0.0 < limit < math.inf:
+                yield Line([0.0, unit * span], [scale * limit] * 2, label, "jam", "--")
 
 
 def mechanisms(context: Context, designs: Designs) -> Columns:

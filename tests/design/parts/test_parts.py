@@ -252,7 +252,7 @@ def test_a_slider_has_a_slot_with_two_guides():
 
 
 def test_guides_of_a_cylinder_move_along_its_axis_until_the_slot_is_clear_of_its_eye():
-    """At its shortest, the rod of the cylinder from B to C ends in the eye of the barrel, so the guides lie elsewhere."""
+    """At its shortest, the rod of the cylinder from B to C ends in the eye of the barrel."""
     places = {"A": (0, 0), "B": (3, 0), "C": (2, 2)}
     crane = gs.Mechanism.from_points(places, ["AC"], "AB", ["BC"], cylinders=["BC"])
     inputs = np.linspace(0, 1, 41)
