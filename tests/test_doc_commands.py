@@ -45,9 +45,9 @@ NOT_RUN = {
     r"--scheduler|sixteen": "needs a cluster; tests/atlas starts one",
     r"--mobility 2\.\.4|verify chains.sqlite$": "minutes; tests/atlas verify every chain of the shipped catalogue",
     r"catalog site": "tests/atlas",
-    r"^design ": "searches take seconds to a minute; tests/design/task, tests/pipeline",
+    r"^design my_": "the tasks shown are those of the shipped scenes, which are run",
 }
-SLOW = r"catalog |animate|worked-example"
+SLOW = r"catalog |animate|worked-example|^design |graphsynth-out"
 #: Commands that need an optional package, and which one.
 NEEDS = {r"\.dxf\b|--form (dxf|stl)": "ezdxf", r"parquet": "pyarrow"}
 

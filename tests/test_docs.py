@@ -88,6 +88,7 @@ SLOW_PAGES = (
     *("embody", "point-an-antenna", "jamming-of-any-mechanism", "the-deck-reproduced", "bearing-jamming"),
     *("certificates", "jamming-in-space", "stick-slip", "gallery", "choose-a-method", "intervals"),
     *("README", "build-a-catalogue", "browse-the-atlas", "draw-and-animate", "property-tests"),
+    *("windscreen-wiper", "excavator-bucket"),
 )
 
 

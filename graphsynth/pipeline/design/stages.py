@@ -231,7 +231,7 @@ def curves(context: Context, designs: Designs) -> tuple[Picture, ...]:
     unit = 1.0 if task.linear else math.degrees(1.0)
     for name, target in zip(_titles(designs), task.targets):
         wanted = list(_wanted(target, unit, task.span))
-        lines, point = list(wanted), str(getattr(target, "point", ""))
+        lines, point = [], str(getattr(target, "point", ""))
         for k, answer in enumerate(designs.answers[:_CURVES]):
             if point:
                 x, y = answer.motion.point(point).position.T
@@ -241,8 +241,8 @@ def curves(context: Context, designs: Designs) -> tuple[Picture, ...]:
             lines.append(Line(x, y, f"place {k + 1}", "acd"[k]))
         output = "output" if getattr(target, "slides", False) else "output [°]"
         labels = ("x", "y") if point else ("part of the stroke" if task.linear else "input [°]", output)
-        chart = Chart(lines, *labels, equal=bool(point), size=(5.4, 3.8))
-        said = "Dashed: what is wanted; over it the best answers." if wanted else "The best answers over the input."
+        chart = Chart([*lines, *wanted], *labels, equal=bool(point), size=(5.4, 3.8))
+        said = "Dashed: what is wanted, over the best answers." if wanted else "The best answers over the input."
         if isinstance(target, SwingTarget) and wanted:
             said = "Dashed: the least and the most that is wanted; the best answers from their lowest place on."
         found.append(Picture(f"Target and answers: {name}", chart.svg(), said))
