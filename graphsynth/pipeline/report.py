@@ -60,7 +60,8 @@ def scene_json(report: Report) -> str:
 def print_summary(report: Report, console: Console, tables: Sequence[Table] | None = None) -> None:
     """Print the summary of a run on a rich console: the answer, the tables, and where the files are.
 
-    Without ``tables`` all of the report.  The answer stands first; on a terminal that shows only the end of a long report it is said again at the end.
+    The answer stands first; on a terminal that shows only the end of a long report it is said again at the end.
+    ``tables``: those to show, if not all.
     """
     from rich.markup import escape
 
