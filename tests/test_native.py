@@ -107,6 +107,7 @@ def test_counting_without_the_library_is_the_same() -> None:
     assert python(COUNT, GRAPHSYNTH_NATIVE="0").split() == ["6856", "True"]
 
 
+@pytest.mark.slow
 @needs_library
 def test_a_changed_source_falls_back_and_says_so(tmp_path: Path) -> None:
     package = tmp_path / "graphsynth"
@@ -311,9 +312,7 @@ def real_calls(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
 def loop(signature: Signature) -> Any:
     """One loop over intervals as a case; most are for the slow run, since numba compiles each for a second or two."""
     name = signature.kernel.removeprefix(FLAT[0])
-    return pytest.param(
-        signature, id=name, marks=() if name in ("add", "multiply", "sin", "atan2") else pytest.mark.slow
-    )
+    return pytest.param(signature, id=name, marks=() if name in ("add", "sin") else pytest.mark.slow)
 
 
 @needs_library

@@ -146,7 +146,7 @@ def largest_scale(
     Examples
     --------
     >>> from graphsynth import Mechanism
-    >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate("80..100 deg")
+    >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate("89..91 deg")
     >>> small, exact = (largest_scale(motion, 0.1, 0.1, model=word) for word in ("small", "exact"))
     >>> exact.low < exact.high and abs(exact.low / small.low - 1.0) < 0.02
     True

@@ -124,6 +124,7 @@ def test_what_is_there_is_not_evaluated_again(copy):
         assert catalogue.evaluate([6], per_chain=2, limit=1) == 1
 
 
+@pytest.mark.slow
 def test_without_dimensions_another_seed_searches_anew(copy, monkeypatch):
     from graphsynth.kinematics.dimensional import Goals
 

@@ -76,6 +76,7 @@ def test_every_family_agrees_with_counting_and_with_the_literature(small):
     assert statement["published"].tolist() == [1, 2, 16, 230, 1, 4, 40]
 
 
+@pytest.mark.slow
 def test_counts_per_row_of_the_published_tables(small, twelve):
     import tomllib
 

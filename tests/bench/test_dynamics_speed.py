@@ -120,6 +120,7 @@ def four_bar_runs():
     return model, start, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_four_bar_beside_scipy_at_equal_error(four_bar_runs, capsys, rtol):
     seconds, found = best_of(lambda: scipy_run(rtol))

@@ -46,6 +46,7 @@ def test_drive_curves_show_every_run() -> None:
         drive_curves({})
 
 
+@pytest.mark.slow
 def test_resistance_picture_marks_the_criterion() -> None:
     effect = resistance_effect(DRIVE, [1.0, 5.0], simulate=True)
     figure = resistance_picture({"L = 0.2 H": effect})

@@ -302,6 +302,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "form"), [("B", "augmented"), ("C", "augmented"), ("B", "partitioned")])
 def test_the_tribometer_as_a_general_model(case, form):
     """Final state to 1e-10, the same events, their times to 1e-9 s, with a bounded number of right-hand sides."""
@@ -388,6 +389,7 @@ def test_a_pulley_law_is_linear():
     assert motion.reactions.joints[-1].force[:, 0] == pytest.approx([mu * G] * 2, rel=1e-13)
 
 
+@pytest.mark.slow
 def test_links_without_mass():
     """The rod and the turning of the slide weigh nothing: the limit of light ones, through dead centres and to rest."""
     friction = [JointFriction(0, 3, 0.2), JointFriction(0, 1, 0.2, radius=0.01)]

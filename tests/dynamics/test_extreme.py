@@ -281,7 +281,10 @@ def driven_rocker(*elements):
     return DynamicModel(mechanism, free.bodies, free.elements, prescribed=[Driver(0, 3, law)]), begin.poses
 
 
-@pytest.mark.parametrize(("form", "method"), [("augmented", "DOP853"), ("augmented", "BDF"), ("partitioned", "DOP853")])
+@pytest.mark.parametrize(
+    ("form", "method"),
+    [("augmented", "DOP853"), pytest.param("augmented", "BDF", marks=pytest.mark.slow), ("partitioned", "DOP853")],
+)
 def test_a_lock_under_prescribed_motion_is_called_one(form, method):
     model, pose = driven_rocker(Spring(0, 2, (0.0, 1.0), (0.1, 0.0), 1.0, 0.1))
     motion = simulate_dynamics(model, np.linspace(0.0, 2.0, 5), pose=pose, form=form, method=method, rtol=1e-8)

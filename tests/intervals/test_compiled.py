@@ -80,6 +80,7 @@ def found_roots(paving, roots):
     assert len(paving.status) == len(roots)
 
 
+@pytest.mark.slow
 def test_all_solutions_are_found_and_proved():
     found = pave_compiled(circle_and_parabola(), ["[-2, 2]", "[-2.1, 2]"], [1])
     assert found.finished

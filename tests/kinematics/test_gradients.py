@@ -147,7 +147,9 @@ def test_every_dimension_to_the_last_digits(name: str) -> None:
     assert np.abs(found - rest).max() < 1e-11 * max(1.0, np.abs(rest).max())
 
 
-@pytest.mark.parametrize("name", ["four-bar", "slider-crank", "planet", "slot", "cam", "class III"])
+@pytest.mark.parametrize(
+    "name", ["four-bar", "slider-crank", "planet", "slot", "cam", pytest.param("class III", marks=pytest.mark.slow)]
+)
 def test_rates_of_the_derivatives_to_ten_digits(name: str) -> None:
     """The derivative of a velocity by a dimension is the rate of the pose's, here from poses at two inputs nearby."""
     own = mechanism(name)

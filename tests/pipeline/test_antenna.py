@@ -81,6 +81,7 @@ def test_no_zero_has_a_sign(report: Any) -> None:
     assert "-0" not in cells and not any(cell.startswith(("-0.000000000", "-0.0000 ")) for cell in cells)
 
 
+@pytest.mark.slow
 def test_the_page(tmp_path: Any) -> None:
     scene = changed(
         "records", "tables", "mechanism_pictures", "animations", "plots",

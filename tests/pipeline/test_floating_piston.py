@@ -38,6 +38,7 @@ def changed(tables: dict[str, Any], *products: str, **mechanism: Any) -> Scene:
     return Scene.from_mapping(found, "x.toml")
 
 
+@pytest.mark.slow
 def test_both_machines_are_assessed(report: Any) -> None:
     records = report["records"]
     assert [record.status for record in records] == ["assessed", "assessed"]
@@ -176,6 +177,7 @@ print(",".join(sorted({m.partition(".")[0] for m in set(sys.modules) - before} -
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("product", "allowed"), [("solutions", set()), ("mechanism_pictures", {"numpy"}), ("loops", {"numpy"})]
 )

@@ -47,6 +47,7 @@ PRINTED = [
 ]
 
 
+@pytest.mark.slow
 def test_ripples_are_the_printed_ones(report: Any) -> None:
     for effect, expected in zip(report["claim"].effects.values(), PRINTED, strict=True):
         speeds = [s for s, _ in expected]

@@ -113,7 +113,9 @@ SYMMETRIC = {
 }
 
 
-@pytest.mark.parametrize("name", SYMMETRIC)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name == "PG(2,5)" else ()) for name in SYMMETRIC]
+)
 def test_symmetric_graphs(name):
     graph, order = SYMMETRIC[name]
     graph = nx.convert_node_labels_to_integers(graph)

@@ -123,7 +123,7 @@ def test_lines_of_shards():
     assert sum(lines) == 318162 and spread(lines) < 1.6
 
 
-@pytest.mark.parametrize("shards", [1, 5, 32, 100])
+@pytest.mark.parametrize("shards", [1, 5, 32, pytest.param(100, marks=pytest.mark.slow)])
 def test_counts_of_shards(shards):
     found = cuts(FOURTEEN, shards, listing=False)
     assert sum(piece.count() for shard in found for piece in shard) == 318162

@@ -230,7 +230,7 @@ def largest_scale(
     --------
     >>> from graphsynth import Mechanism
     >>> from graphsynth.jamming.joints import JointLimits
-    >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate(np.linspace(1.5, 1.6, 3))
+    >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate(np.linspace(1.57, 1.58, 2))
     >>> found = largest_scale(motion, JointLimits(0.1), Misalignment(0, 1, 0.1))
     >>> 1.99 < found.low < 2.01 and found.relative_gap < 1e-3
     True
@@ -298,7 +298,7 @@ def least_factor(
     --------
     >>> from graphsynth import Mechanism
     >>> from graphsynth.jamming.joints import JointLimits
-    >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate(np.linspace(1.5, 1.6, 3))
+    >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate(np.linspace(1.57, 1.58, 2))
     >>> found = least_factor(motion, JointLimits(0.1), Misalignment(0, 1, 0.1))
     >>> 0.49 < found.low < found.high < 0.51
     True

@@ -100,7 +100,7 @@ def pose_gradients(mechanism: Mechanism, dimensions: ArrayLike, frames: ArrayLik
     >>> found.dimensions.shape, found.drivers.shape
     ((1, 1, 4, 10, 2), (1, 1, 1, 2))
     """
-    sizes = np.ascontiguousarray(finite_array("dimensions", dimensions))
+    sizes = np.array(finite_array("dimensions", dimensions), order="C")  # its own: the library takes no locked arrays
     at, given = np.asarray(frames, dtype=np.float64), np.array(loads, dtype=np.float64, order="C")
     links, joints = mechanism.graph.links, len(mechanism.joints)
     if sizes.shape[1:] != (joints, 10) or at.shape != (len(sizes), *at.shape[1:2], links, 4):

@@ -69,6 +69,7 @@ def test_what_is_found_draws_the_wanted_curve(index: CurveIndex) -> None:
     assert len(seen) >= 4
 
 
+@pytest.mark.slow
 def test_motions_are_found_by_any_point_of_the_link(index: CurveIndex) -> None:
     random = np.random.default_rng(8)
     right = 0

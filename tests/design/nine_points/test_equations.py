@@ -34,6 +34,7 @@ def test_slopes_are_derivatives():
         assert sympy.expand(sympy.diff(expression, symbol) - slope) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pivots", [0, 1, 2])
 def test_kernel_agrees(pivots):
     rng = np.random.default_rng(pivots)
@@ -58,6 +59,7 @@ def test_kernel_agrees(pivots):
     assert np.abs(M - np.stack(numbers, axis=1)).max() < 1e-6 * np.abs(M).max()
 
 
+@pytest.mark.slow
 def test_solution_of_linear_systems():
     rng = np.random.default_rng(5)
     A, b = generic(rng, 6, 6), generic(rng, 6, 2)

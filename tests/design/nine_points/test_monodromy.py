@@ -35,6 +35,7 @@ def test_turned_roots_are_roots():
     assert np.abs(follow(start, start.end) - start.z).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_made_again_and_after_an_interruption(tmp_path, capsys, monkeypatch):
     out, work = tmp_path / "starts.npz", tmp_path / "work.npz"
     monodromy.main(["--pivots", "2", "--out", str(out)])

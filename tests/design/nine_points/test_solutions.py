@@ -29,6 +29,7 @@ def problem_3():
     return four_bars_through(PROBLEM_3)
 
 
+@pytest.mark.slow
 def test_counts_of_the_literature(problem_3):
     assert (problem_3.certified, problem_3.expected, len(problem_3.linkages)) == (1442, 1442, 64)
     assert problem_3.complete

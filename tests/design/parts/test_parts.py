@@ -83,7 +83,7 @@ def outside_slots(made, inputs):
 
 
 @given(testing.mechanisms(4, 6, prismatic=True))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_what_is_certified_is_never_contradicted(mechanism):
     never_contradicted(mechanism)
 

@@ -252,6 +252,7 @@ def test_a_function_is_kept():
     assert np.abs(moved.poses[0, 1, :2] - (-3.0, 1.0)).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_eight_links():
     """One dyad more on a Stephenson III six-bar: its links may be exchanged too."""
     joints = [*STEPHENSON, (0, 6), (6, 7), (5, 7)]

@@ -193,7 +193,7 @@ def by_bodies(
     )
 
 
-@pytest.mark.parametrize("kind", ["four-bar", "slider", "six-bar"])
+@pytest.mark.parametrize("kind", ["four-bar", "slider", pytest.param("six-bar", marks=pytest.mark.slow)])
 def test_energy_of_bodies(kind: str) -> None:
     """Random limits and stiffness; the energy over all tilts and heights of bodies is the same."""
     random = np.random.default_rng(len(kind))

@@ -204,6 +204,7 @@ def test_a_box_around_the_float_alone_is_not_that_of_the_motion(monkeypatch):
     assert not of_the_motion(work, pieces._replace(proved=np.array([False]))).own.any()
 
 
+@pytest.mark.slow
 def test_whole_turn_of_the_lambda_linkage():
     """Free up to 2 t_A, jammed above, undecided at it; within alpha squared of it by small tilts only.
 

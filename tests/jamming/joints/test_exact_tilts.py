@@ -251,7 +251,7 @@ def test_bounds_hold_for_every_disturbance_within(part):
         lower, upper, found, places = disturbed_bounds(given, poses, **amount)
         assert (lower <= found.lower).all() and (upper >= found.upper).all()
         least, most = found.upper.copy(), found.lower.copy()
-        for _ in range(60):
+        for _ in range(24):
             r, e, d = (v.copy() for v in places)
             turned = {"r": r, "e": e, "d": d}[part]
             angle = rng.uniform(0.0, 2.0 * np.pi, turned.shape[:2])

@@ -255,6 +255,7 @@ def test_static_friction_in_a_slot_that_stands_still():
     assert "may add" in compare_pistons(square).statement
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("machine", [m for m in MACHINES.values() if not m.acceleration],
                          ids=[n for n, m in MACHINES.items() if not m.acceleration])  # fmt: skip
 def test_energy_over_a_turn(machine):
@@ -277,6 +278,7 @@ def test_energy_with_a_rod_that_is_hardly_long_enough(slack):
     assert abs(turn.gas - turn.gas_closed_form) < 1e-9 * turn.gas
 
 
+@pytest.mark.slow
 def test_works_against_another_quadrature():
     """The trapezoidal rule of a periodic function, with a friction law so soft that few points are enough."""
     machine = replace(MACHINES["askew"], friction=replace(RUB, smoothing_velocity=1.0), gas=ConstantForce(500.0))
@@ -340,6 +342,7 @@ def test_given_force():
     assert machine.loads([1.0, 2.0]).power_error < 1e-12
 
 
+@pytest.mark.slow
 def test_free_motion_of_the_model():
     """The general dynamics keeps the crank's speed under the motor torque of the closed form."""
     from graphsynth.dynamics import Torque, simulate_dynamics

@@ -146,6 +146,7 @@ def test_tie_between_stick_and_slip_is_flagged():
     assert "rounding" in motion.statement
 
 
+@pytest.mark.slow
 def test_storm_of_a_very_stiff_undamped_spring():
     motion = CRANK.stiffened(1e6, scaled_damping=False).event_driven(2.0, estimate=False)
     assert motion.status is RunStatus.STORM
