@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-
 from hypothesis import settings
 
 collect_ignore = ["mutation"]  # a program, not tests
@@ -14,8 +11,3 @@ collect_ignore = ["mutation"]  # a program, not tests
 settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.register_profile("fresh", deadline=None, print_blob=True)
 settings.load_profile("fixed")
-
-# Programs that tests start find the byte code of the first one, even where none may be written beside the sources.
-_bytecode = tempfile.TemporaryDirectory(prefix="bytecode-")
-os.environ["PYTHONPYCACHEPREFIX"] = _bytecode.name
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
