@@ -86,7 +86,16 @@ def differ(one, other):
 #: Pages whose examples search or sweep for seconds, or repeat what tests/test_newcomer.py, atlas and testing run.
 SLOW_PAGES = (
     *("embody", "point-an-antenna", "jamming-of-any-mechanism", "the-deck-reproduced", "bearing-jamming"),
-    *("certificates", "jamming-in-space", "stick-slip", "gallery", "choose-a-method", "intervals"),
+    *(
+        "certificates",
+        "jamming-in-space",
+        "closure-in-space",
+        "probability-of-a-mechanism",
+        "stick-slip",
+        "gallery",
+        "choose-a-method",
+        "intervals",
+    ),
     *("README", "build-a-catalogue", "browse-the-atlas", "draw-and-animate", "property-tests"),
     *("windscreen-wiper", "excavator-bucket"),
 )

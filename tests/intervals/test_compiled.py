@@ -10,6 +10,7 @@ from graphsynth.core.errors import IntervalError
 from graphsynth.intervals import Interval, Status, compiled_system, image, pave, pave_cells, pave_compiled
 from graphsynth.intervals.kernels import arithmetic as ia
 
+pytestmark = pytest.mark.slow  # numba compiles each system for seconds
 ROOT = np.array([0.6180339887498949, 0.7861513777574233])
 MIRROR = ROOT * [1.0, -1.0]
 
@@ -80,7 +81,6 @@ def found_roots(paving, roots):
     assert len(paving.status) == len(roots)
 
 
-@pytest.mark.slow
 def test_all_solutions_are_found_and_proved():
     found = pave_compiled(circle_and_parabola(), ["[-2, 2]", "[-2.1, 2]"], [1])
     assert found.finished

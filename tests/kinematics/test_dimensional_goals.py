@@ -153,6 +153,7 @@ def in_order(z: np.ndarray, goal: np.ndarray) -> float:
     return min(found)
 
 
+@pytest.mark.slow
 def test_path_without_times_is_passed_in_order(known: dict[str, np.ndarray]) -> None:
     target = PathGoal(tuple((p.real, p.imag) for p in known["z"][:6]), tolerance=1e-3)
     found = embody(CYCLE, Goals(min_transmission_angle=LEAST, target=target), driver=1, tries=2)

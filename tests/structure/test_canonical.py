@@ -315,6 +315,7 @@ def test_keys_tell_frame_mobility_and_space_apart():
         assert MechanismGraph.from_key(graph.key) == graph.canonical()
 
 
+@pytest.mark.slow
 def test_more_links_than_the_kernel_takes():
     for graph, order in (
         (nx.cycle_graph(255), 510),

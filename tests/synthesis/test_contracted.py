@@ -117,6 +117,7 @@ def test_same_as_geng_and_multig(loops):
         assert trivial == dict(numbers("trivial_group"))[loops]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("loops", "count"), numbers("trivial_group"))
 def test_trivial_groups(loops, count):
     assert sum(_is_asymmetric(mult) for _, mults in layers(loops) for mult in mults) == count

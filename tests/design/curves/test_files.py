@@ -58,6 +58,7 @@ def test_two_workers_write_the_same_bytes(index: CurveIndex, tmp_path: Path) -> 
     assert bytes_of(tmp_path) == bytes_of(index.folder)
 
 
+@pytest.mark.slow
 def test_no_curve_is_drawn_twice(index: CurveIndex) -> None:
     (shard,) = index.shards
     assert len(np.unique(shard.columns["mechanism"]["point"], axis=0)) == 3000

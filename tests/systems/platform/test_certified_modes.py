@@ -363,6 +363,7 @@ def circle_roots(A: list[Any], b: list[Any], lengths: list[Any]) -> list[tuple[m
     return sorted((mp.arg(z), k) for z, k in found)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=12, deadline=None)
 def test_random_platforms_agree_with_two_hundred_digits(seed: int) -> None:
