@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -84,37 +84,32 @@ def _cell(row: Mapping[str, str] | None) -> str:
 
 
 def letters(rows: Mapping[Key, Mapping[str, str]]) -> str:
-    """Markdown of the letters: Chamfer distance in parts of the size."""
-    head = "| letter | graphsynth | proved | links | larger groups | dyads only | ratio | scipy DE | pylinkage |\n"
-    lines = [head + "|---|---|---|---|---|---|---|---|---|"]
-    for trial in EVERY[len(CLASSICAL) :]:
-        own = rows.get((trial.name, "ours"))
-        if own is None:
-            continue
-        cells = [_cell(rows.get((trial.name, by))) for by in NAMES]
-        other = rows.get((trial.name, "dyads"))
-        ratio = "—" if other is None else _number(float(own["error"]) / float(other["error"]))
-        groups = "no" if own["dyadic"] == "yes" else "yes"
-        parts = (trial.title[-1], cells[0], own["certified"] or "—", own["links"], groups, cells[1], ratio, *cells[2:])
-        lines.append(f"| {' | '.join(parts)} |")
-    lines.append(summary(rows))
-    return "\n".join(lines)
-
-
-def summary(rows: Mapping[Key, Mapping[str, str]]) -> str:
-    """Return the medians over the letters as a row."""
+    """Markdown of the letters: Chamfer distances in parts of the size; who was not run has no column."""
     own = [trial.name for trial in EVERY[len(CLASSICAL) :] if (trial.name, "ours") in rows]
-
-    def median(by: str) -> float:
-        found = [float(rows[name, by]["error"]) for name in own if (name, by) in rows]
-        return float(np.median(found)) if found else math.nan
-
-    pairs = [(name, "dyads") for name in own if (name, "dyads") in rows]
-    ratios = [float(rows[name, "ours"]["error"]) / float(rows[name, by]["error"]) for name, by in pairs]
-    ratio = float(np.median(ratios)) if ratios else math.nan
+    peers = [by for by in ("evolution", "swarm") if any((name, by) in rows for name in own)]
+    names = ["letter", NAMES["ours"], "proved", "links", "larger groups", NAMES["dyads"], "ratio"]
+    names += [NAMES[by] for by in peers]
+    lines = [f"| {' | '.join(names)} |\n|{'---|' * len(names)}"]
+    for name in own:
+        row, other = rows[name, "ours"], rows.get((name, "dyads"))
+        groups = "no" if row["dyadic"] == "yes" else "yes"
+        cells = [name[-1], _cell(row), row["certified"] or "—", row["links"], groups, _cell(other), _ratio(row, other)]
+        lines.append(f"| {' | '.join([*cells, *(_cell(rows.get((name, by))) for by in peers)])} |")
     proved = sum(rows[name, "ours"]["certified"] == "yes" for name in own)
-    cells = (_number(median("ours")), f"{proved} of {len(own)}", "", "", _number(median("dyads")), _number(ratio))
-    return f"| median | {' | '.join((*cells, _number(median('evolution')), _number(median('swarm'))))} |"
+    every = [_median(rows, own, by) for by in ("ours", "dyads", *peers)]
+    cells = ["median", every[0], f"{proved} of {len(own)}", "", "", every[1], "", *every[2:]]
+    return "\n".join([*lines, f"| {' | '.join(cells)} |"])
+
+
+def _ratio(row: Mapping[str, str], other: Mapping[str, str] | None) -> str:
+    if other is None or not math.isfinite(float(other["error"])):
+        return "—"
+    return _number(float(row["error"]) / float(other["error"]))
+
+
+def _median(rows: Mapping[Key, Mapping[str, str]], names: Sequence[str], by: str) -> str:
+    found = [float(rows[name, by]["error"]) for name in names if (name, by) in rows]
+    return _number(float(np.median(found)) if found else math.nan)
 
 
 def draw_errors(rows: Mapping[Key, Mapping[str, str]], path: Path) -> None:
@@ -142,8 +137,8 @@ def draw_errors(rows: Mapping[Key, Mapping[str, str]], path: Path) -> None:
     axes.invert_yaxis()
     axes.tick_params(colors=LIGHT["ink"])
     axes.grid(True, axis="both", color=LIGHT["soft"], alpha=0.3, lw=0.6)
-    axes.set_xlabel(f"error in the unit of each task; {_LEAST:g} stands for all that is less", color=LIGHT["ink"])
-    legend = axes.legend(loc="lower left", bbox_to_anchor=(-0.45, 1.0), ncols=5, frameon=False)
+    axes.set_xlabel(f"error in the unit of each task, at least {_LEAST:g}", color=LIGHT["ink"])
+    legend = figure.legend(loc="outside upper center", ncols=5, frameon=False, columnspacing=1.0, handletextpad=0.2)
     for text in legend.get_texts():
         text.set_color(LIGHT["ink"])
     path.write_text(themed_svg(figure) + "\n", "utf-8")

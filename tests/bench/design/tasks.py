@@ -92,14 +92,14 @@ _ELLIPSE = [
 _SEMICIRCLE = [(0, 0), (1.9098, 5.8779), (6.9098, 9.5106), (13.09, 9.5106), (18.09, 5.8779), (20, 0)]
 #: Of a body on the coupler of a four-bar (ground 3, crank 1, coupler 2.6, follower 2), rounded; angles in degrees.
 _POSES = [(0.89, 2.12, 39.6), (0.97, 2.47, 29.8), (0.73, 2.68, 22.7), (0.31, 2.65, 19.4), (-0.19, 2.33, 19.4)]
-_MANDAL = "Acharyya & Mandal, Mech. Mach. Theory 44 (2009)"
+_MANDAL = "[Acharyya & Mandal 2009]"
 
 PATHS = [
-    _path("vertical", "six points on a vertical line", "Cabrera et al., Mech. Mach. Theory 37 (2002)",
+    _path("vertical", "six points on a vertical line", "[Cabrera et al. 2002]",
           [(20, y) for y in range(20, 50, 5)]),
-    _path("five_timed", "five timed points", "Kunjur & Krishnamurty (1997)", _FIVE, [0, 15, 30, 45, 60],
+    _path("five_timed", "five timed points", "[Kunjur & Krishnamurty 1997]", _FIVE, [0, 15, 30, 45, 60],
           bounds=50.0, pivots=[(0, 0)], pivot_region=(-1e-3, -1e-3, 50.0, 1e-3)),
-    _path("eighteen_timed", "18 timed points", "Kunjur & Krishnamurty (1997)", _EIGHTEEN, 20.0 * np.arange(18),
+    _path("eighteen_timed", "18 timed points", "[Kunjur & Krishnamurty 1997]", _EIGHTEEN, 20.0 * np.arange(18),
           bounds=50.0),
     _path("ellipse", "ten points on an ellipse", _MANDAL, _ELLIPSE, bounds=80.0),
     _path("semicircle", "six timed points of a semicircle", _MANDAL, _SEMICIRCLE, [0, 30, 60, 90, 120, 150],
@@ -121,7 +121,7 @@ def _function(name: str, title: str, source: str, of: Any, between: Any, spans: 
 
 
 FUNCTIONS = [
-    _function("log", "log x, 1 to 2, over 60° and 90°", "Freudenstein, Trans. ASME 77 (1955)", np.log10, (1, 2),
+    _function("log", "log x, 1 to 2, over 60° and 90°", "[Freudenstein 1955]", np.log10, (1, 2),
               ("60 deg", "90 deg")),
     _function("square", "x², 0 to 1, over 90° and 90°", "own ranges", np.square, (0, 1), ("90 deg", "90 deg")),
     _function("sine", "sin x, 0 to 90°, over 90° and 90°", "own ranges", np.sin, (0, 0.5 * np.pi),
