@@ -167,3 +167,14 @@ def _runs(pid):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
+
+
+@pytest.mark.slow
+def test_a_script_without_a_guard_is_told_to_have_one(tmp_path):
+    script = tmp_path / "mine.py"
+    lines = ["from graphsynth.core.ordered import in_order, processes", "with processes(2) as crew:"]
+    script.write_text("\n".join([*lines, "    list(in_order(crew, abs, range(40)))"]), "utf-8")
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "came to the line that starts workers" in done.stderr  # the worker
+    assert done.stderr.splitlines()[-1].endswith("has to stand below 'if __name__ == \"__main__\":'")  # this process

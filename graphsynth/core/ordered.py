@@ -21,7 +21,12 @@ AHEAD = 16  # pieces under way or waiting to be read: bounds memory whatever the
 RETRIES = 3  # how often lost work is done anew before the loss is told
 _LOST = (
     "worker processes were killed while they worked, again and again (is the memory full?): use fewer workers or free "
-    "some memory, then give the same command; what is stored stays"
+    "some memory, then give the same command; what is stored stays. In a script of your own, work on several processes "
+    "has to stand below 'if __name__ == \"__main__\":'"
+)
+_GUARD = (
+    "a worker process reads your script first, and came to the line that starts workers: put what the script does "
+    "below 'if __name__ == \"__main__\":'"
 )
 
 
@@ -180,8 +185,10 @@ def processes(workers: int, prepare: Callable[[], None] | None = None) -> Iterat
         yield None
         return
     from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import active_children, get_context
+    from multiprocessing import active_children, current_process, get_context
 
+    if getattr(current_process(), "_inheriting", False):  # as multiprocessing asks itself
+        raise GraphsynthError(_GUARD)
     if prepare:
         prepare()
 

@@ -134,12 +134,14 @@ def _sheet(parts: Parts) -> list[tuple[int, Rounded, list[Rounded]]]:
     ]
 
 
-def cut_svg(parts: Parts) -> str:
+def cut_svg(parts: Parts, *, line: float = 0.1) -> str:
     """Write all sheets beside each other as SVG at full size: outlines and holes as hairlines, numbers engraved.
 
     Parameters
     ----------
     parts : Parts
+    line : float
+        Width of the lines, millimetres; hairlines are right for most lasers, wider ones for the eye.
 
     Returns
     -------
@@ -153,7 +155,8 @@ def cut_svg(parts: Parts) -> str:
         path = " ".join(_path(shape, corner.imag) for shape in (outline, *holes))
         at = _label_place(outline, holes)
         lines.append(
-            f'<g id="link-{parts.plan.label(link)}"><path d="{path}" fill="none" stroke="#ff0000" stroke-width="0.1"/>'
+            f'<g id="link-{parts.plan.label(link)}">'
+            f'<path d="{path}" fill="none" stroke="#ff0000" stroke-width="{line:g}"/>'
             f'<text x="{at.real:.3f}" y="{corner.imag - at.imag + _HALF * size:.3f}" '
             f'font-size="{size:.3g}" text-anchor="middle" fill="#0000ff">{parts.plan.label(link)}</text></g>'
         )

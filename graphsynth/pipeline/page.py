@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from graphsynth.drawing.pages import template, whole_page
@@ -84,13 +85,14 @@ _PAGE = """
 <div class="pictures{{ kind }}">
 {%- for picture in pictures -%}
 <figure class="{{ picture.size }}">{{ picture.svg | drawing }}<figcaption><b>{{ picture.title }}</b>
-{%- if picture.caption %}. {{ picture.caption }}{% endif %}</figcaption></figure>
+{%- if picture.caption %}. {{ picture.caption | unbroken }}{% endif %}</figcaption></figure>
 {%- endfor -%}
 </div>
 {%- endmacro -%}
 
 {%- macro finding(item) -%}
-<p class="verdict {{ item.good | tone }}">{% if item.good is none %}{{ item.text }}{% else %}<b>{{ item.text }}</b>
+<p class="verdict {{ item.good | tone }}">{% if item.good is none -%}
+{{ item.text | unbroken }}{% else %}<b>{{ item.text | unbroken }}</b>
 {%- endif %}</p>
 {%- endmacro -%}
 
@@ -98,7 +100,8 @@ _PAGE = """
 {% for text in notes %}<p class="verdict"><b>{{ text }}</b></p>{% endfor %}
 {% for item in first %}{{ finding(item) }}{% endfor -%}
 <ul class="facts">
-{%- for fact in facts %}<li><b class="{{ fact.good | tone }}">{{ fact.value }}</b><span>{{ fact.text }}</span></li>
+{%- for fact in facts %}<li><b class="{{ fact.good | tone }}">{{ fact.value | unbroken }}</b>
+{#- -#}<span>{{ fact.text }}</span></li>
 {%- endfor -%}
 </ul>
 {%- for item in then %}{{ finding(item) }}{% endfor %}
@@ -123,6 +126,19 @@ results.csv</summary>{{ grid(("no.", "assortment", "status", "verdict or reason"
 <code>scene.json</code>.</p>"""
 
 
+#: Blanks before and within a unit of a number.
+_IN_QUANTITY = re.compile(r"(?<=\d) (?=(?:[kmµ]?N|mm|m|rad|kg|s|J|W)\b)|(?:(?<=\d N)|(?<=\d [kmµ]N)) (?=m{1,2}\b)")
+
+
+def unbroken(text: str) -> str:
+    r"""Keep a number and its unit on one line: blanks between them do not break.
+
+    >>> unbroken("binds with at most 2.348 N m, at 12 mm").split(" ")
+    ['binds', 'with', 'at', 'most', '2.348\xa0N\xa0m,', 'at', '12\xa0mm']
+    """
+    return _IN_QUANTITY.sub("\N{NO-BREAK SPACE}", text)
+
+
 def report_html(report: Report) -> str:
     """Return the page of a run, all in one string: styles, tables, pictures as inline SVG; values are escaped."""
     scene, products = report.scene, report.products
@@ -133,7 +149,7 @@ def report_html(report: Report) -> str:
     order = [*_HEADINGS, *sorted(set(names) - {*_HEADINGS, "graph_pictures"})]
     records = products.get("records", ())
     candidates = [(str(r.number), r.solution, r.status, r.verdict or r.reason, r.key) for r in records]
-    body = template(_PAGE, tone={None: "", True: "good", False: "bad"}.get).render(
+    body = template(_PAGE, tone={None: "", True: "good", False: "bad"}.get, unbroken=unbroken).render(
         scene=scene,
         notes=report.notes,
         first=found[:first],
