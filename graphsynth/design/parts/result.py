@@ -118,6 +118,23 @@ class Parts(Shown):
         """Count the washers on a pin: one between neighbouring layers, two at a spacer."""
         return len(self._stops(pin)) - 1 + len(self.spacers(pin))
 
+    def heads(self, pin: int) -> tuple[bool, bool]:
+        """Whether a head or nut, as wide as a washer and at most one layer high, has room below and above a pin.
+
+        Estimated at the samples of the motion; the board leaves no room below what lies on it.
+        """
+        low, high = self.span(pin)
+        name = self.plan.pins[pin].title
+        met = [{found.one, found.other} - {name} for found in self.collisions if name in (found.one, found.other)]
+
+        def room(layer: int) -> bool:
+            sheets = {f"link {self.plan.label(sheet)}" for sheet, own in enumerate(self.layers) if own == layer}
+            spans = ((other.title, self.span(k)) for k, other in enumerate(self.plan.pins))
+            there = sheets | {title for title, (first, last) in spans if first <= layer <= last}
+            return all(not names & there for names in met)
+
+        return low == 0 or (low > 1 and room(low - 1)), high == self.count or room(high + 1)
+
     def _stops(self, pin: int) -> list[int]:
         """Layers of the sheets on a pin, and of those in whose slot it moves."""
         own, (low, high) = self.plan.pins[pin], self.span(pin)

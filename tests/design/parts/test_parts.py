@@ -323,6 +323,30 @@ def test_the_bill_adds_up(lambda_parts):
     assert len(repr(lambda_parts).splitlines()) <= 10
 
 
+def test_heads_have_room_where_nothing_sweeps_over_the_end_of_a_pin(lambda_parts):
+    """By the definition, at samples of its own: a disc on the end of the pin against what lies in the next layer."""
+    heads = {pin.title: lambda_parts.heads(k) for k, pin in enumerate(lambda_parts.plan.pins)}
+    above = {"pin 1-2": (False, True), "pin 2-3": (False, True)}
+    assert heads == {"shaft 0-1": (True, False), "pin 0-3": (True, True), **above}
+    for made in (lambda_parts, gs.parts(gs.simulate(crankshaft()), unit=100.0)):
+        poses = made.motion.poses * [made.unit, made.unit, 1.0]
+        for k, pin in enumerate(made.plan.pins):
+            disc = Solid(pin.link, Rounded((pin.at,), made.sizes.spacer))
+            _, high = made.span(k)
+            above = [
+                Solid(made.plan.links[sheet], made.plan.outlines[sheet])
+                for sheet, layer in enumerate(made.layers)
+                if layer == high + 1
+            ]
+            above += [
+                Solid(other.link, Rounded((other.at,), made.sizes.spacer))
+                for j, other in enumerate(made.plan.pins)
+                if made.span(j)[0] <= high + 1 <= made.span(j)[1]
+            ]
+            free = all(gaps(disc, body, poses).min() >= made.sizes.clearance for body in above)
+            assert made.heads(k)[1] == free
+
+
 def test_spacers_fill_the_way_between_links_that_are_not_neighbours():
     made = gs.parts(gs.simulate(gs.gallery.klann()), unit=200.0)
     s = made.sizes
