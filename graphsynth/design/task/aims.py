@@ -44,7 +44,7 @@ class Aim(ABC):
     def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
         """Return errors at frames (sets, n, links, 4) and rates (sets, n, links, 3)."""
 
-    def begin(self, times: Array, moved: Moved, random: np.random.Generator) -> Array:
+    def begin(self, times: Array, moved: Moved, u: Unknowns, random: np.random.Generator) -> Array:
         """Return first values (sets, unknowns) of its own unknowns."""
         return np.zeros((len(moved.frames), self.unknowns))
 
@@ -119,7 +119,7 @@ class PointAim(TimedAim):
         rates[..., 1] += arm.real * own.rates[..., 2]
         return MovingLink(own.u, frames, rates, own.period)
 
-    def begin(self, times: Array, moved: Moved, random: np.random.Generator) -> Array:
+    def begin(self, times: Array, moved: Moved, u: Unknowns, random: np.random.Generator) -> Array:
         """Measure angles from the line that suits best; begin anywhere."""
         found = random.uniform(0.0, self.model.task.span, (len(times), self.unknowns))
         if self.turn is not None:
@@ -232,22 +232,23 @@ class FunctionAim(TimedAim):
         self.outputs, self.measure = outputs, Measure(model, target.link)
         self.unknowns += 1
 
-    def begin(self, times: Array, moved: Moved, random: np.random.Generator) -> Array:
+    def begin(self, times: Array, moved: Moved, u: Unknowns, random: np.random.Generator) -> Array:
         """Begin where the output is nearest to what is wanted."""
         if not self.own_start:
             return np.zeros((len(moved.frames), 1))
-        shifts = np.linspace(0.0, self.model.task.span, 48, endpoint=False)
-        own, base = moved.link(self.measure.link), np.array(self.inputs)
-        theta = np.unwrap(np.arctan2(own.frames[..., 3], own.frames[..., 2]), axis=1)
-        error = [
-            np.ptp(
-                np.stack([np.interp(np.mod(base + s, self.model.task.span), own.u, row) for row in theta])
-                - self.outputs,
-                axis=1,
-            )
-            for s in shifts
-        ]
-        return np.stack([np.zeros(len(theta)), shifts[np.argmin(error, axis=0)]], axis=1)
+        best = self.missed(moved, u).argmin(axis=1)
+        return np.stack([np.zeros(len(best)), moved.inputs[best]], axis=1)
+
+    def missed(self, moved: Moved, u: Unknowns) -> Array:
+        """Return standard deviations (sets, samples) from the outputs if the inputs count from a sample."""
+        values = self.measure.values(moved.frames, u)
+        values = values if self.measure.guide >= 0 else np.unwrap(values, axis=1)
+        starts = moved.inputs[:-1] if moved.period or self.own_start else moved.inputs[:1]
+        at = np.array(self.inputs) + starts[:, None]
+        turns = np.floor(at / moved.period) if moved.period else 0.0 * at
+        rest, whole = at - turns * moved.period, values[:, -1] - values[:, 0]
+        found = np.stack([np.interp(rest, moved.inputs, row) for row in values]) + turns * whole[:, None, None]
+        return np.asarray((found - self.outputs).std(axis=2))
 
     def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
         """Differences from the outputs."""
@@ -328,7 +329,7 @@ class RatioAim(Aim):
         """Just before and after both dead centres (sets, 4)."""
         return np.asarray(self.own(u, 0) + np.array([-_NEAR, _NEAR, self.slow - _NEAR, self.slow + _NEAR]))
 
-    def begin(self, times: Array, moved: Moved, random: np.random.Generator) -> Array:
+    def begin(self, times: Array, moved: Moved, u: Unknowns, random: np.random.Generator) -> Array:
         """Begin at a dead centre, the largest or the smallest value."""
         own = moved.link(self.measure.link)
         theta = np.unwrap(np.arctan2(own.frames[..., 3], own.frames[..., 2]), axis=1)

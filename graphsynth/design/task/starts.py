@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.design.curves.index import CurveIndex
-from graphsynth.design.task.aims import FunctionAim, PointAim
+from graphsynth.design.task.aims import FunctionAim, PointAim, TimedAim
 from graphsynth.design.task.classical import solutions
 from graphsynth.design.task.model import Model, Moved, Unknowns
 from graphsynth.design.task.plans import Plan, fitting
@@ -123,12 +123,22 @@ def placed_starts(
     goals = np.array([complex(*p) for _, p in model.plan.given])
     if not len(whole):
         return np.zeros((0, model.size)), []
+    late = np.zeros(len(whole), dtype=np.intp)
     if first is None:
         s, t = _similar(held, goals, model.task.size, len(whole), random)
         error, times, q = np.zeros(len(whole)), None, u.points[:, :1, 0] * 0j
+        function = next((aim for aim in problem.aims if isinstance(aim, FunctionAim)), None)
+        if function is not None:
+            every = function.missed(moved, u)
+            late, error = (every.argmin(axis=1) if _begins_late(model, function) else late), every.min(axis=1)
     else:
         error, times, c = _screened(model, first, moved, u, held, goals, random)
         s, q, t = c[:, :1], c[:, 1:2], c[:, 2:]
+        if _begins_late(model, first):
+            late = np.abs(moved.inputs - (times[:, :1] - first.inputs[0])).argmin(axis=1)
+            z0, w0 = moved.frames[np.arange(len(late)), late, first.link].view(np.complex128).T[..., None]
+            q = s * z0 + q * w0
+    u = _posed(model, u, moved, late)
     order = np.argsort(error, kind="stable")[:keep]
     order = order[np.isfinite(error[order])]
     u, s, t, q = _some(u, order), s[order], t[order], q[order]
@@ -145,7 +155,29 @@ def placed_starts(
     u = Unknowns(
         _pairs(place), numbers, _pairs(p), u.own, u.stroke * np.abs(s[:, 0]) if model.task.linear else u.stroke
     )
-    return _begun(problem, u, {} if first is None or times is None else {id(first): times[order]}, random)
+    known = {} if times is None else {id(first): times[order] - moved.inputs[late[order], None]}
+    return _begun(problem, u, known, random)
+
+
+def _begins_late(model: Model, aim: TimedAim) -> bool:
+    """Whether a candidate may begin anywhere on its turn: then it is moved to where its inputs suit the target."""
+    return aim.inputs is not None and not aim.own_start and model.task.drive == "rotation"
+
+
+def _posed(model: Model, u: Unknowns, moved: Moved, at: NDArray[np.intp]) -> Unknowns:
+    """Return candidates that begin at samples (sets,) of their motions."""
+    frames = moved.frames[np.arange(len(at)), at].view(np.complex128)  # place and direction (sets, links, 2)
+    design = model.plan.design
+    joints = [joint.a for joint in design.graph.joints]
+    points = [model.carrier(name) for name, of_point in model.task.names.items() if of_point]
+    guides = [joints[k] for k, _ in design.numbers]
+
+    def carried(place: Array, links: list[int]) -> Array:
+        own = frames[:, links]
+        return _pairs(own[..., 0] + own[..., 1] * (place @ [1.0, 1.0j]))
+
+    numbers = u.numbers + np.angle(frames[:, guides, 1])
+    return u._replace(places=carried(u.places, joints), numbers=numbers, points=carried(u.points, points))
 
 
 def _begun(
@@ -159,7 +191,7 @@ def _begun(
     for aim in problem.aims:
         if aim.unknowns:
             start = aim.times(moved, u, None) if id(aim) not in known else known[id(aim)]
-            own[:, at : at + aim.unknowns] = aim.begin(start, moved, random)
+            own[:, at : at + aim.unknowns] = aim.begin(start, moved, u, random)
             u = u._replace(own=own)
             if id(aim) in known and isinstance(aim, PointAim) and aim.start >= 0:
                 assert aim.inputs is not None
@@ -264,7 +296,8 @@ def _guesses(model: Model, aim: PointAim, own: MovingLink, guess: Complex, wante
     """Return times (sets, guesses, n) at which the points may be passed: as given, or spread by the arc of a curve."""
     sets, span = len(own.frames), model.task.span
     if aim.inputs is not None:
-        shifts = np.arange(_PHASES) * (span / _PHASES) if aim.own_start else np.zeros(1)
+        late = aim.own_start or _begins_late(model, aim)
+        shifts = own.u[:: max(1, len(own.u) // _PHASES)] if late else np.zeros(1)
         return np.tile((np.array(aim.inputs) + shifts[:, None])[None], (sets, 1, 1))
     w = own.frames[..., 2] + 1j * own.frames[..., 3]
     z = own.frames[..., 0] + 1j * own.frames[..., 1] + w * guess
