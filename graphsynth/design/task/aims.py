@@ -90,16 +90,22 @@ class TimedAim(Aim):
 class PointAim(TimedAim):
     """A point passes points, or a link poses; for poses one more unknown, the line from which angles are measured."""
 
-    def __init__(self, model: Model, at: int, target: PathTarget | PosesTarget) -> None:
+    def __init__(self, model: Model, at: int, target: PathTarget | PosesTarget, few: int) -> None:
         super().__init__(model, at, target.weight / target.tolerance, target.inputs, target.own_start)
-        self.goal, self.size = target.goal, target.size
+        self.goal, self.size, n = target.goal, target.size, len(target.goal)
         self.turn = target.turn if isinstance(target, PosesTarget) else None
+        closed = isinstance(target, PathTarget) and target.closed
+        coarse = 0 < few < n and self.inputs is None
+        if coarse:
+            kept = np.linspace(0, n if closed else n - 1, few, endpoint=not closed).round().astype(int)
+            self.goal, self.turn = self.goal[kept], None if self.turn is None else self.turn[kept]
         self.unknowns += self.turn is not None
         self.link, self.point = model.carrier(target.point), model.point_at(target.point)
-        closed = isinstance(target, PathTarget) and target.closed
         self.wanted = Wanted(self.goal, self.turn, self.size, closed, free=False)
         self.whole = (
-            np.linspace(0.0, model.task.span, _WHOLE, endpoint=False) if closed and self.inputs is None else np.zeros(0)
+            np.linspace(0.0, model.task.span, _WHOLE, endpoint=False)
+            if closed and self.inputs is None and not coarse
+            else np.zeros(0)
         )
         self.weight /= math.sqrt(len(self.goal) + len(self.whole))
 
@@ -349,14 +355,17 @@ class RatioAim(Aim):
         return Rows(times, (values @ mix.T)[:, None], loads, direct, self.weight, mix=mix, start=self.at)
 
 
-def aims_of(model: Model) -> list[Aim]:
-    """Return the aims of all targets, with their own unknowns one after the other."""
+def aims_of(model: Model, few: int) -> list[Aim]:
+    """Return the aims of all targets, with their own unknowns one after the other.
+
+    ``few``: points at most of a path or motion without times, for a first look; 0 for all.
+    """
     found: list[Aim] = []
     at = model.own_at
     for target in model.task.targets:
         made: list[Aim] = []
         if isinstance(target, PathTarget | PosesTarget):
-            made.append(PointAim(model, at, target))
+            made.append(PointAim(model, at, target, few))
         elif isinstance(target, FunctionTarget | DwellTarget):
             made.append(FunctionAim(model, at, target))
         elif isinstance(target, SwingTarget):

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 #: Points of a path that determine four-bars, by the number of given pivots; positions that determine others.
 _THROUGH, _POSITIONS = {0: 9, 1: 7, 2: 5}, 5
+#: Four-bars of the infinitely many through one position fewer.
+_OF_MANY = 16
 #: Time limit of a search from which on it begins with all four-bars through points, which take some 20 s.
 _PATIENT = 60.0
 
@@ -48,6 +50,11 @@ def _found(task: DesignTask, target: object, seconds: float) -> Sequence[Mechani
     """Return the solutions of the target, if it is one of the problems."""
     if isinstance(target, PosesTarget) and target.inputs is None and len(target.poses) == _POSITIONS:
         return [linkage.mechanism for linkage in four_bars_for_poses(target.poses)]
+    if isinstance(target, PosesTarget) and target.inputs is None and len(target.poses) == _POSITIONS - 1:
+        box = task.pivot_region or task.box
+        pivots = None if box is None else (box[::2], box[1::2])
+        every = four_bars_for_poses(target.poses, pivots=pivots, count=_OF_MANY)
+        return [linkage.mechanism for linkage in every if not linkage.defects]
     if isinstance(target, FunctionTarget) and target.inputs is not None and len(target.outputs) == _POSITIONS:
         inputs = [u - target.inputs[0] for u in target.inputs]
         outputs = [v - target.outputs[0] for v in target.outputs]

@@ -84,6 +84,18 @@ class Rows(NamedTuple):
     mix: Array | None = None
     start: int = -1
 
+    def stressed(self, by: Array) -> Rows:
+        """Return the same numbers times factors (sets, n) of the samples."""
+        by = by[:, None]
+        return self._replace(
+            values=self.values * by, loads=self.loads * by[:, :, None, None], direct=self.direct * by[..., None]
+        )
+
+    @property
+    def sizes(self) -> Array:
+        """Sizes (sets, n) of the numbers of every sample, times the weight."""
+        return np.asarray(self.weight * np.sqrt((self.values**2).sum(axis=1)))
+
 
 class Model:
     """Candidates of a plan for one sense of the drive and one choice of assembly modes.

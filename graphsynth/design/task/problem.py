@@ -27,16 +27,18 @@ class Linearised(NamedTuple):
 
 
 class TaskProblem:
-    """What the candidates of a model shall achieve."""
+    """What the candidates of a model shall achieve; ``few``: at so many points of a path, for a first look."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, few: int = 0) -> None:
         self.model = model
-        self.aims = aims_of(model)
+        self.aims = aims_of(model, few)
 
-    def linearise(self, X: Array, times: list[Array] | None, strict: float) -> tuple[Linearised, list[Array]]:
+    def linearise(
+        self, X: Array, times: list[Array] | None, strict: float, stress: list[Array] | None = None
+    ) -> tuple[Linearised, list[Array]]:
         """Return errors and derivatives of candidates (sets, size), and the times found, from those given if any.
 
-        ``strict``: weight of the bounds.
+        ``strict``: weight of the bounds; ``stress``: factors (sets, n) of the samples of every target.
         """
         model = self.model
         u = model.read(X)
@@ -47,6 +49,11 @@ class TaskProblem:
         for aim, own in zip(self.aims, times):
             frames, rates = moved.at(own)
             every.append((aim.rows(own, frames, rates, u), frames, rates))
+        if stress is not None:
+            every = [
+                (rows if rows.mix is not None else rows.stressed(own), frames, rates)
+                for own, (rows, frames, rates) in zip(stress, every)
+            ]
         every += [(rows, *moved.at(rows.times)) for rows in sampled_wishes(model, moved, u, strict)]
         values, slopes = self._pulled(every, u)
         more, steep = direct_wishes(model, u, strict)
@@ -55,6 +62,12 @@ class TaskProblem:
         bad = ~moved.complete | ~np.isfinite(slopes).all(axis=(1, 2)) | ~np.isfinite(error)
         values[bad], slopes[bad] = 0.0, 0.0
         return Linearised(np.where(bad, np.inf, error), values, slopes), times
+
+    def sizes(self, X: Array, times: list[Array]) -> list[Array]:
+        """Return errors (sets, n) of the samples of every target at its times."""
+        u = self.model.read(X)
+        moved = self.model.move(u)
+        return [aim.rows(own, *moved.at(own), u).sizes for aim, own in zip(self.aims, times)]
 
     def _pulled(self, every: list[tuple[Rows, Array, Array]], u: Unknowns) -> tuple[Array, Array]:
         """Take loads on the poses back to the unknowns, all targets in one pass."""

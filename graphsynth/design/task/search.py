@@ -23,9 +23,9 @@ from graphsynth.core.errors import GeometryError, GraphsynthError
 from graphsynth.core.ordered import in_order
 from graphsynth.core.shown import Shown
 from graphsynth.design.task.answers import Candidate, DesignedMechanism, Origin, built, judged, proved, signature
-from graphsynth.design.task.descend import Descended, best, descend
+from graphsynth.design.task.descend import Descended, best, descend, evened
 from graphsynth.design.task.impossible import proof
-from graphsynth.design.task.model import Model
+from graphsynth.design.task.model import Model, Unknowns
 from graphsynth.design.task.plans import plans
 from graphsynth.design.task.problem import TaskProblem
 from graphsynth.design.task.starts import Starts, from_mechanism, placed_starts, planned, random_starts, shaken
@@ -34,10 +34,13 @@ from graphsynth.design.task.task import DesignTask
 Array = NDArray[np.float64]
 
 #: First candidates of a piece; kept at each stage, and iterations there: with bounds weak, then strict.
-_FIRST = 600
+_FIRST = 1200
 _STAGES = ((80, 0.2, 8), (25, 0.2, 15), (6, 3.0, 40))
+#: Points at most of a path without times before the last stage; errors, in tolerances, of answers that miss the task
+#: below which the largest error is made small in the end.
+_FEW, _EVEN = 24, 10.0
 #: Copies of a mechanism to begin with, and by how much they are shaken, over the size: powers of ten.
-_COPIES, _SHAKEN = 100, (-2.5, -0.4)
+_COPIES, _SHAKEN = 80, (-2.5, -0.4)
 #: Pieces of a wave, of which so many go on from the best; waves in each round by the number of links.
 _WAVE, _AGAIN, _WAVES = 8, 4, {4: 2, 6: 4, 8: 6, 10: 6}
 #: Waves without another answer after which a search rests that has some.
@@ -201,7 +204,7 @@ class _Run:
         )
         self.deadline = begin + seconds
         self.found: list[Candidate] = []
-        self.judged: dict[int, DesignedMechanism] = {}
+        self.judged: dict[int, tuple[Candidate, DesignedMechanism]] = {}
         self.reasons: Counter[str] = Counter()
         self.pieces, self.stopped = 0, ""
         self.before, self.idle = 0, 0  # accepted before the last wave, waves without another one
@@ -257,7 +260,7 @@ class _Run:
                     self._judge()
                 if progress is not None:
                     least = min((c.error for c in self.found), default=math.inf)
-                    good = sum(answer.accepted for answer in self.judged.values())
+                    good = sum(answer.accepted for _, answer in self.judged.values())
                     progress(Progress(self.pieces, least, good, perf_counter() - self.begin))
                 if perf_counter() > self.deadline:
                     self.stopped = "the time limit was reached"
@@ -284,13 +287,25 @@ class _Run:
         self.found.sort(key=lambda candidate: candidate.error)
         for candidate in self.found[: _JUDGED * self.count]:
             if id(candidate) not in self.judged:
-                self.judged[id(candidate)] = judged(self.task, candidate)
+                self.judged[id(candidate)] = candidate, judged(self.task, candidate)
+                if candidate.error < 1.0:  # then the largest error may be small enough, too
+                    self._even(candidate)
+
+    def _even(self, candidate: Candidate) -> None:
+        """Make the largest error of a candidate small that was judged and missed a target; keep what is better."""
+        _, answer = self.judged[id(candidate)]
+        if answer.accepted:
+            return
+        with suppress(GraphsynthError):
+            other = judged(self.task, _evened(self.task, self.seed, candidate))
+            if (len(other.reasons), other.score) < (len(answer.reasons), answer.score):
+                self.judged[id(candidate)] = candidate, other
 
     def _ranked(self) -> list[DesignedMechanism]:
         """Return what was judged, accepted ones first, without near copies."""
         kept: list[DesignedMechanism] = []
         marks: list[np.ndarray] = []
-        for answer in sorted(self.judged.values(), key=lambda a: (not a.accepted, a.score)):
+        for answer in sorted((own for _, own in self.judged.values()), key=lambda a: (not a.accepted, a.score)):
             mark = signature(self.task, answer)
             same = any(
                 other.key == answer.key and len(own) == len(mark) and np.abs(own - mark).max() < _ALIKE
@@ -305,11 +320,15 @@ class _Run:
         """Rank, certify, and say what was found."""
         if not self.judged:
             self._judge()
+        nearest = self._ranked()[: self.count]
+        if not any(answer.accepted for answer in nearest):
+            for candidate in [own for own, answer in self.judged.values() if answer in nearest and own.error < _EVEN]:
+                self._even(candidate)
         every = self._ranked()
         good = [answer for answer in every if answer.accepted]
         chosen = (good or every)[: self.count]
         chosen = [replace(a, certificate=proved(a, self.task.span)) if a.accepted else a for a in chosen]
-        for answer in self.judged.values():
+        for _, answer in self.judged.values():
             self.reasons.update(answer.reasons)
         if good:
             proofs = sum(answer.certified for answer in chosen)
@@ -336,29 +355,25 @@ class _Run:
 def worked(piece: Piece) -> tuple[list[Candidate], dict[str, int]]:
     """Do one piece: begin with many candidates, keep the best, improve them; return the best and what failed."""
     origin, random = piece.origin, np.random.default_rng([piece.seed, piece.number, 1])
-    of_model = np.random.default_rng([piece.seed, origin.number])
     try:
-        if origin.given is None:
-            model = Model(piece.task, origin.plan, of_model)
-        else:
-            given, sense = from_mechanism(piece.task, origin.plan, origin.given)
-            model = Model(piece.task, origin.plan, of_model, given, sense)
+        model, given = _modelled(piece.task, piece.seed, origin)
         if not model.regular:
             return [], {"the chain cannot be assembled": 1}
-        problem = TaskProblem(model)
+        problem, coarse = TaskProblem(model), TaskProblem(model, _FEW)
         if piece.parent is not None:
-            X, times = _children(problem, piece.parent, random)
+            X, times = _children(coarse, piece.parent, random)
         else:
-            first = random_starts(model, _FIRST, random) if origin.given is None else shaken(given, _COPIES, random)
-            X, times = placed_starts(problem, first, _STAGES[0][0], random)
+            first = random_starts(model, _FIRST, random) if given is None else shaken(given, _COPIES, random)
+            X, times = placed_starts(coarse, first, _STAGES[0][0], random)
     except GraphsynthError:
         return [], {"the chain cannot be moved": 1}
     reasons = {"no candidate completes the range": 1} if not len(X) else {}
     found = Descended(X, np.zeros(len(X)), times)
-    for keep, strict, iterations in _STAGES:
+    for stage, (keep, strict, iterations) in enumerate(_STAGES):
         found = best(found, keep)
         if len(found.X):
-            found = descend(problem, found.X, strict, iterations, found.times)
+            last = stage == len(_STAGES) - 1  # at all points
+            found = descend(problem if last else coarse, found.X, strict, iterations, None if last else found.times)
     candidates = []
     error = found.error + model.untransmitted(found.X)
     for k in np.argsort(error, kind="stable")[:_KEPT]:
@@ -366,6 +381,24 @@ def worked(piece: Piece) -> tuple[list[Candidate], dict[str, int]]:
             mechanism, starts = built(problem, found.X[k])
             candidates.append(Candidate(float(error[k]), origin, found.X[k], mechanism, starts))
     return candidates, reasons
+
+
+def _modelled(task: DesignTask, seed: int, origin: Origin) -> tuple[Model, Unknowns | None]:
+    """Return the model of candidates of an origin, and the mechanism it began with, if any, as one of them."""
+    random = np.random.default_rng([seed, origin.number])
+    if origin.given is None:
+        return Model(task, origin.plan, random), None
+    given, sense = from_mechanism(task, origin.plan, origin.given)
+    return Model(task, origin.plan, random, given, sense), given
+
+
+def _evened(task: DesignTask, seed: int, candidate: Candidate) -> Candidate:
+    """Return a candidate after its largest error, not the sum of squares, was made small."""
+    problem, x, strict = TaskProblem(_modelled(task, seed, candidate.origin)[0]), candidate.x[None], _STAGES[-1][1]
+    found, times = problem.linearise(x, None, strict)
+    own = evened(problem, Descended(x, found.error, times), strict)
+    mechanism, starts = built(problem, own)
+    return candidate._replace(x=own, mechanism=mechanism, starts=starts)
 
 
 def _children(problem: TaskProblem, parent: Array, random: np.random.Generator) -> tuple[Array, list[Array]]:

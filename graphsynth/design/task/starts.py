@@ -134,7 +134,7 @@ def placed_starts(
     else:
         error, times, c = _screened(model, first, moved, u, held, goals, random)
         s, q, t = c[:, :1], c[:, 1:2], c[:, 2:]
-        if _begins_late(model, first):
+        if first.inputs is not None and _begins_late(model, first):
             late = np.abs(moved.inputs - (times[:, :1] - first.inputs[0])).argmin(axis=1)
             z0, w0 = moved.frames[np.arange(len(late)), late, first.link].view(np.complex128).T[..., None]
             q = s * z0 + q * w0

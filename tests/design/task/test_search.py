@@ -23,10 +23,11 @@ from graphsynth.design import (
 )
 from graphsynth.design.task.answers import Candidate, Origin, judged, signature
 from graphsynth.design.task.classical import solutions
+from graphsynth.design.task.descend import descend, evened
 from graphsynth.design.task.model import Model
 from graphsynth.design.task.plans import plans
 from graphsynth.design.task.problem import TaskProblem
-from graphsynth.design.task.starts import placed_starts, random_starts
+from graphsynth.design.task.starts import _moved, _posed, _some, placed_starts, random_starts
 
 POINTS = [(0.0, 0.0), (1.0, 0.5), (2.0, 0.2), (3.0, -0.5)]
 POSES = [(x, y, 0.2 * k) for k, (x, y) in enumerate(POINTS)]
@@ -175,6 +176,53 @@ def test_errors_of_angles_are_those_of_a_fine_motion() -> None:
     assert np.allclose(signature(task, found), signature(task, other))  # no target has a length
     sized = DesignTask(targets=targets, links=[4], crank=1.0)
     assert np.abs(signature(sized, found) - signature(sized, other)).min() > 1.0
+
+
+def test_a_candidate_may_begin_anywhere_on_its_turn() -> None:
+    """Its motion from a later sample is the same motion, of every joint and point."""
+    task = DesignTask(targets=[PathTarget(points=POINTS)])
+    plan = next(plan for plan in plans(task, 6))
+    random = np.random.default_rng(2)
+    model = Model(task, plan, random)
+    u = random_starts(model, 200, random)
+    moved = model.move(u)
+    whole = np.flatnonzero(moved.complete)
+    assert len(whole) > 5
+    u, moved = _some(u, whole), _moved(moved, whole)
+    at = random.integers(0, len(moved.inputs) - 1, len(whole))
+    later = _posed(model, u, moved, at)
+    again = model.move(later)
+    assert again.complete.all()
+    frame = plan.design.graph.frame
+    for k, joint in enumerate(plan.design.graph.joints):
+        link = joint.a if joint.a != frame else joint.b
+
+        def way(places: Any, motion: Any, link: int = link, k: int = k) -> Any:
+            own = motion.frames[:, :-1, link].copy().view(np.complex128)
+            return own[..., 0] + own[..., 1] * (places[:, k] @ [1.0, 1.0j])[:, None]
+
+        before, after = way(u.places, moved), way(later.places, again)
+        for one, two, start in zip(before, after, at):
+            assert np.abs(np.roll(one, -start) - two).max() < 1e-7 * (1.0 + np.abs(one).max())
+
+
+def test_the_largest_error_is_made_small_in_the_end() -> None:
+    """A parabola by a four-bar: least squares leave uneven errors, afterwards seven or more are the largest."""
+    parabola = FunctionTarget.of(np.square, (0, 1), input_range="90 deg", output_range="60 deg", count=33)
+    task = DesignTask(targets=[parabola], links=[4], transmission=0.0, lengths=(0.02, 20), length_ratio=20)
+    random = np.random.default_rng(5)
+    model = Model(task, next(plans(task, 4)), random)
+    problem = TaskProblem(model)
+    X, times = placed_starts(problem, random_starts(model, 300, random), 20, random)
+    found = descend(problem, X, 3.0, 100, times).one(0)
+
+    def sizes(x: Any) -> Any:
+        return 0.01 * math.sqrt(33) * problem.sizes(x[None], found.times)[0][0]
+
+    before, after = sizes(found.X[0]), sizes(evened(problem, found, 3.0))
+    assert after.max() < 0.8 * before.max()
+    assert (after > 0.9 * after.max()).sum() >= 7 > (before > 0.9 * before.max()).sum()  # six numbers of a four-bar
+    assert (after**2).sum() > (before**2).sum()  # which least squares had made small
 
 
 def test_two_targets_at_once_share_one_mechanism() -> None:
