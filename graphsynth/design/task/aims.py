@@ -95,8 +95,8 @@ class PointAim(TimedAim):
         self.goal, self.size, n = target.goal, target.size, len(target.goal)
         self.turn = target.turn if isinstance(target, PosesTarget) else None
         closed = isinstance(target, PathTarget) and target.closed
-        coarse = 0 < few < n and self.inputs is None
-        if coarse:
+        coarse = few > 0 and self.inputs is None
+        if coarse and few < n:
             kept = np.linspace(0, n if closed else n - 1, few, endpoint=not closed).round().astype(int)
             self.goal, self.turn = self.goal[kept], None if self.turn is None else self.turn[kept]
         self.unknowns += self.turn is not None
