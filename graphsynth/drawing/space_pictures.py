@@ -17,7 +17,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.svg import number, painted, picture, words
 
 if TYPE_CHECKING:
-    from graphsynth.jamming.space import SpaceModel
+    from graphsynth.jamming.space import Seat, SpaceModel
 
 Array = NDArray[np.float64]
 #: Pixels round the mechanism, of a letter and of a line, from a joint to its label at most; colours of links.
@@ -96,6 +96,11 @@ def _text(joint: _Seen, name: str) -> str:
     return " · ".join(filter(None, (name, share, f"{joint.off:.2g}° off" if joint.off > 1e-6 else "")))
 
 
+def _seated(seat: Seat) -> Array:
+    """Rotation of a seat on its link."""
+    return _turned(seat.turn) @ _turned((0.0, 0.0, seat.spin))
+
+
 def _turned(vector: Sequence[float] | Array) -> Array:
     """Rotation about a vector by its length."""
     angle = float(np.linalg.norm(vector))
@@ -118,7 +123,7 @@ def _frames(model: SpaceModel, q: Array) -> dict[int, tuple[Array, Array]]:
     while len(frames) < model.links:
         for joint, column in zip(model.joints, model.column):
             turn, x, y, *shift = (float(q[c]) if c >= 0 else 0.0 for c in column)
-            R, S = (_turned(seat.turn) for seat in (joint.seat_a, joint.seat_b))
+            R, S = (_seated(seat) for seat in (joint.seat_a, joint.seat_b))
             moved = R @ _turned(_tilt(x, y)) @ _turned((0.0, 0.0, turn)) @ S.T
             place = np.array(joint.seat_a.point) + model.unit * (R @ shift) - moved @ np.array(joint.seat_b.point)
             if joint.a in frames and joint.b not in frames:
@@ -137,7 +142,7 @@ class _Seen:
         joint, column = model.joints[k], model.column[k]
         self.number, self.links, self.driven = k, (joint.a, joint.b), joint.driven
         own, at = frames[joint.a]
-        seat = own @ _turned(joint.seat_a.turn)
+        seat = own @ _seated(joint.seat_a)
         self.place = at + own @ np.array(joint.seat_a.point)
         x, y = (float(q[column[c]]) if column[c] >= 0 else 0.0 for c in (1, 2))
         self.axis = seat[:, 2]

@@ -23,9 +23,10 @@ from graphsynth.jamming.joints.limits import Misalignment, bounds, chosen
 from graphsynth.jamming.joints.program import JointProblem
 from graphsynth.jamming.joints.search import MemberWitness, limits_chosen, lowest, sharp_problem, unclosed_at
 from graphsynth.jamming.space.closure import Closure, closures
-from graphsynth.jamming.space.model import SpaceModel, driven_at, in_space, largest_turn, leaning, start
+from graphsynth.jamming.space.model import SpaceModel, driven_at, in_space, largest_spin, largest_turn, leaning, start
 from graphsynth.jamming.space.optimum import Optimum, least_scale
 from graphsynth.jamming.space.pose import PoseProof, prove_pose
+from graphsynth.mechanism.joints import Revolute
 from graphsynth.tolerances.box import relative_box
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ class Members:
 
     def __init__(self, given: JointProblem, motion: Motion, sizes: ParameterBox) -> None:
         self.given, self.motion, self.sizes = given, motion, sizes
-        self.box = _with_axes(sizes, given.misalignments)
+        self.box = _with_axes(motion.mechanism, sizes, given.misalignments)
         self.model = in_space(given, self.box)
         keep = np.flatnonzero(motion.assembled)
         ends = motion.inputs[keep]
@@ -100,7 +101,7 @@ class Members:
 
         Turns a and b about x and y lead the axis to ``(sin b, -sin a cos b, cos a cos b)``, x in the direction given.
         """
-        turns, found = iter(p[self.sizes.size :].reshape(-1, 2).tolist()), []
+        turns, found = iter(_pairs(p, self).tolist()), []
         for tilt in self.given.misalignments:
             own = tilt
             if leaning(tilt):
@@ -114,14 +115,11 @@ class Members:
 
     @cached_property
     def _spun(self) -> Array:
-        """How far the turns of a leaning axis may spin the seat of a driven joint, (drivers,), rounded up.
-
-        Turns a and b are the least rotation of the axis and a spin ``2 atan(tan(a / 2) tan(b / 2))`` about it.
-        """
-        most = {tilt.pair: largest_turn(tilt) for tilt in self.given.misalignments if leaning(tilt)}
+        """How far the turns of a leaning axis may spin the seat of a driven joint that turns, (drivers,)."""
+        most = {tilt.pair: largest_spin(tilt) for tilt in self.given.misalignments if leaning(tilt)}
         driven = {driver.pair for driver in self.motion.mechanism.drivers}
-        size = [most.get(joint.pair, 0.0) for joint in self.motion.mechanism.joints if joint.pair in driven]
-        return 2.0 * np.tan(0.5 * np.array(size)) ** 2 * (1.0 + 1e-12)
+        joints = [joint for joint in self.motion.mechanism.joints if joint.pair in driven]
+        return np.array([most.get(one.pair, 0.0) if isinstance(one, Revolute) else 0.0 for one in joints])
 
     def coordinates(self, u: Interval, p: Interval) -> Interval:
         """Enclose the given coordinates (N, ...) for pieces u (N,) of the input and p (N, m) of the dimensions."""
@@ -148,16 +146,26 @@ class Members:
         return MemberPoses(q, np.asarray(given.rad), found)
 
 
-def _with_axes(sizes: ParameterBox, tilts: Iterable[Misalignment]) -> ParameterBox:
-    """Return a box of dimensions with two turns, within a disc, of every axis that may lean."""
-    box = sizes
-    for tilt in filter(leaning, tilts):
-        most, k = largest_turn(tilt), box.size
-        names = tuple(f"turn about {axis} of the axis {tilt.base}-{tilt.link} on link {tilt.base}" for axis in "xy")
-        ends, names = np.append(box.high, [most, most]), (*box.names, *names)
-        low = np.append(box.low, [-most, -most])
-        box = replace(box, names=names, low=low, high=ends, discs=(*box.discs, (k, k + 1)))
-    return box
+def _with_axes(mechanism: Mechanism, sizes: ParameterBox, tilts: Iterable[Misalignment]) -> ParameterBox:
+    """Return a box of dimensions with two turns, within a disc, of every axis that may lean.
+
+    Then a third one for each of a guide, whose direction would spin with the two (`largest_spin`).
+    """
+    tilts = list(filter(leaning, tilts))
+    guides = [tilt for tilt in tilts if not isinstance(mechanism.joint(*tilt.pair), Revolute)]
+    turns = [(tilt, axis, largest_turn(tilt)) for tilt in tilts for axis in "xy"]
+    turns += [(tilt, "z", largest_spin(tilt)) for tilt in guides]
+    names = tuple(f"turn about {axis} of the axis {own.base}-{own.link} on link {own.base}" for own, axis, _ in turns)
+    ends, first = np.array([most for *_, most in turns]), sizes.size
+    discs = tuple((k, k + 1) for k in range(first, first + 2 * len(tilts), 2))
+    low, high = np.append(sizes.low, -ends), np.append(sizes.high, ends)
+    return replace(sizes, names=(*sizes.names, *names), low=low, high=high, discs=(*sizes.discs, *discs))
+
+
+def _pairs(values: Array, members: Members) -> Array:
+    """Two values for every axis that may lean, of those of all parameters (m,)."""
+    first, count = members.sizes.size, sum(map(leaning, members.given.misalignments))
+    return values[first : first + 2 * count].reshape(-1, 2)
 
 
 def aligned(given: JointProblem, motion: Motion, sizes: ParameterBox) -> JointProblem:
@@ -171,7 +179,7 @@ def aligned(given: JointProblem, motion: Motion, sizes: ParameterBox) -> JointPr
     u, p = points(np.array([0.5 * (own.low + own.high)])), _ASIDE * own.box.high
     poses = own.poses(u, points(p[None]))
     rises = slopes(own.model, least_scale(own.floats, poses.q[0]))
-    pairs = iter(rises[len(rises) - own.box.size + sizes.size :].reshape(-1, 2).tolist())
+    pairs = iter(_pairs(rises[len(rises) - own.box.size :], own).tolist())
     for tilt in given.misalignments:
         if leaning(tilt):
             a, b = next(pairs)

@@ -49,6 +49,7 @@ class Unsupported(Exception):  # noqa: N818 - never leaves the package: it becom
 class Seat:
     """Where a joint sits on a link: a point, and the rotation vector (radians) that turns the z axis to its axis.
 
+    Before that it is turned about z by ``spin``.
     ``turn_box`` and ``point_box`` (3,) enclose the rotation vector and the point where floats do not say them exactly.
     ``moves`` tells the vectors (3,) by which one unit of a parameter of the model moves the point.
     """
@@ -58,6 +59,7 @@ class Seat:
     turn_box: Interval | None = None
     point_box: Interval | None = None
     moves: tuple[tuple[int, Interval], ...] = ()
+    spin: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("point", "turn"):
@@ -273,7 +275,10 @@ class SpaceModel:
     def _seat(self, seat: Seat) -> tuple[Interval, Interval]:
         turn = Interval(list(seat.turn)) if seat.turn_box is None else seat.turn_box
         point = Interval(list(seat.point)) if seat.point_box is None else seat.point_box
-        return rotation(turn), point / self.unit
+        R = rotation(turn)
+        if seat.spin != 0.0:
+            R = product(R, rotation(Interval([0.0, 0.0, seat.spin])))
+        return R, point / self.unit
 
     def moves(self, passed: tuple[int, bool], after: tuple[int, bool]) -> tuple[tuple[int, Interval], ...]:
         """Vectors by which one unit of a parameter moves the next joint of a loop from the one passed before, in units.
@@ -402,6 +407,14 @@ def largest_turn(tilt: Misalignment) -> float:
     return math.sqrt(2.0) * math.asin(math.sqrt(2.0) * math.sin(half)) * (1.0 + 1e-12)
 
 
+def largest_spin(tilt: Misalignment) -> float:
+    """How far the turns of a leaning axis may spin its seat, against the least rotation of the axis: rounded up.
+
+    Turns a and b are the least rotation of the axis and a spin ``2 atan(tan(a / 2) tan(b / 2))`` about it.
+    """
+    return 2.0 * math.tan(0.5 * largest_turn(tilt)) ** 2 * (1.0 + 1e-12)
+
+
 def in_space(given: JointProblem, box: ParameterBox | None = None) -> SpaceModel:
     """Put a plane mechanism with limits and misaligned axes into space, and the parameters of a box of dimensions.
 
@@ -412,6 +425,7 @@ def in_space(given: JointProblem, box: ParameterBox | None = None) -> SpaceModel
     box = box if box is not None and box.size else None
     by_pair = {tilt.pair: tilt for tilt in given.misalignments}
     lean = [] if box is None else [tilt.pair for tilt in given.misalignments if leaning(tilt)]
+    spun = [pair for pair in lean if not isinstance(mechanism.joint(*pair), Revolute)]
     driven = {driver.pair for driver in mechanism.drivers}
     joints, mounts = [], []
     for k, (joint, limits) in enumerate(zip(mechanism.joints, given.limits)):
@@ -426,17 +440,16 @@ def in_space(given: JointProblem, box: ParameterBox | None = None) -> SpaceModel
         for link, at, angle in ((joint.a, joint.at_a, "angle_a"), (joint.b, joint.at_b, "angle_b")):
             own = tilt if tilt is not None and tilt.base == link else None
             loose = own is not None and joint.pair in lean
-            seat = _plane_seat(at, getattr(joint, angle, 0.0), None if loose else own)
+            seat = _plane_seat(at, getattr(joint, angle, 0.0), own)
+            seat = replace(seat, turn=(0.0, 0.0, 0.0), turn_box=None) if loose else seat
             seat = seat if box is None else _toleranced(seat, box.points[k][len(seats)], box)
             if own is not None and box is not None and loose:
+                first = box.size - len(spun) - 2 * (len(lean) - lean.index(joint.pair))
+                numbers = [first, first + 1]
                 if guide:
-                    raise Unsupported(
-                        f"an axis that may lean at the guide {joint.a}-{joint.b} is not described in space"
-                    )
-                place = lean.index(joint.pair)
-                first, mount = box.size - 2 * (len(lean) - place), mechanism.graph.links + 2 * place
-                mounts += _leaning_seat(seat, (link, mount, mount + 1), first, own)
-                seat, links[len(seats)] = Seat(), mount + 1
+                    numbers.append(box.size - len(spun) + spun.index(joint.pair))
+                mounts += _leaning_seat(seat, (link, mechanism.graph.links + len(mounts)), numbers, own)
+                seat, links[len(seats)] = Seat(spin=seat.spin), mechanism.graph.links + len(mounts) - 1
             seats.append(seat)
         own_driven = joint.pair in driven
         turns = not isinstance(joint, Prismatic)
@@ -445,19 +458,21 @@ def in_space(given: JointProblem, box: ParameterBox | None = None) -> SpaceModel
     return SpaceModel((*joints, *mounts), count, mechanism.frame, 0 if box is None else box.size)
 
 
-def _leaning_seat(seat: Seat, links: tuple[int, int, int], first: int, tilt: Misalignment) -> list[SpaceJoint]:
-    """Two joints from a seat to a link that turns about x, then y, by the parameters from ``first`` on.
+def _leaning_seat(seat: Seat, links: tuple[int, int], numbers: list[int], tilt: Misalignment) -> list[SpaceJoint]:
+    """Joints from a seat to links that turn about x, then y, then z where asked for, by parameters of these numbers.
 
-    The x axis points in the direction of the misalignment.
+    ``links``: that of the seat, and the first new one.  The x axis points in the direction of the misalignment.
     """
     way, half, joints = Interval(tilt.direction), pi() / 2, []
     c, s, none = half * cos(way), half * sin(way), Interval(0)
-    most = largest_turn(tilt)
-    for k, turn in enumerate(([-s, c, none], [-c, -s, none])):  # z to x, z to y
+    ways = [[-s, c, none], [-c, -s, none], [none, none, none]]  # z to x, z to y, z
+    most, before = (largest_turn(tilt), largest_turn(tilt), largest_spin(tilt)), links[0]
+    for k, (number, turn) in enumerate(zip(numbers, ways)):
         box = Interval.stack(turn)
         own = Seat(turn=tuple(box.mid.tolist()), turn_box=box)
-        base = own if k else replace(seat, turn=own.turn, turn_box=box)
-        joints.append(SpaceJoint(links[k], links[k + 1], base, own, RIGID, parameter=first + k, lean=most))
+        base = own if k else replace(seat, turn=own.turn, turn_box=box, spin=0.0)
+        joints.append(SpaceJoint(before, links[1] + k, base, own, RIGID, parameter=number, lean=most[k]))
+        before = links[1] + k
     return joints
 
 
@@ -483,14 +498,12 @@ def _plane_seat(at: tuple[float, float], angle: float, tilt: Misalignment | None
     """Seat of a joint of a plane mechanism, turned in the plane (a guide) or out of it (a misaligned axis)."""
     if tilt is None:
         return Seat((*at, 0.0), (0.0, 0.0, angle))
-    if angle != 0.0:
-        raise Unsupported("a misaligned guide whose direction is turned is not described in space; use small tilts")
     tilt = tilt.sharp() if leaning(tilt) else tilt
     alpha, direction = (Interval.from_bounds(*bounds(tilt, name)) for name in ("alpha", "direction"))
     if alpha.contains(0.0) and tilt.alpha_range != (0.0, 0.0):
         raise Unsupported("a range of misalignments around zero has no single direction; use small tilts")
     box = Interval.stack([alpha * cos(direction), alpha * sin(direction), Interval(0)])
-    return Seat((*at, 0.0), tuple(box.mid.tolist()), box)
+    return Seat((*at, 0.0), tuple(box.mid.tolist()), box, spin=angle)
 
 
 def start(model: SpaceModel, mechanism: Mechanism, pose: Array) -> Array:

@@ -14,9 +14,12 @@ from graphsynth.intervals.balls import exact
 from graphsynth.intervals.proving import points
 from graphsynth.jamming import Bearing, Verdict
 from graphsynth.jamming.joints import (
+    RIGID,
+    SPHERICAL,
     JointLimits,
     Misalignment,
     SlideLimits,
+    assess_coupled,
     certify_coupled,
     largest_scale as small_scale,
 )
@@ -216,16 +219,72 @@ def test_random_mechanisms_with_leaning_axes_never_contradict_their_members(link
     assert decided >= 5
 
 
-def test_a_guide_that_may_lean_is_undecided_with_a_reason():
+def slider(angle):
+    """Crank 1, coupler 3, a guide through the motor's axis in the direction ``angle``."""
     graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
-    joints = [Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (3.0, 0.0)), Prismatic(0, 3)]
-    slider = Mechanism(graph, joints, [Driver(0, 1)])
-    limits = {
-        (0, 1): JointLimits(0.0),
-        (1, 2): JointLimits(0.1),
-        (2, 3): JointLimits(0.1),
-        (0, 3): SlideLimits(0.1, 0.1),
-    }
-    found = certify_in_space(simulate(slider, [0.5, 0.6]), limits, Misalignment(0, 1, 0.01),
-                             tolerances=[AxisAngle(0, 3, 0.01)])  # fmt: skip
-    assert found.verdict is Verdict.UNDECIDED and "guide 0-3" in found.reason
+    guide = Prismatic(0, 3, angle_a=angle, angle_b=angle)
+    return Mechanism(graph, [Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (3.0, 0.0)), guide],
+                     [Driver(0, 1)])  # fmt: skip
+
+
+@pytest.mark.parametrize(("angle", "part", "verdict"), [(0.4, 1.01, FREE), pytest.param(0.0, 0.99, SOME, marks=SLOW)])
+def test_a_rail_that_leans_lifts_its_slider(angle, part, verdict):
+    """At the distance s by s times the sine of the lean; the coupler is free at the slider and tilts in the crank."""
+    lean, u = 0.02, np.array([0.5, 0.501])
+    along = math.cos(lean) * np.cos(u - angle)
+    height = math.sin(lean) * (along + np.sqrt(along**2 + 8.0)).max()
+    limits = {(0, 1): RIGID, (1, 2): JointLimits(part * math.asin(height / 3.0)), (2, 3): SPHERICAL,
+              (0, 3): SlideLimits(0.0, 0.0)}  # fmt: skip
+    found = certify_in_space(simulate(slider(angle), u), limits, [], tolerances=[AxisAngle(0, 3, lean)])
+    assert found.verdict is verdict
+    if verdict is SOME:  # it leans across its direction
+        own = found.witness.misalignments[0]
+        assert own.alpha == pytest.approx(lean) and abs(math.cos(own.direction - angle)) < 1e-3
+
+
+def test_a_guide_leans_by_the_least_rotation_and_its_direction_does_not_turn():
+    """Three turns within their box are any lean of the seat; small tilts say the same where the slider leans."""
+    rng, angle = np.random.default_rng(5), 0.2
+    motion = simulate(slider(0.4), [0.7, 0.71])
+    limits, axes, box = drawn(motion.mechanism, JointLimits(0.1), Misalignment(0, 1, 0.01), [AxisAngle(3, 0, angle)])
+    own = Members(problem(motion.mechanism, limits, axes), motion, box)
+    assert own.box.size == 3 and own.box.discs == ((0, 1),)
+    q = np.zeros(own.model.width)
+    for way in rng.uniform(0.0, math.tau, 6):
+        least = np.array(rotation([angle * math.cos(way), angle * math.sin(way), 0.0]).tolist(), dtype=float)
+        a, b = math.atan2(-least[1, 2], least[2, 2]), math.asin(least[0, 2])
+        p = np.array([a, b, -2.0 * math.atan(math.tan(0.5 * a) * math.tan(0.5 * b))])
+        assert (np.abs(p) <= own.box.high).all() and own.box.holds(p)
+        q[-3:] = p
+        mount = np.eye(3)
+        for k in (4, 5, 6):
+            mount = mount @ np.array(moved(own.model, k, q.tolist())[0].tolist(), dtype=float)
+        assert mount == pytest.approx(least, abs=1e-14)
+    for way in (0.3, 1.7):
+        tilt = Misalignment(3, 0, 1e-4, way, rigid=False)
+        limits = {j.pair: SlideLimits(0.01, 0.03) if j.kind == "P" else JointLimits(0.02, 0.01)
+                  for j in motion.mechanism.joints}  # fmt: skip
+        small = assess_coupled(motion, limits, tilt).allowed_scale[0]
+        model = in_space(problem(motion.mechanism, limits, tilt))
+        exactly = least_scale(Closure(model, False), start(model, motion.mechanism, motion.poses[0])).scale
+        assert small * exactly == pytest.approx(1.0, abs=1e-6)
+
+
+@SLOW
+def test_random_members_of_a_leaning_guide_are_as_the_box_is():
+    motion, rng = simulate(slider(0.3), [0.8, 0.81]), np.random.default_rng(9)
+    tilt, part = Misalignment(0, 1, 0.01, 0.5), AxisAngle(0, 3, 2e-3)
+    decided = set()
+    for limit in (0.0016, 0.002, 0.004, 0.006, 0.01):
+        limits = {(1, 2): JointLimits(limit), (2, 3): JointLimits(limit), (0, 3): SlideLimits(limit, limit, 0.002)}
+        found = certify_in_space(motion, limits, tilt, tolerances=[part], seconds=30.0)
+        decided.add(found.verdict)
+        if found.verdict not in (FREE, JAMMED):
+            continue
+        sharp = problem(motion.mechanism, limits, tilt).limits
+        for _ in range(6):
+            lean, way = part.angle * math.sqrt(rng.random()), rng.uniform(0.0, 6.28)
+            model = in_space(sharp_problem(motion.mechanism, sharp, (tilt, Misalignment(0, 3, lean, way, rigid=False))))
+            state = prove_pose(model, start(model, motion.mechanism, motion.poses[0])).state
+            assert state != (-1 if found.verdict is FREE else 1)
+    assert {FREE, JAMMED} <= decided
