@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.compilation import named
+from graphsynth.design.nine_points.digits import follow_with_digits
 from graphsynth.design.nine_points.equations import cognates
 from graphsynth.design.nine_points.proof import MIRROR, Mask, ProvedRoots, marks, overlaps, prove
 from graphsynth.design.nine_points.task import POINTS, Complex, Task, free_unknowns
@@ -25,6 +26,8 @@ SAME = 1e-8
 _ROUNDS = 3
 #: Random detours for roots that are lost, relative; how many may be lost for another try, or one in fifty.
 _DETOURS, _FEW = (3e-3, 1e-2, 3e-2) * 3, 8
+#: The most lost paths that are followed with many digits, a second each.
+_MOST_DIGITS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +77,9 @@ def candidates(task: Task, begin: Start, rng: np.random.Generator) -> tuple[Comp
     """Follow one path to a task; return approximate roots, real ones once, and how many paths were followed.
 
     Where a path is lost, or two have become one, those of the cognates are tried, which pass elsewhere through large
-    numbers, then detours: round a point where a root is infinite they lead to the same end.  Of points in special
-    position many are lost for good.  The points are real, so the mirror image of a root is one, too.
+    numbers, then detours: round a point where a root is infinite they lead to the same end.  The last few are followed
+    with many digits, as far pivots leave too few in double precision.  Of points in special position many are lost for
+    good.  The points are real, so the mirror image of a root is one, too.
     """
     z = follow(begin, task.end)
     paths, pivots = len(z), begin.pivots
@@ -92,6 +96,14 @@ def candidates(task: Task, begin: Start, rng: np.random.Generator) -> tuple[Comp
             at = Start(middle, follow(at, middle, SETTINGS[1]))
         z[left] = follow(at, task.end, SETTINGS[1 if detour else 0])
         paths += left.size
+    lost = ~np.isfinite(z).all(axis=1)
+    lost[repeated(z, pivots)] = True
+    for k in np.flatnonzero(lost) if lost.sum() <= _MOST_DIGITS else ():
+        if len(_whole(z, pivots)) >= len(z):
+            break
+        arrived = follow_with_digits(begin.z[k], begin.end, task)
+        z[k] = np.nan if arrived is None else arrived
+        paths += 1
     return _whole(z, pivots), paths
 
 

@@ -19,5 +19,8 @@ SYSTEM = System(
         Stage("plot", f"{_HERE}:curves", ("designs",), ("plots",)),
         Stage("mechanisms", f"{_HERE}:mechanisms", ("designs",), ("mechanisms",)),
     ),
-    evidence=plans("graphsynth.evidence.designs", "hidden-task", "nine-points"),
+    evidence=(
+        *plans("graphsynth.evidence.designs", "hidden-task", "nine-points"),
+        *plans("graphsynth.evidence.poses", "five-poses", "function-positions", "cognates"),
+    ),
 )
