@@ -26,8 +26,8 @@ SAME = 1e-8
 _ROUNDS = 3
 #: Random detours for roots that are lost, relative; how many may be lost for another try, or one in fifty.
 _DETOURS, _FEW = (3e-3, 1e-2, 3e-2) * 3, 8
-#: The most lost paths that are followed with many digits, a second each.
-_MOST_DIGITS = 6
+#: The most lost paths that are followed with many digits, a second or two each.
+_MOST_DIGITS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +73,12 @@ def repeated(z: Complex, pivots: int) -> NDArray[np.int64]:
     return found[overlaps([Balls(mark.mid, SAME * (1e-3 + np.abs(mark.mid))) for mark in sums])]
 
 
-def candidates(task: Task, begin: Start, rng: np.random.Generator) -> tuple[Complex, int]:
-    """Follow one path to a task; return approximate roots, real ones once, and how many paths were followed.
+def candidates(task: Task, begin: Start, rng: np.random.Generator) -> tuple[Complex, NDArray[np.int64], int]:
+    """Follow one path to a task; return approximate roots, real ones once, which are lost, how many paths were followed.
 
     Where a path is lost, or two have become one, those of the cognates are tried, which pass elsewhere through large
-    numbers, then detours: round a point where a root is infinite they lead to the same end.  The last few are followed
-    with many digits, as far pivots leave too few in double precision.  Of points in special position many are lost for
-    good.  The points are real, so the mirror image of a root is one, too.
+    numbers, then detours: round a point where a root is infinite they lead to the same end.  Of points in special
+    position many are lost for good.  The points are real, so the mirror image of a root is one, too.
     """
     z = follow(begin, task.end)
     paths, pivots = len(z), begin.pivots
@@ -96,15 +95,9 @@ def candidates(task: Task, begin: Start, rng: np.random.Generator) -> tuple[Comp
             at = Start(middle, follow(at, middle, SETTINGS[1]))
         z[left] = follow(at, task.end, SETTINGS[1 if detour else 0])
         paths += left.size
-    lost = ~np.isfinite(z).all(axis=1)
+    lost = np.asarray(~np.isfinite(z).all(axis=1))
     lost[repeated(z, pivots)] = True
-    for k in np.flatnonzero(lost) if lost.sum() <= _MOST_DIGITS else ():
-        if len(_whole(z, pivots)) >= len(z):
-            break
-        arrived = follow_with_digits(begin.z[k], begin.end, task)
-        z[k] = np.nan if arrived is None else arrived
-        paths += 1
-    return _whole(z, pivots), paths
+    return _whole(z, pivots), np.flatnonzero(lost), paths
 
 
 def _whole(z: Complex, pivots: int) -> Complex:
@@ -112,6 +105,13 @@ def _whole(z: Complex, pivots: int) -> Complex:
     z = z[np.isfinite(z).all(axis=1)]
     z = np.concatenate([z, z[:, MIRROR].conj()])
     return np.delete(z, repeated(z, pivots)[:, 1], axis=0)
+
+
+def _with_digits(task: Task, begin: Start, lost: NDArray[np.int64]) -> Complex:
+    """Ends of lost paths, followed with many digits, and their mirror images: far pivots leave too few in doubles."""
+    ends = [end for k in lost if (end := follow_with_digits(begin.z[k], begin.end, task)) is not None]
+    z = np.array(ends, dtype=np.complex128).reshape(-1, 8)
+    return np.concatenate([z, z[:, MIRROR].conj()])
 
 
 def solve(task: Task, seed: int = 0) -> tuple[ProvedRoots, int]:
@@ -122,11 +122,15 @@ def solve(task: Task, seed: int = 0) -> tuple[ProvedRoots, int]:
     z, paths, before = np.empty((0, 8), dtype=np.complex128), 0, 0
     for _ in range(_ROUNDS):
         begin = start.turned(np.exp(2j * np.pi * rng.uniform(size=2)) / scale)
-        found, followed = candidates(task, begin, rng)
+        found, lost, followed = candidates(task, begin, rng)
         z, paths = np.concatenate([z, found]), paths + followed
         z = np.delete(z, repeated(z, start.pivots)[:, 1], axis=0)
         roots = prove(z, task)
         z = z[roots.distinct]
+        if len(z) < len(start.z) and 0 < lost.size <= _MOST_DIGITS:
+            z, paths = np.concatenate([z, _with_digits(task, begin, lost)]), paths + lost.size
+            roots = prove(z, task)
+            z = z[roots.distinct]
         if len(z) in (before, len(start.z)):
             break
         before = len(z)
