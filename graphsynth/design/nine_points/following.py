@@ -74,7 +74,7 @@ def repeated(z: Complex, pivots: int) -> NDArray[np.int64]:
 
 
 def candidates(task: Task, begin: Start, rng: np.random.Generator) -> tuple[Complex, NDArray[np.int64], int]:
-    """Follow one path to a task; return approximate roots, real ones once, which are lost, how many paths were followed.
+    """Follow one path to a task; return approximate roots, real ones once, those lost, and how many were followed.
 
     Where a path is lost, or two have become one, those of the cognates are tried, which pass elsewhere through large
     numbers, then detours: round a point where a root is infinite they lead to the same end.  Of points in special
@@ -108,7 +108,7 @@ def _whole(z: Complex, pivots: int) -> Complex:
 
 
 def _with_digits(task: Task, begin: Start, lost: NDArray[np.int64]) -> Complex:
-    """Ends of lost paths, followed with many digits, and their mirror images: far pivots leave too few in doubles."""
+    """Return ends of lost paths, followed with many digits, and mirror images: far pivots leave too few in doubles."""
     ends = [end for k in lost if (end := follow_with_digits(begin.z[k], begin.end, task)) is not None]
     z = np.array(ends, dtype=np.complex128).reshape(-1, 8)
     return np.concatenate([z, z[:, MIRROR].conj()])
