@@ -92,8 +92,9 @@ def letters(rows: Mapping[Key, Mapping[str, str]]) -> str:
     lines = [f"| {' | '.join(names)} |\n|{'---|' * len(names)}"]
     for name in own:
         row, other = rows[name, "ours"], rows.get((name, "dyads"))
-        groups = "no" if row["dyadic"] == "yes" else "yes"
-        cells = [name[-1], _cell(row), row["certified"] or "—", row["links"], groups, _cell(other), _ratio(row, other)]
+        found = math.isfinite(float(row["error"]))
+        links, groups = (row["links"], "no" if row["dyadic"] == "yes" else "yes") if found else ("—", "—")
+        cells = [name[-1], _cell(row), row["certified"] or "—", links, groups, _cell(other), _ratio(row, other)]
         lines.append(f"| {' | '.join([*cells, *(_cell(rows.get((name, by))) for by in peers)])} |")
     proved = sum(rows[name, "ours"]["certified"] == "yes" for name in own)
     every = [_median(rows, own, by) for by in ("ours", "dyads", *peers)]
@@ -102,7 +103,7 @@ def letters(rows: Mapping[Key, Mapping[str, str]]) -> str:
 
 
 def _ratio(row: Mapping[str, str], other: Mapping[str, str] | None) -> str:
-    if other is None or not math.isfinite(float(other["error"])):
+    if other is None or not all(math.isfinite(float(one["error"])) for one in (row, other)):
         return "—"
     return _number(float(row["error"]) / float(other["error"]))
 
@@ -164,7 +165,7 @@ def draw_curves(trials: Iterable[Trial], curves: Mapping[str, Any], path: Path, 
         for by, colour, wide in (("dyads", "b", 0.9), ("ours", "a", 1.4)):
             z = curves.get(f"{trial.name} {by}")
             if z is not None:
-                z = np.asarray(z)[:: max(1, len(z) // 120)]
+                z = np.asarray(z)[:: max(1, len(z) // 80)]
                 z = np.append(z, z[0]) if trial.kind == "curve" else z
                 axes.plot(z.real, z.imag, color=LIGHT[colour], lw=wide)
         if trial.kind != "curve":
