@@ -9,6 +9,9 @@ from graphsynth.cli import console
 from graphsynth.cli.animate import moved, read_mechanism
 from graphsynth.core.errors import SpecError
 
+#: Pins thinner than this, in millimetres, are told: the unit of length may be a metre.
+_SMALL = 0.5
+
 
 def run(options: argparse.Namespace) -> int:
     """Make parts of a mechanism and write them to a folder."""
@@ -28,6 +31,9 @@ def run(options: argparse.Namespace) -> int:
         )
     sizes = PartSizes(**{name: getattr(options, name) for name in PartSizes.__dataclass_fields__})
     made = parts(moved(mechanism, options.range), unit=options.unit, sizes=sizes)
+    if made.sizes.pin < _SMALL:
+        longest = max(row.length for row in made.bill)
+        console.note(f"the longest part is {longest:.3g} mm: --unit says how many millimetres one unit of length is")
     files = made.write(options.out, forms=options.form or ("svg", "csv"))
     if options.json:
         console.put_json(

@@ -31,6 +31,12 @@ def test_a_file_over_a_range_as_json(tmp_path, capsys):
     assert status == 2 and "no layers without a collision: " in told
 
 
+def test_parts_too_small_to_be_meant_are_told(tmp_path, capsys):
+    status, _, told = run(capsys, "chebyshev_lambda", "--out", tmp_path)
+    assert status == 0 and "the longest part is 5.32 mm: --unit" in told
+    assert "--unit" not in run(capsys, "chebyshev_lambda", "--unit", 40, "--out", tmp_path)[2]
+
+
 @pytest.mark.parametrize("name", ["nobody", "nothing.toml"])
 def test_what_is_no_mechanism_is_told(capsys, name):
     status, _, told = run(capsys, name)
