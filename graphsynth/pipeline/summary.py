@@ -162,9 +162,10 @@ def _rejected(records: Sequence[Record]) -> list[Finding]:
     if len(causes) == 1 and total > 1:
         why = causes[0][0].removesuffix(".")
         return [Finding(f"Rejected: {total} of {len(records)}, all for the same reason: {why}.")]
-    listed = "; ".join(f"{count} ({cause.removesuffix('.')})" for cause, count in causes[:_REASONS])
-    rest = sum(count for _, count in causes[_REASONS:])
-    more = f"; {rest} for {len(causes) - _REASONS} other reason{'s' * (len(causes) > _REASONS + 1)}" if rest else ""
+    told = causes if len(causes) == _REASONS + 1 else causes[:_REASONS]
+    listed = "; ".join(f"{count} ({cause.removesuffix('.')})" for cause, count in told)
+    rest = sum(count for _, count in causes[len(told) :])
+    more = f"; {rest} for {len(causes) - len(told)} other reasons" if rest else ""
     return [Finding(f"Rejected: {total} of {len(records)}: {listed}{more}.")]
 
 

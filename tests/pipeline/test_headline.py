@@ -80,7 +80,7 @@ def test_reasons_are_counted_the_most_frequent_first(lambda_tables: dict[str, An
     )
     report = report_of(lambda_tables, records)
     told = next(text for text in said(report) if text.startswith("Rejected"))
-    assert told == "Rejected: 11 of 12: 6 (too weak); 3 (too long); 1 (ZeroDivisionError); 1 for 1 other reason."
+    assert told == "Rejected: 11 of 12: 6 (too weak); 3 (too long); 1 (ZeroDivisionError); 1 (ugly)."
     numbers = {fact.text: (fact.value, fact.good) for fact in facts(report)}
     assert numbers["candidate mechanisms"] == ("12", None) and numbers["failed"] == ("1", False)
     assert (numbers["assessed"][0], numbers["rejected"][0], numbers["on the Pareto front"][0]) == ("1", "10", "1")

@@ -35,7 +35,8 @@ def shares(context: Context, records: tuple[Record, ...]) -> tuple[Table, ...]:
     told = Counter(_told(record) for record in records)
     if drawn == every:
         rows = [(name, count, f"{100.0 * count / every:.1f} %") for name, count in told.most_common()]
-        said = Finding(f"All {every} mechanisms were examined; {moving} move as asked.")
+        moves = f"{moving} {'moves' if moving == 1 else 'move'} as asked"
+        said = Finding(f"All {every} mechanisms were examined; {moves}." if every > 1 else f"There is one; {moves}.")
         return (
             table("What became of the mechanisms", ("what became of it", "number", "share"), rows, _SEARCHED, said),
         )
