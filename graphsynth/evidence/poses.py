@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from graphsynth.evidence.rows import Effort, Problem, Row, best_of
-from graphsynth.mechanism.model import Mechanism
+from graphsynth.mechanism.model import Mechanism, TracePoint
 
 _INPUTS = np.array([0.2, 1.1, 1.9, 3.0, 4.4])
 #: Frame, crank, coupler and rocker.
@@ -72,7 +73,7 @@ def function_positions(context: Any, effort: Effort) -> Problem:
     for count, given in ((3, {"input_start": 0, "output_start": 0}), (4, {"output_start": 0}), (5, {})):
         starts = {name: (_INPUTS, outputs)[name == "output_start"][0] for name in given}
         asked = (_INPUTS - _INPUTS[0])[:count], (outputs - outputs[0])[:count]
-        found, *timed = best_of(lambda asked=asked, starts=starts: function_generators(*asked, **starts), effort)
+        found, *timed = best_of(partial(function_generators, *asked, **starts), effort)
         known = np.array([_SIDES[1], _SIDES[3]]) / _SIDES[0]
         away = [np.abs([dyad.length for dyad in own.dyads] - known).max() for own in found]
         more = {"kind": "distance of crank and rocker", "reference": "the four-bar", "proved": True}
@@ -91,11 +92,11 @@ def cognates(context: Any, effort: Effort) -> Problem:
     watt = Mechanism.six_bar("watt", (2.0, 1.0, 2.5, 2.5), joint=(1.2, 0.8), link=2.6, output=2.2, pivot=(4.2, 0.5))
     cases = {"four-bar": Mechanism.four_bar(*_SIDES, coupler_point=(1.1, 0.9))}
     cases["six-bar with a point of its first coupler"] = Mechanism(
-        watt.graph, watt.joints, watt.drivers, {"P": (2, (0.7, 0.6))}, watt.pose
+        watt.graph, watt.joints, watt.drivers, {"P": TracePoint(2, (0.7, 0.6))}, watt.pose
     )
     rows, inputs = [], np.linspace(0.2, 1.2, 11)
     for setting, mechanism in cases.items():
-        found, *timed = best_of(lambda mechanism=mechanism: find(mechanism), effort)
+        found, *timed = best_of(partial(find, mechanism), effort)
         path = mechanism.simulate(inputs).point("P").position
         same = [own.mechanism.simulate(inputs).point("P").position for own in found if own.timed]
         error = max(float(np.abs(own - path).max()) for own in same) / float(np.ptp(path))
