@@ -45,7 +45,7 @@ class Free(NamedTuple):
 
     def take(self, rows: Ints) -> Free:
         """Return some of them."""
-        return Free(*(part[rows] for part in self))
+        return Free._make(part[rows] for part in self)
 
 
 class _Ends(NamedTuple):
@@ -64,20 +64,19 @@ def joined(closure: Closure, floats: Closure, first: Free, second: Free, face: I
     """
     if not closure.rows:
         return np.ones(len(first.at), dtype=np.bool_)  # any motion is one, and limits are convex
-    found = _led(closure, floats, *(_ends(piece, face) for piece in (first, second)), face.rad, 0)
+    found = _led(closure, floats, _ends(first, face), _ends(second, face), face.rad, 0)
     rows = np.flatnonzero(~found)
     if rows.size:
         some = face[rows]
         a, b = (_narrow(closure, floats, piece.take(rows), some) for piece in (first, second))
         found[rows] = a.sure & b.sure
         rest = np.flatnonzero(found[rows])
-        ends = (_Ends(*(part[rest] for part in end)) for end in (a, b))
-        found[rows[rest]] = _led(closure, floats, *ends, some.rad[rest], _HALVES)
+        found[rows[rest]] = _led(closure, floats, _some(a, rest), _some(b, rest), some.rad[rest], _HALVES)
     return found
 
 
 def _some(ends: _Ends, rows: Ints) -> _Ends:
-    return _Ends(*(part[rows] for part in ends))
+    return _Ends._make(part[rows] for part in ends)
 
 
 def _ends(piece: Free, face: Interval) -> _Ends:

@@ -427,7 +427,8 @@ def in_space(given: JointProblem, box: ParameterBox | None = None) -> SpaceModel
     lean = [] if box is None else [tilt.pair for tilt in given.misalignments if leaning(tilt)]
     spun = [pair for pair in lean if not isinstance(mechanism.joint(*pair), Revolute)]
     driven = {driver.pair for driver in mechanism.drivers}
-    joints, mounts = [], []
+    joints: list[SpaceJoint] = []
+    mounts: list[SpaceJoint] = []
     for k, (joint, limits) in enumerate(zip(mechanism.joints, given.limits)):
         if not isinstance(joint, Revolute | Prismatic | PinSlot) or (
             isinstance(joint, PinSlot) and joint.pair in driven
