@@ -201,9 +201,9 @@ def _planned(
         if isinstance(joint, Prismatic):
             reach = 2.0 * sizes.boss
             way = cmath.exp(1j * joint.angle_b)
-            own = (places[joint.a], places[joint.b])
+            both = (places[joint.a], places[joint.b])
             driven = any({d.base, d.link} == {joint.a, joint.b} for d in mechanism.drivers)
-            shift = _guides_at(A, along, B, way, (low, high), own, sizes) if free and driven else 0.0
+            shift = _guides_at(A, along, B, way, (low, high), both, sizes) if free and driven else 0.0
             B, low, high = B + shift * way, low + shift, high + shift
             guides = [B - reach * way, B + reach * way]
         for k, pin in enumerate(pins):  # what is jointed to the slider in its middle may reach through the slot
