@@ -84,6 +84,11 @@ def differ(one, other):
 
 
 #: Pages whose examples search or sweep for seconds, or repeat what tests/test_newcomer.py, atlas and testing run.
+#: Pages whose examples take about a second or more.
+LONG_PAGES = (
+    *("closure-in-space", "probability-of-a-mechanism", "design-a-mechanism", "four-bars-through-points"),
+    *("floating-piston", "design-for-poses", "find-a-curve"),
+)
 SLOW_PAGES = (
     *("embody", "point-an-antenna", "jamming-of-any-mechanism", "the-deck-reproduced", "bearing-jamming"),
     *(
@@ -101,10 +106,15 @@ SLOW_PAGES = (
 )
 
 
+def marks_of(page):
+    """How long the examples of a page take."""
+    return pytest.mark.slow if page.stem in SLOW_PAGES else pytest.mark.long if page.stem in LONG_PAGES else ()
+
+
 @pytest.mark.parametrize(
     "page",
     [
-        pytest.param(page, id=name_of(page), marks=pytest.mark.slow if page.stem in SLOW_PAGES else ())
+        pytest.param(page, id=name_of(page), marks=marks_of(page))
         for page in PAGES
         if any(is_example(*fence[:2]) for fence in fences(page))
     ],

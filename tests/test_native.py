@@ -95,6 +95,7 @@ def test_counting_does_not_load_numba() -> None:
     assert python(ADD, GRAPHSYNTH_NATIVE="0").split() == ["-3.0", "4.0", "True"]
 
 
+@pytest.mark.long
 @needs_library
 def test_dimensions_of_gear_trains_do_not_load_numba() -> None:
     """Arrays come to the kernels in the order of memory for which they are compiled, with two gear pairs too."""
@@ -107,7 +108,7 @@ def test_counting_without_the_library_is_the_same() -> None:
     assert python(COUNT, GRAPHSYNTH_NATIVE="0").split() == ["6856", "True"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @needs_library
 def test_a_changed_source_falls_back_and_says_so(tmp_path: Path) -> None:
     package = tmp_path / "graphsynth"
@@ -312,9 +313,10 @@ def real_calls(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
 def loop(signature: Signature) -> Any:
     """One loop over intervals as a case; most are for the slow run, since numba compiles each for a second or two."""
     name = signature.kernel.removeprefix(FLAT[0])
-    return pytest.param(signature, id=name, marks=() if name in ("add", "sin") else pytest.mark.slow)
+    return pytest.param(signature, id=name, marks=() if name in ("add", "sin") else pytest.mark.long)
 
 
+@pytest.mark.long
 @needs_library
 @pytest.mark.parametrize("signature", [loop(s) for s in read_list() if s.kernel.startswith(FLAT)])
 def test_interval_loops_give_the_bits_of_numba_for_any_numbers(signature: Signature, each: int = 2000) -> None:

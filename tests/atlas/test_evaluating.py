@@ -124,7 +124,7 @@ def test_what_is_there_is_not_evaluated_again(copy):
         assert catalogue.evaluate([6], per_chain=2, limit=1) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_without_dimensions_another_seed_searches_anew(copy, monkeypatch):
     from graphsynth.kinematics.dimensional import Goals
 
@@ -254,6 +254,7 @@ def test_wrong_dimensions_are_found(four, tmp_path, change, named):
     assert not found.passed and any(named in text for text in found.differences)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "statement",
     [
@@ -271,6 +272,7 @@ def test_wrong_values_are_found(four, judged, tmp_path, altered, statement):
         assert not catalogue.verify().passed
 
 
+@pytest.mark.long
 def test_a_verdict_is_proved_again(judged):
     with Catalogue(judged) as catalogue:
         own = catalogue.entry("1.4.4.1")["mechanisms"][0]["evaluations"]["jamming"]

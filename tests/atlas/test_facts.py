@@ -25,7 +25,7 @@ def moved(driver, frame):
     return 0 if driver == frame else driver + 1 if driver < frame else driver
 
 
-@pytest.mark.parametrize(("links", "mobility"), [*FAMILIES, (10, 1), pytest.param(11, 2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("links", "mobility"), [*FAMILIES, (10, 1), pytest.param(11, 2, marks=pytest.mark.long)])
 def test_facts_are_those_of_the_graph_class(links, mobility):
     chains, rows = facts_of(links, mobility)
     own = []

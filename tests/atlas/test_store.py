@@ -76,7 +76,7 @@ def test_every_family_agrees_with_counting_and_with_the_literature(small):
     assert statement["published"].tolist() == [1, 2, 16, 230, 1, 4, 40]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_counts_per_row_of_the_published_tables(small, twelve):
     import tomllib
 
@@ -158,6 +158,7 @@ def test_executors_and_order_do_not_matter(small, tmp_path):
             assert other.digest() == small.digest()
 
 
+@pytest.mark.long
 def test_processes_give_the_same_rows(many, tmp_path, fine):
     from graphsynth.atlas.making import processes
 
@@ -165,6 +166,7 @@ def test_processes_give_the_same_rows(many, tmp_path, fine):
         assert rows(other) == rows(many)
 
 
+@pytest.mark.long
 def test_merged_shards_are_the_catalogue_to_the_last_number(many, tmp_path, fine):
     parts = [tmp_path / f"{i}.sqlite" for i in (1, 2, 3)]
     for i, part in enumerate(parts, 1):

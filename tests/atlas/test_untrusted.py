@@ -234,7 +234,7 @@ def test_only_the_rows_that_are_shown_are_read(path, capsys):
             catalogue.sql("SELECT 1", limit=-1)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_questions_are_bounded_in_time_and_memory(path, capsys):
     assert main(["catalog", "query", str(path), "--sql", ENDLESS.format("COUNT(*)"), "--seconds", "0.2"]) == 2
     assert "takes more than 0.2 s: ask for less, or allow more seconds" in capsys.readouterr().err

@@ -120,13 +120,14 @@ def four_bar_runs():
     return model, start, found
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_four_bar_beside_scipy_at_equal_error(four_bar_runs, capsys, rtol):
     seconds, found = best_of(lambda: scipy_run(rtol))
     report(capsys, f"scipy DOP853 {rtol:g}", four_bar_runs[2], (abs(found.y[0, -1] - G1_END), seconds))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("step", [1e-3, 1e-4])
 def test_four_bar_beside_exudyn_at_equal_error(four_bar_runs, capsys, step):
     pytest.importorskip("exudyn")

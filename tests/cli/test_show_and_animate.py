@@ -161,6 +161,7 @@ def test_animate_every_eight_link_chain_and_inversion(
         assert said["accepted"] and said["closed"], (graph.key, said["statement"])
 
 
+@pytest.mark.long
 def test_animate_a_part_of_a_turn_says_why(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "rocker.toml"
     file.write_text(four_bar(2, 1, 1, 1).to_toml())

@@ -46,7 +46,7 @@ def test_drive_curves_show_every_run() -> None:
         drive_curves({})
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_resistance_picture_marks_the_criterion() -> None:
     effect = resistance_effect(DRIVE, [1.0, 5.0], simulate=True)
     figure = resistance_picture({"L = 0.2 H": effect})
@@ -85,6 +85,7 @@ def test_ripples_over_the_resistance(of: str) -> None:
         ripple_picture({"0.2 H": effect}, "torque")
 
 
+@pytest.mark.long
 def test_themed_svg_follows_the_page() -> None:
     study = DRIVE.inductance_study([0.0, 0.05], [1e-4, 1e-6])
     one, two = (themed_svg(reduction_picture(study)) for _ in range(2))

@@ -55,6 +55,7 @@ def test_what_has_no_plane_diagram_is_refused() -> None:
         graph_svg(MechanismGraph(4, loop, frame=0), driver=2)
 
 
+@pytest.mark.long
 def test_two_views_side_by_side_in_every_kind_of_file(tmp_path: Path) -> None:
     graph = eight(3).with_frame(0)
     sketch, pose = graph_sketch(graph)

@@ -85,7 +85,7 @@ def test_section_without_and_with_jamming():
         section_picture(Bearing(), (0.1,), exaggeration=math.nan)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_cylinders_in_space_without_and_with_jamming():
     from matplotlib.colors import to_rgb
 

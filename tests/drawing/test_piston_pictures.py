@@ -58,7 +58,7 @@ def test_the_piston_is_drawn_where_it_is():
         assert min(abs(complex(*pose[4, :2]) - centre) for centre in blocks) < 1e-12
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("machine", MACHINES.values(), ids=MACHINES)
 def test_charts_show_the_loads(machine):
     angle = np.linspace(0.0, 2.0 * np.pi, 721)

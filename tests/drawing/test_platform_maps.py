@@ -50,7 +50,7 @@ def test_loci_picture_has_a_panel_for_every_mode() -> None:
     assert "28.65°" in figure.get_suptitle()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("quantity", ["dexterity", "smallest", "velocity_max", "link_force", "reach"])
 def test_map_picture(quantity: str) -> None:
     found = platform_map(G1, 0.0, (1, 1, -1), nodes=60)

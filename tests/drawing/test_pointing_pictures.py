@@ -88,7 +88,7 @@ def test_tolerance_map_hatches_what_is_undecided():
     assert "[″]" in figure.axes[-1].get_ylabel()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_pictures_can_be_written():
     for figure in (pointing_picture(ART, 0.3, 0.2), tolerance_map_picture(ART, (1e-5,) * 5, span=0.3, nodes=2)):
         for kind in ("png", "svg"):

@@ -56,7 +56,7 @@ def test_friction_picture(motion):
     assert axes.get_xlabel() == "sliding velocity [mm/s]"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_failures_stay_in_the_pictures_of_errors():
     study = method_study(
         MODEL, 0.5, tolerances=[], steps=[1e-3, 1e-4], speeds=[1e-3, 1e-5], solvers=["DOP853"], most_calls=5000

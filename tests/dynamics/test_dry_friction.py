@@ -98,6 +98,7 @@ def test_a_block_above_its_friction_angle_turns_back(form):
     assert_complementary(motion)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("form", "method"), [*((form, "DOP853") for form in FORMS), ("augmented", "Radau"), ("augmented", "LSODA")]
 )
@@ -302,7 +303,7 @@ CASES = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("case", "form"), [("B", "augmented"), ("C", "augmented"), ("B", "partitioned")])
 def test_the_tribometer_as_a_general_model(case, form):
     """Final state to 1e-10, the same events, their times to 1e-9 s, with a bounded number of right-hand sides."""
@@ -320,6 +321,7 @@ def test_the_tribometer_as_a_general_model(case, form):
     assert motion.evaluations < 20_000
 
 
+@pytest.mark.long
 def test_an_event_storm_is_said():
     """A hard spring on a belt: it is released and caught 3000 times a second."""
     belt = Tribometer(law=TwoCoefficientLaw(0.40, 0.25), damping=0.0, stiffness=1e8, drive=BeltDrive(0.02))
@@ -389,7 +391,7 @@ def test_a_pulley_law_is_linear():
     assert motion.reactions.joints[-1].force[:, 0] == pytest.approx([mu * G] * 2, rel=1e-13)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_links_without_mass():
     """The rod and the turning of the slide weigh nothing: the limit of light ones, through dead centres and to rest."""
     friction = [JointFriction(0, 3, 0.2), JointFriction(0, 1, 0.2, radius=0.01)]

@@ -283,7 +283,7 @@ def driven_rocker(*elements):
 
 @pytest.mark.parametrize(
     ("form", "method"),
-    [("augmented", "DOP853"), pytest.param("augmented", "BDF", marks=pytest.mark.slow), ("partitioned", "DOP853")],
+    [("augmented", "DOP853"), pytest.param("augmented", "BDF", marks=pytest.mark.long), ("partitioned", "DOP853")],
 )
 def test_a_lock_under_prescribed_motion_is_called_one(form, method):
     model, pose = driven_rocker(Spring(0, 2, (0.0, 1.0), (0.1, 0.0), 1.0, 0.1))

@@ -112,7 +112,7 @@ def test_four_bar_with_a_dc_motor_by_hand(form):
 
 
 @pytest.mark.parametrize(
-    "method", ["DOP853", *(pytest.param(m, marks=pytest.mark.slow) for m in ("RK45", "Radau", "BDF")), "LSODA", "CVODE"]
+    "method", ["DOP853", *(pytest.param(m, marks=pytest.mark.long) for m in ("RK45", "Radau", "BDF")), "LSODA", "CVODE"]
 )
 @pytest.mark.parametrize("form", FORMS)
 def test_synchronous_motor_of_the_braider(form, method):
@@ -135,7 +135,7 @@ def test_synchronous_motor_of_the_braider(form, method):
     assert motion.checks.electric < (1e-12 if tight else 1e-6) and motion.checks.energy < (1e-12 if tight else 1e-6)
 
 
-@pytest.mark.parametrize("method", ["DOP853", pytest.param("Radau", marks=pytest.mark.slow), "LSODA"])
+@pytest.mark.parametrize("method", ["DOP853", pytest.param("Radau", marks=pytest.mark.long), "LSODA"])
 def test_voltage_limit_is_a_located_event(method):
     motor = replace(DC, voltage_limit=24.0)
     expected = MotorDrivenPlatform.source(motor).simulate([0.0, 0.6], rtol=1e-11)

@@ -124,6 +124,7 @@ def test_reactions_against_fifty_digits(links, seed):
     assert motion.checks.newton_euler < 1e-12 * max(1.0, 0.1 * start.condition)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("links", "seed"), CASES)
 def test_forms_agree_or_say_why(links, seed):
     """Random mechanisms soon meet folds and near-singular poses: what is returned agrees, or is a failure."""

@@ -10,7 +10,7 @@ from graphsynth.evidence.designs import hidden_task, nine_points
 from graphsynth.evidence.rows import Effort
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_nine_points_are_all_found_and_proved() -> None:
     """The counts are those of the literature: 36, 243 and 1442 (Wampler, Morgan and Sommese)."""
     problem = nine_points(None, Effort(quick=True))

@@ -76,6 +76,7 @@ def test_a_search_that_ends_with_its_start_box_has_no_result():
     assert first.status is RowStatus.FAILED and "start box" in first.reason
 
 
+@pytest.mark.long
 def test_coupled_joints_of_the_source():
     problem = lambda_problem(LambdaLinkage(), Bearing(), effort=QUICK)
     assert all(row.good for row in problem.rows)
@@ -230,6 +231,7 @@ def test_near_a_double_root_doubles_give_up_and_say_so():
     assert "right down to a distance 1e-13" in problem.sentences["sextic and Newton"]
 
 
+@pytest.mark.long
 def test_positions_of_a_four_bar():
     mechanism, closed = four_bar(LambdaLinkage())
     problem = position_problem(mechanism, "the lambda linkage", closed, effort=QUICK)

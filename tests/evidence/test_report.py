@@ -140,6 +140,7 @@ def test_table_holds_every_row_and_column(folder):
     assert list(frame_of([]).columns)[:2] == ["problem", "method"]
 
 
+@pytest.mark.long
 def test_document_is_json_without_nan(folder):
     text = (folder / "accuracy.json").read_text(encoding="utf-8")
     document = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} in the document"))
@@ -192,6 +193,7 @@ def test_failures_are_drawn_above_everything_that_has_an_error():
     assert np.asarray(lines[0].get_ydata()).min() > 0.0  # an error of zero is drawn at rounding size
 
 
+@pytest.mark.long
 def test_names_of_settings_keep_off_markers():
     """The end of one line lies among the markers of another, an eighth of an inch apart."""
     ends = [("a", 6.6e-4, 2.9e-4), ("a", 0.0109, 2.9e-5), ("a", 0.149, 2.9e-6)]

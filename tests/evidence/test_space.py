@@ -8,6 +8,7 @@ from graphsynth.evidence.space import space_problem
 from graphsynth.mechanism.four_bar import TiltedFourBar
 
 
+@pytest.mark.long
 def test_the_exact_factor_and_its_proofs_beside_small_tilts():
     problem = space_problem(TiltedFourBar(), 0.1, Effort(rounds=1, quick=True))
     assert problem.methods == ("small tilts", "least factor in space", "proofs in space")

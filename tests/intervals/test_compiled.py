@@ -10,7 +10,7 @@ from graphsynth.core.errors import IntervalError
 from graphsynth.intervals import Interval, Status, compiled_system, image, pave, pave_cells, pave_compiled
 from graphsynth.intervals.kernels import arithmetic as ia
 
-pytestmark = pytest.mark.slow  # numba compiles each system for seconds
+pytestmark = pytest.mark.long  # numba compiles each system for seconds
 ROOT = np.array([0.6180339887498949, 0.7861513777574233])
 MIRROR = ROOT * [1.0, -1.0]
 

@@ -189,7 +189,7 @@ PATCH = """
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_compiled_code_equals_the_uncompiled_source_to_the_bit():
     """The interpreter neither contracts nor reorders; so neither has the compiler, on any path of any kernel."""
     from pathlib import Path

@@ -274,6 +274,7 @@ def test_rim_area_against_the_direct_form(R, ratio, relative, beyond):
     close(area, float(exact), 1e-13 + 4e-15 * size / gap)
 
 
+@pytest.mark.long
 def test_steep_rim_uses_quadrature():
     bearing = Bearing(1.0, 1.6, 0.1)
     t = 1.2

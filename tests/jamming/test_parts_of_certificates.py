@@ -37,7 +37,7 @@ def gap_of_a_turn(l1, l2, l3, l4, z, rod):
     return min((least - abs(l4 - plan)).min(), (l4 + plan - distances.max(axis=0)).min())
 
 
-@pytest.mark.parametrize("rod", ["rigid", pytest.param("deck", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("rod", ["rigid", pytest.param("deck", marks=pytest.mark.long)])
 def test_a_free_turn_is_proved_only_where_it_is_free_in_any_unit(rod):
     """Any proportions with pins far out of the plane, many next to the border of one of the conditions."""
     rng, proved, refused = np.random.default_rng(2), 0, 0

@@ -165,6 +165,7 @@ def test_planet_around_a_fixed_sun() -> None:
         assert proof.certified and proof.closed == closes, (ratio, turns)
 
 
+@pytest.mark.long
 def test_close_to_a_change_point_the_gap_is_really_open() -> None:
     for excess in (1e-3, 1e-6, 1e-9, 1e-12):
         lengths = (3.0, 1.0, 2.0 + excess, 2.0)

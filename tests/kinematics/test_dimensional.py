@@ -92,6 +92,7 @@ def test_every_four_and_six_link_inversion_moves(links: int) -> None:
             recheck(embody(mechanism))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("index", [0, 5, 9, 15])  # dyads; triads; a triad with a dyad; one group of six links
 def test_eight_link_chains_move(index: int) -> None:
     recheck(embody(chains(8)[index]))

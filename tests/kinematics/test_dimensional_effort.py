@@ -103,6 +103,7 @@ def check_goals(effort: float, seed: int, aimed: bool) -> None:
         assert strip_width(segment) / stroke <= goals.target.tolerance * 1.02
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effort", [0.02, 0.3])
 def test_same_seed_same_bytes(effort: float) -> None:
     chain = next(iter(enumerate_chains(6)))

@@ -116,6 +116,7 @@ def test_timed_path_is_recovered(known: dict[str, np.ndarray]) -> None:
     assert np.abs(own - curve).max() < 1e-4
 
 
+@pytest.mark.long
 def test_poses_are_recovered(known: dict[str, np.ndarray]) -> None:
     poses = tuple((p.real, p.imag, t) for p, t in zip(known["z"], known["theta"]))
     target = PosesGoal(poses, tuple(known["inputs"]), tolerance=1e-6)
@@ -128,6 +129,7 @@ def test_poses_are_recovered(known: dict[str, np.ndarray]) -> None:
     assert np.abs(turned - (known["theta"] - known["theta"][0])).max() < 1e-5
 
 
+@pytest.mark.long
 def test_function_is_recovered(known: dict[str, np.ndarray]) -> None:
     target = FunctionGoal(tuple(known["inputs"]), tuple(known["output"]), tolerance=1e-6)
     found = embody(CYCLE, Goals(min_transmission_angle=LEAST, target=target), driver=1, tries=4)
@@ -153,7 +155,7 @@ def in_order(z: np.ndarray, goal: np.ndarray) -> float:
     return min(found)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_path_without_times_is_passed_in_order(known: dict[str, np.ndarray]) -> None:
     target = PathGoal(tuple((p.real, p.imag) for p in known["z"][:6]), tolerance=1e-3)
     found = embody(CYCLE, Goals(min_transmission_angle=LEAST, target=target), driver=1, tries=2)

@@ -116,7 +116,8 @@ def test_an_escape_to_infinity_is_told_and_located() -> None:
     assert "infinity" in event.statement
 
 
-@pytest.mark.parametrize("seed", [202, pytest.param(1141, marks=pytest.mark.slow), 1292, 1478])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [202, pytest.param(1141, marks=pytest.mark.long), 1292, 1478])
 def test_escapes_are_located_whatever_hangs_on_the_link(seed: int) -> None:
     """Larger groups, parallel guides, and groups that are lost before: against the poses on the way."""
     random = np.random.default_rng(seed)

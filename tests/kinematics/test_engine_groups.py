@@ -211,6 +211,7 @@ def test_rrr_batch() -> None:
         solve_rrr(A, B, 1.0, 1.0, 0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("index", range(0, 12, 3))
 def test_branch_does_not_depend_on_the_samples(index: int) -> None:
     """Fine, coarse and reversed inputs find the same branch, the same end and the same reason."""

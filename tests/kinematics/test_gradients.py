@@ -148,7 +148,7 @@ def test_every_dimension_to_the_last_digits(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["four-bar", "slider-crank", "planet", "slot", "cam", pytest.param("class III", marks=pytest.mark.slow)]
+    "name", ["four-bar", "slider-crank", "planet", "slot", "cam", pytest.param("class III", marks=pytest.mark.long)]
 )
 def test_rates_of_the_derivatives_to_ten_digits(name: str) -> None:
     """The derivative of a velocity by a dimension is the rate of the pose's, here from poses at two inputs nearby."""

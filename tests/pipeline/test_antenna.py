@@ -81,7 +81,7 @@ def test_no_zero_has_a_sign(report: Any) -> None:
     assert "-0" not in cells and not any(cell.startswith(("-0.000000000", "-0.0000 ")) for cell in cells)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_page(tmp_path: Any) -> None:
     scene = changed(
         "records", "tables", "mechanism_pictures", "animations", "plots",
@@ -96,6 +96,7 @@ def test_the_page(tmp_path: Any) -> None:
     assert (tmp_path / "results.csv").read_text("utf-8").count("\n") == 2
 
 
+@pytest.mark.long
 def test_an_antenna_that_folds() -> None:
     """Parallelogram legs fold at 69.39 degrees: the sweep stops there and says so, nothing is invented beyond."""
     scene = changed(
@@ -115,6 +116,7 @@ def test_an_antenna_that_folds() -> None:
     assert "folds" in report["animations"][0].caption
 
 
+@pytest.mark.long
 def test_an_antenna_whose_legs_do_not_reach() -> None:
     report = execute(changed(*SAID, lengths={"cardan_mm": 10, "crank_y_mm": 100, "crank_x_mm": 100}))
     (record,) = report["records"]

@@ -72,7 +72,7 @@ def test_the_answer_is_the_straightest_line() -> None:
     assert rank(Context(scene), records).numbers == (2, 1, 3)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_some_of_the_mechanisms(tmp_path: Path) -> None:
     report = run(drawn(load_scene("eight_link_search"), 2), out=tmp_path)
     check(report)

@@ -92,7 +92,7 @@ def test_a_mechanism_that_moves_badly_is_told_apart_from_one_that_does_not() -> 
     assert record.status == "rejected" and record.cause == "embody: moves, but the transmission angle is too small"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_sample_speaks_for_all(tmp_path: Path) -> None:
     scene = tables("worked_example")
     scene["structure"]["generate"] = {"sample": 6, "limit": 6}

@@ -38,7 +38,7 @@ def changed(tables: dict[str, Any], *products: str, **mechanism: Any) -> Scene:
     return Scene.from_mapping(found, "x.toml")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_both_machines_are_assessed(report: Any) -> None:
     records = report["records"]
     assert [record.status for record in records] == ["assessed", "assessed"]
@@ -63,6 +63,7 @@ def test_both_machines_are_assessed(report: Any) -> None:
     assert slider["static friction of the slot"] == pytest.approx(0.08 * 3665.0, rel=0.02)
 
 
+@pytest.mark.long
 def test_figures_of_the_explanation(report: Any) -> None:
     """docs/explanation/floating-piston.md quotes these."""
     slider, yoke = (turn.found for turn in report["turns"])
@@ -109,6 +110,7 @@ def test_the_whole_scene_writes_its_report(tmp_path: Any) -> None:
     assert (tmp_path / "results.csv").read_text("utf-8").count("\n") == 3
 
 
+@pytest.mark.long
 def test_a_constant_force_and_one_kind(tables: dict[str, Any]) -> None:
     own = copy.deepcopy(tables)
     for key in ("gas", "masses", "friction", "group"):
@@ -177,7 +179,7 @@ print(",".join(sorted({m.partition(".")[0] for m in set(sys.modules) - before} -
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("product", "allowed"), [("solutions", set()), ("mechanism_pictures", {"numpy"}), ("loops", {"numpy"})]
 )

@@ -168,6 +168,7 @@ def test_bearings_against_the_coupled_assessment(tmp_path: Path) -> None:
     assert "estimated" in report["records"][0].verdict
 
 
+@pytest.mark.long
 def test_certified_bearings_free_jammed_and_out_of_budget(tmp_path: Path) -> None:
     spread = {"clearance_tolerance": "1 um", "length_tolerance": "0.001 %", "certify": True}
     free = execute(scene(tmp_path, ["records"], bearings={**BEARINGS, **spread, "alpha_deg": 0.1}))["records"][0]

@@ -47,7 +47,7 @@ PRINTED = [
 ]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_ripples_are_the_printed_ones(report: Any) -> None:
     for effect, expected in zip(report["claim"].effects.values(), PRINTED, strict=True):
         speeds = [s for s, _ in expected]
@@ -61,7 +61,7 @@ def test_ripples_are_the_printed_ones(report: Any) -> None:
     assert [row[3] for row in table.rows] == ["rises, then falls", "rises", "rises", "falls, then rises"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_resistances_behave_as_the_source_says(report: Any) -> None:
     first, second = report["records"]
     one, two = ({m.name: m for m in record.margins} for record in (first, second))

@@ -237,7 +237,7 @@ def test_a_candidate_that_fails_is_recorded_with_its_reason(lambda_tables: dict[
     assert report["tables"] == () and report["plots"] == () and report["mechanism_pictures"] == ()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_crank_that_cannot_turn_fully_is_assessed_and_drawn(lambda_tables: dict[str, Any]) -> None:
     lambda_tables["mechanism"]["lengths"] = {"frame": 2, "crank": 1, "coupler": 1, "rocker": 1}
     report = execute(Scene.from_mapping(lambda_tables))

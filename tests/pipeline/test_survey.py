@@ -243,6 +243,7 @@ def test_a_margin_at_its_limit_is_kept() -> None:
         assert execute(Scene.from_mapping(found))["ranking"].ranked == 1
 
 
+@pytest.mark.long
 def test_certificates_agree_with_the_closed_form_and_hold_the_tolerances() -> None:
     scene = small(limits={"transmission_deg": 20, "free": False}, tolerances={})
     report = execute(replace(scene, outputs=replace(scene.outputs, products=("records", "survey"))))
@@ -412,6 +413,7 @@ def test_an_unknown_objective_is_named() -> None:
         execute(Scene.from_mapping(found))
 
 
+@pytest.mark.long
 def test_pictures_show_the_maps_and_the_best() -> None:
     scene = small()
     products = ("plots", "mechanism_pictures", "animations")

@@ -88,7 +88,7 @@ def test_methods_keep_failures(report: Any) -> None:
     assert float(own[-1][2]) < 1e-12
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_page(tmp_path: Any) -> None:
     run(changed("records", "tables", "mechanism_pictures", "animations", "plots"), out=tmp_path)
     page = (tmp_path / "report.html").read_text("utf-8")
@@ -109,7 +109,7 @@ def test_exact_belt_cycle() -> None:
     assert refused and all(row[6] == "failed" and "two-coefficient" in row[7] for row in refused)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_event_storm_is_said() -> None:
     platform = {"mass_kg": 1, "stiffness_N_per_m": 4e8, "damping_N_s_per_m": 2}
     report = execute(changed(*SAID, "plots", "animations", platform=platform, run={"duration_s": 2, "samples": 401}))

@@ -119,6 +119,7 @@ def test_every_mechanism_answers_the_question_once(question):
         )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("links", "mobility", "options"),
     [c for c in CHAINS if c[0] <= 9 and not {"space", "fractionated"} & set(c[2])] + [(10, 1, {})],
@@ -258,6 +259,7 @@ def _atoms(piece):
     return [(piece.family, graph) for graph in range(piece.start, piece.stop)]
 
 
+@pytest.mark.long
 @EXACT
 @given(st.integers(0, len(PROBLEMS) - 1), st.integers(1, 40))
 def test_shards_one_after_the_other_are_the_whole(at, shards):

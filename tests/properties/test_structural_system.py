@@ -130,7 +130,7 @@ def expected(question, spaces, options):
     return oracle(question, spaces, options["fractionated"], options["max_joint_mobility"], most_joints)
 
 
-@pytest.mark.parametrize("examples", [20, pytest.param(1500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("examples", [20, pytest.param(1500, marks=pytest.mark.long)])
 def test_all_solutions_and_no_others_in_the_stated_order(examples):
     settings(max_examples=examples, deadline=None)(given(questions())(compare))()
 
@@ -173,6 +173,7 @@ def test_every_solution_satisfies_the_eight_equations(mobility, moving, space, m
         check_eight_equations(solution)
 
 
+@pytest.mark.long
 @settings(max_examples=60, deadline=None)
 @given(questions())
 def test_a_contradiction_is_true_and_speaks_only_of_what_was_said(case):

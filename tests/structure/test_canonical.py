@@ -114,7 +114,7 @@ SYMMETRIC = {
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow if name == "PG(2,5)" else ()) for name in SYMMETRIC]
+    "name", [pytest.param(name, marks=pytest.mark.long if name == "PG(2,5)" else ()) for name in SYMMETRIC]
 )
 def test_symmetric_graphs(name):
     graph, order = SYMMETRIC[name]
@@ -315,7 +315,7 @@ def test_keys_tell_frame_mobility_and_space_apart():
         assert MechanismGraph.from_key(graph.key) == graph.canonical()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_more_links_than_the_kernel_takes():
     for graph, order in (
         (nx.cycle_graph(255), 510),

@@ -90,7 +90,7 @@ def test_the_largest_graphs_of_links_alike_have_a_key(graph: nx.Graph, order: in
     assert turned.key == key and MechanismGraph.from_key(key).key == key
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_graph_too_symmetric_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     parts = MechanismGraph(80, [(k, k + 1) for k in range(0, 80, 2)])
     key = parts.key

@@ -90,6 +90,7 @@ def test_every_graph_is_what_it_should_be(loops):
         assert all(k == 2 or nx.is_biconnected(nx.from_numpy_array(mult > 0)) for mult in mults)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("loops", [2, 3, 4, 5, 6, 7, pytest.param(8, marks=pytest.mark.slow)])
 def test_the_generator_reproduces_the_shipped_file(loops):
     shipped = files("graphsynth.synthesis").joinpath("data", f"contracted-{loops}.xz").read_bytes()
@@ -117,7 +118,7 @@ def test_same_as_geng_and_multig(loops):
         assert trivial == dict(numbers("trivial_group"))[loops]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("loops", "count"), numbers("trivial_group"))
 def test_trivial_groups(loops, count):
     assert sum(_is_asymmetric(mult) for _, mults in layers(loops) for mult in mults) == count

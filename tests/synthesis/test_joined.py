@@ -21,6 +21,7 @@ SMALL = [
 ]  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("question", SMALL, ids=str)
 def test_the_listing_has_as_many(question):
     """Listed by canonical augmentation, which shares no arithmetic with the count."""

@@ -31,6 +31,7 @@ def test_the_estimate_is_near_what_is_known(question, known):
     assert known / 1.3 < extrapolated(*question) < 1.3 * known
 
 
+@pytest.mark.long
 def test_estimates_of_trusses_and_of_frames():
     assert 0.7 < extrapolated(7, 15, 0, 3, {}) / count_baranov_trusses(15) < 1.3
     assert 0.7 < extrapolated(7, 16, 1, 3, {}, framed=True) / 308_823_067 < 1.3  # counted once

@@ -65,7 +65,7 @@ def test_chains(row):
 def listed():
     found = [row for row in rows("chains") if row.values[0]["count"] < 10_000]
     return [
-        pytest.param(*row.values, id=row.id, marks=pytest.mark.slow if row.values[0]["count"] > 1_000 else row.marks)
+        pytest.param(*row.values, id=row.id, marks=pytest.mark.long if row.values[0]["count"] > 1_000 else row.marks)
         for row in found
     ]
 
@@ -139,6 +139,7 @@ def test_worked_example_of_the_figure():
     assert count_mechanisms(example("figure_3")) == EXAMPLE["figure_3"]["count"]
 
 
+@pytest.mark.long
 def test_threefold_mechanisms_of_the_figure():
     threefold = list(enumerate_mechanisms(example("figure_3"), symmetry=3))
     keys = {g.key for g in threefold}

@@ -82,6 +82,7 @@ def has_no_symmetry(mult):
     return sum(1 for _ in islice(found, 2)) == 1
 
 
+@pytest.mark.long
 def test_the_estimate_is_what_is_visited():
     """By listing every contracted graph; without symmetry every labelling is met, and the number is exact."""
     for family in FOURTEEN.families:
@@ -123,7 +124,7 @@ def test_lines_of_shards():
     assert sum(lines) == 318162 and spread(lines) < 1.6
 
 
-@pytest.mark.parametrize("shards", [1, 5, 32, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("shards", [1, 5, 32, pytest.param(100, marks=pytest.mark.long)])
 def test_counts_of_shards(shards):
     found = cuts(FOURTEEN, shards, listing=False)
     assert sum(piece.count() for shard in found for piece in shard) == 318162

@@ -314,6 +314,7 @@ def test_members_are_members(pair):
     assert high == math.inf or member <= Fraction(high)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "corner",
     [
@@ -342,6 +343,7 @@ def test_platforms_are_general_or_symmetric(platform):
     assert min(*platform.l1, *platform.l2) >= 0.05
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "corner",
     [

@@ -279,6 +279,7 @@ def test_a_dyad_that_some_member_cannot_close_is_not_proved():
             assert tubes.dyads[0, 0, 0].contains((1.6 + a) ** 2 / 9.0 - share**2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("sizes", "signs"), [((2, 1, 1.6, 1.45), (1, 1, -1, -1)), ((2, 1, 2.5, 1.55), (-1, 1, 1, -1))])
 def test_a_member_that_does_not_turn_fully_is_named(sizes, signs):
     """Near the verge: stretched, coupler and rocker do not reach; folded, the coupler is too long."""
@@ -421,6 +422,7 @@ def test_no_member_contradicts_a_proof(seed):
             assert (factor[inside] >= found.lower[place][inside] * (1 - 1e-9)).all()
 
 
+@pytest.mark.long
 def test_lengths_that_grow_together_are_one_parameter():
     """One material: a temperature scales the whole linkage, and no tilt is lost; two materials do lose some."""
     motion = simulate(LAMBDA, TURN)
@@ -460,6 +462,7 @@ def test_a_pin_in_a_hole_has_no_less_than_both_contacts_allow():
     assert own.tilt_range[0] == pytest.approx(min(larger), rel=1e-6) and own.tilt_range[0] <= min(larger)
 
 
+@pytest.mark.long
 def test_fits_stand_for_the_limits_of_their_joints():
     fits = [FitClearance(pair, "35 H8/e8", 10.0) for pair in ((1, 2), (2, 3), (0, 3))]
     motion = simulate(LAMBDA, TURN)

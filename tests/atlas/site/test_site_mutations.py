@@ -320,6 +320,7 @@ def memory():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000
 
 
+@pytest.mark.long
 def test_mutants(right, altered, tmp_path, monkeypatch):
     """A fixed few."""
     faults, statuses, _ = campaign(right, altered, tmp_path, monkeypatch, range(16))

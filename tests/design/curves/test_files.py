@@ -32,7 +32,7 @@ def bytes_of(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="has no SIGKILL")
 def test_a_killed_build_goes_on_to_the_same_bytes(index: CurveIndex, tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", KILLED.format(signal=int(signal.SIGKILL)), str(tmp_path)], check=False)
@@ -51,14 +51,14 @@ def test_a_killed_build_goes_on_to_the_same_bytes(index: CurveIndex, tmp_path: P
     assert bytes_of(tmp_path) == bytes_of(index.folder)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_workers_write_the_same_bytes(index: CurveIndex, tmp_path: Path) -> None:
     with processes(2) as executor:
         build(tmp_path, 3000, links=[4, 6], sliders=1, executor=executor)
     assert bytes_of(tmp_path) == bytes_of(index.folder)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_no_curve_is_drawn_twice(index: CurveIndex) -> None:
     (shard,) = index.shards
     assert len(np.unique(shard.columns["mechanism"]["point"], axis=0)) == 3000
@@ -67,7 +67,7 @@ def test_no_curve_is_drawn_twice(index: CurveIndex) -> None:
     assert len(set(parts)) == 3 and make_piece(piece)["arc"].tobytes() == parts[0]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_shards_hold_the_rows_of_the_whole(index: CurveIndex, tmp_path: Path) -> None:
     build(tmp_path, 3000, links=[4, 6], sliders=1, shard=(2, 2))
     with pytest.raises(FormatError, match="1 of 2 shards"):

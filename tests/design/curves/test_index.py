@@ -41,6 +41,7 @@ def test_curves_of_the_index_are_found(index: CurveIndex) -> None:
         assert best.error < 2e-3
 
 
+@pytest.mark.long
 def test_what_is_found_draws_the_wanted_curve(index: CurveIndex) -> None:
     random = np.random.default_rng(2)
     seen = set()
@@ -69,7 +70,7 @@ def test_what_is_found_draws_the_wanted_curve(index: CurveIndex) -> None:
     assert len(seen) >= 4
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_motions_are_found_by_any_point_of_the_link(index: CurveIndex) -> None:
     random = np.random.default_rng(8)
     right = 0

@@ -26,6 +26,7 @@ def test_linkages_satisfy_them_and_others_do_not(plant):
         assert np.abs(value(other, p, p.conj())).max() > 1e-6
 
 
+@pytest.mark.long
 def test_slopes_are_derivatives():
     symbols = sympy.symbols("a A x X b B y Y")
     p, q = sympy.symbols("p q")
@@ -34,7 +35,7 @@ def test_slopes_are_derivatives():
         assert sympy.expand(sympy.diff(expression, symbol) - slope) == 0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("pivots", [0, 1, 2])
 def test_kernel_agrees(pivots):
     rng = np.random.default_rng(pivots)
@@ -59,7 +60,7 @@ def test_kernel_agrees(pivots):
     assert np.abs(M - np.stack(numbers, axis=1)).max() < 1e-6 * np.abs(M).max()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_solution_of_linear_systems():
     rng = np.random.default_rng(5)
     A, b = generic(rng, 6, 6), generic(rng, 6, 2)

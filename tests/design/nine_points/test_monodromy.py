@@ -35,7 +35,7 @@ def test_turned_roots_are_roots():
     assert np.abs(follow(start, start.end) - start.z).max() < 1e-9
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_made_again_and_after_an_interruption(tmp_path, capsys, monkeypatch):
     out, work = tmp_path / "starts.npz", tmp_path / "work.npz"
     monodromy.main(["--pivots", "2", "--out", str(out)])
@@ -60,6 +60,7 @@ def test_made_again_and_after_an_interruption(tmp_path, capsys, monkeypatch):
         assert data["z_2"].tobytes() == whole.z.tobytes()
 
 
+@pytest.mark.long
 def test_trace():
     """Sum over all roots of a curve's sections is linear, and not without one of them."""
     found = monodromy.trace(shipped(2), (1, 2))

@@ -29,7 +29,7 @@ def problem_3():
     return four_bars_through(PROBLEM_3)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_counts_of_the_literature(problem_3):
     assert (problem_3.certified, problem_3.expected, len(problem_3.linkages)) == (1442, 1442, 64)
     assert problem_3.complete
@@ -58,6 +58,7 @@ def closing(a, b, c, d, p0, p):
     return min(abs(abs(joint - b) - abs(d - b)) for joint in joints) / abs(d - b)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("count", "pivots", "expected"), [(7, 1, 243), (5, 2, 36)])
 def test_given_pivots(plant, count, pivots, expected):
     for seed in range(3):
@@ -82,6 +83,7 @@ def in_order(plant):
     return linkage, four_bars_through(linkage.points)
 
 
+@pytest.mark.long
 def test_a_crank_rocker_is_found_without_defects(in_order):
     linkage, found = in_order
     assert found.complete and linkage.among(found.without_defects)

@@ -78,6 +78,7 @@ def test_the_three_curves_are_one_in_rational_numbers():
     assert wrong(spots[1]) * first[0][0] != wrong(spots[0]) * first[0][1]
 
 
+@pytest.mark.long
 def test_equal_sextics_by_elimination():
     linkage = gs.Mechanism.four_bar(2, 1, 2.5, 2.5, coupler_point=(1.5, 0.0))
     curves = [one.coupler_curve("P").equation.monic() for one in mechanisms(linkage)]
@@ -252,7 +253,7 @@ def test_a_function_is_kept():
     assert np.abs(moved.poses[0, 1, :2] - (-3.0, 1.0)).max() < 1e-12
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_eight_links():
     """One dyad more on a Stephenson III six-bar: its links may be exchanged too."""
     joints = [*STEPHENSON, (0, 6), (6, 7), (5, 7)]

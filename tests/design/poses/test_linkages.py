@@ -72,7 +72,7 @@ def test_a_dead_point_between_is_a_branch_defect_unless_the_other_link_drives():
     assert "branch" in driven_at_rocker.defects and "circuit" not in driven_at_rocker.defects
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_judgement_agrees_with_the_motion():
     """No defect exactly where the simulated body comes to all poses in their order."""
     rng = np.random.default_rng(12)

@@ -225,6 +225,7 @@ def test_the_largest_error_is_made_small_in_the_end() -> None:
     assert (after**2).sum() > (before**2).sum()  # which least squares had made small
 
 
+@pytest.mark.long
 def test_two_targets_at_once_share_one_mechanism() -> None:
     """A timed path and the rocker's angle of the same hidden four-bar; each alone leaves more freedom."""
     motion = hidden()

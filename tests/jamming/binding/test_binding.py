@@ -193,7 +193,7 @@ def by_bodies(
     )
 
 
-@pytest.mark.parametrize("kind", ["four-bar", "slider", pytest.param("six-bar", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["four-bar", "slider", pytest.param("six-bar", marks=pytest.mark.long)])
 def test_energy_of_bodies(kind: str) -> None:
     """Random limits and stiffness; the energy over all tilts and heights of bodies is the same."""
     random = np.random.default_rng(len(kind))
@@ -375,6 +375,7 @@ def test_stiffness_over_nine_decades() -> None:
     np.testing.assert_allclose(a.energy, b.energy, rtol=1e-6, atol=1e-12)
 
 
+@pytest.mark.long
 def test_programs_against_projected_gradients() -> None:
     """Random programs with a third of the limits zero or infinite."""
     random = np.random.default_rng(5)

@@ -69,6 +69,7 @@ def test_no_dearer_than_an_exhaustive_search(allowed: float, listed: int, monkey
     assert len(repr(found).splitlines()) <= 10
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("machine", "allowed", "members"),
     [

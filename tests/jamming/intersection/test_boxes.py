@@ -288,7 +288,7 @@ def test_bounds_of_quotients_are_the_tightest(top, bottom, shift):
     assert low == high or math.nextafter(low, math.inf) == high
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @settings(max_examples=25, deadline=None)
 @given(
     st.lists(st.fractions(F("0.01"), 3, max_denominator=10**6), min_size=4, max_size=4),

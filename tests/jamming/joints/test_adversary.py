@@ -100,6 +100,7 @@ def attack(make, links, rng, count):
     return outcome
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("make", [anywhere, turning])
 def test_no_false_certificate(make):
     """Exact judge at a few positions of 4, 6 and 8 links; thousands in the slow test."""

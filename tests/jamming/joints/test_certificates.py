@@ -204,7 +204,7 @@ def test_a_box_around_the_float_alone_is_not_that_of_the_motion(monkeypatch):
     assert not of_the_motion(work, pieces._replace(proved=np.array([False]))).own.any()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_whole_turn_of_the_lambda_linkage():
     """Free up to 2 t_A, jammed above, undecided at it; within alpha squared of it by small tilts only.
 
@@ -280,6 +280,7 @@ def test_tolerances_within_which_all_are_free_or_all_jam():
     assert certify_coupled(motion, fit, Misalignment(0, 1, 0.0134)).verdict.name == "CERTIFIED_JAMMED"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("fit", "alpha", "alpha_range", "tolerance"),
     [
@@ -384,6 +385,7 @@ def slide_driven():
     return Mechanism(graph, joints, [Driver(0, 1)])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("make", "low", "high"),
     [

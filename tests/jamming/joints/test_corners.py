@@ -98,6 +98,7 @@ def test_many_boxes_fall_back_to_intervals():
     assert corner_layouts(large) == (large,)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("turn", [np.linspace(0.6, 0.8, 3), pytest.param(TURN, marks=pytest.mark.slow)])
 def test_any_direction(turn):
     """A tilt up to alpha in a direction nobody knows: proved free up to one percent below the worst direction."""

@@ -124,6 +124,7 @@ def joint_limits(limits, scale=1.0):
     return {pair: JointLimits(t * scale, s * scale) for pair, (t, s) in limits.items() if pair != (0, 1)}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 12))])
 @pytest.mark.parametrize("kind", ["bearings", "spherical", "rigid"])
 def test_links_placed_in_space_agree(kind, seed):
@@ -239,6 +240,7 @@ def slider_and_four_bar():
     yield four_bar(), bearings, Misalignment(0, 1, 0.03, 0.3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("part", ["r", "e", "d"])
 def test_bounds_hold_for_every_disturbance_within(part):
     """Positions, guides and misalignments moved by what is allowed: the factor of none lies beyond the bounds."""

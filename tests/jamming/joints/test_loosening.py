@@ -85,7 +85,7 @@ def test_bad_growth(by, inputs, text):
         compare_sensitivities(simulate(four_bar(), inputs), Bearing(), Misalignment(0, 1, 0.01), by=by)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_pictures(eight, tmp_path):
     motion, limits, tilt = eight
     report = assess_coupled(motion, limits, tilt)

@@ -387,7 +387,7 @@ def extent(R, half, hole, tilt):
     return R * c + half * s if half * c - R * s <= hole else (R + hole * s) / c
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_range_of_the_general_pin_is_proved():
     """No pin within tolerance jams below the range, every one jams above it: 50 digits, 400 random pins."""
     rng = np.random.default_rng(6)

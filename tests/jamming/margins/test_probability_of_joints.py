@@ -87,7 +87,7 @@ def test_sampled_margins_are_those_of_members(name: str) -> None:
         assert abs(true) < 0.05
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_point_is_a_plain_verdict() -> None:
     margin = four_bar("85..95 deg", tolerances=())
     given = {name: Distribution("uniform", Range(own.lower, own.lower)) for name, own in margin.ranges.items()}

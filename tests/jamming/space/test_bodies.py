@@ -60,7 +60,7 @@ def whole(bodies, u, by, pairs):
     return value, by @ here.J.mid[0] + sum(w * s.mid[0] for w, (_, s) in own), here
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("number", range(4))
 def test_derivatives_are_those_of_differences(number):
     rng = np.random.default_rng(number)

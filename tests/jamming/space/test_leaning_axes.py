@@ -49,6 +49,7 @@ def members(parts, limits, tilt, u=1.3):
     return Members(problem(motion.mechanism, bearings, axes), motion, box)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("axis", "limit", "verdict"),
                          [((2, 3), 1.005 * (TILT + ANGLE), FREE), ((2, 3), 0.995 * (TILT + ANGLE), SOME),
                           ((3, 2), 1.02 * (TILT + ANGLE), FREE),

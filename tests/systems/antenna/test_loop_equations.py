@@ -148,6 +148,7 @@ def test_printed_and_corrected_equations_from_zero(every):
     assert ART.solve_loops(phi, phi, start=np.zeros(12)).genuine.all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("order", ORDERS)
 def test_false_orientation_roots_are_rejected_and_counted(order):
     mechanism = PointingMechanism(order=order)

@@ -148,7 +148,7 @@ def general_state(braider, run, k):
     return motion.accelerations[0, :, 2], np.array(list(joints))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_start_up_of_the_general_model(start_up):
     """The specification's start-up a second time: the planar model with its motor, integrated in every form."""
     expected = read(TRANSIENT)

@@ -166,6 +166,7 @@ def test_massless_plain_slider_is_the_textbook():
     assert np.abs(floating.slot + 700.0).max() < 1e-10
 
 
+@pytest.mark.long
 def test_largest_side_load_of_the_plain_machine():
     machine = PistonMachine(FloatingPiston(CrankSlider(0.05, 0.2, 0.01)), gas=ConstantForce(1000.0))
     found = compare_pistons(machine)
@@ -186,6 +187,7 @@ def test_square_error_of_the_slot(error, turn, phi, load):
     assert abs(abs(loads.slot[0]) - load / math.cos(error)) < 1e-11 * load
 
 
+@pytest.mark.long
 def test_break_even_is_the_steepest_angle_of_the_rod():
     plain = PistonMachine(FloatingPiston.crank_slider(0.05, 0.2), gas=ConstantForce(1000.0))
     limit = compare_pistons(plain).squareness
@@ -255,7 +257,7 @@ def test_static_friction_in_a_slot_that_stands_still():
     assert "may add" in compare_pistons(square).statement
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("machine", [m for m in MACHINES.values() if not m.acceleration],
                          ids=[n for n, m in MACHINES.items() if not m.acceleration])  # fmt: skip
 def test_energy_over_a_turn(machine):
@@ -267,6 +269,7 @@ def test_energy_over_a_turn(machine):
         assert turn.friction > 0.0 or own.friction == PistonFriction()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("slack", [1e-2, 1e-4, 1e-6])
 def test_energy_with_a_rod_that_is_hardly_long_enough(slack):
     mechanism = FloatingPiston.crank_slider(0.05, 0.06 * (1.0 + slack), 0.01, cylinder_angle=0.1)
@@ -278,7 +281,7 @@ def test_energy_with_a_rod_that_is_hardly_long_enough(slack):
     assert abs(turn.gas - turn.gas_closed_form) < 1e-9 * turn.gas
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_works_against_another_quadrature():
     """The trapezoidal rule of a periodic function, with a friction law so soft that few points are enough."""
     machine = replace(MACHINES["askew"], friction=replace(RUB, smoothing_velocity=1.0), gas=ConstantForce(500.0))
@@ -290,6 +293,7 @@ def test_works_against_another_quadrature():
         assert power.mean() * 2.0 * math.pi / machine.speed == pytest.approx(own, rel=1e-7)
 
 
+@pytest.mark.long
 def test_friction_falls_when_the_guide_is_better_than_the_wall():
     found = compare_pistons(MACHINES["square"])
     rings_only = piston_turn(replace(MACHINES["square"].without_group(), friction=PistonFriction(rings=20.0)))
@@ -342,7 +346,7 @@ def test_given_force():
     assert machine.loads([1.0, 2.0]).power_error < 1e-12
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_free_motion_of_the_model():
     """The general dynamics keeps the crank's speed under the motor torque of the closed form."""
     from graphsynth.dynamics import Torque, simulate_dynamics

@@ -264,6 +264,7 @@ COORDINATE = st.integers(-4, 4)
 POINTS = st.lists(st.tuples(COORDINATE, COORDINATE), min_size=3, max_size=3)
 
 
+@pytest.mark.long
 @given(POINTS, POINTS, st.lists(st.integers(1, 6), min_size=3, max_size=3))
 @settings(max_examples=150, deadline=None)
 def test_small_integers_are_decided_the_same_in_two_ways(
@@ -363,7 +364,7 @@ def circle_roots(A: list[Any], b: list[Any], lengths: list[Any]) -> list[tuple[m
     return sorted((mp.arg(z), k) for z, k in found)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=12, deadline=None)
 def test_random_platforms_agree_with_two_hundred_digits(seed: int) -> None:

@@ -35,6 +35,7 @@ def circle(a, b):
 # --- inverse problem --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_sum_of_two_products_that_cancel_keeps_its_digits():
     """``a b + c d`` to a rounding or two of the result, and to the square of a rounding of the products."""
     rng = np.random.default_rng(3)
@@ -74,6 +75,7 @@ def test_extreme_legs_of_section_14_2(l1, l2, u, v):
         assert circle(theta, exact).max() <= 4.5e-16
 
 
+@pytest.mark.long
 @settings(max_examples=200, deadline=None)
 @given(
     st.floats(-6, 6), st.floats(-6, 6), st.floats(1e-90, 1), st.floats(-math.pi, math.pi), st.sampled_from((1, -1)),

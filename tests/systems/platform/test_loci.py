@@ -34,6 +34,7 @@ def loci(request: pytest.FixtureRequest) -> tuple[ParallelPlatform, SingularLoci
     return platform, singular_loci(platform, alpha, nodes=80)
 
 
+@pytest.mark.long
 def test_points_are_singular_poses_of_their_mode(loci: tuple[ParallelPlatform, SingularLoci]) -> None:
     """Substituted in the inverse problem and the Jacobian of the platform, away from the ends."""
     platform, found = loci

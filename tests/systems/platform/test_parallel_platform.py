@@ -226,6 +226,7 @@ def test_special_legs(l1, l2, u, v, status):
             assert mp.mpf(0.6) ** 2 + mp.mpf(0.8) ** 2 > 1
 
 
+@pytest.mark.long
 @settings(max_examples=300, deadline=None)
 @given(
     st.floats(-6, 6), st.floats(-6, 6), st.floats(1e-90, 1), st.floats(-math.pi, math.pi), st.sampled_from((1, -1)),

@@ -48,6 +48,7 @@ def test_general_engine_gives_the_same_motion(source: SingleMotorPlatform) -> No
     assert np.allclose(motion.velocities[:, 1, 2], 1.0 / source.gears.ratio, atol=1e-13)
 
 
+@pytest.mark.long
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.0, 6.28))
 def test_all_joints_close_and_the_rank_is_full(psi: float) -> None:

@@ -62,6 +62,7 @@ def test_stribeck_law_with_crank(crank):
     assert crank.error < 1e-12
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("factor", printed.STIFF)
 def test_stiff_springs(factor):
     model = CRANK.stiffened(factor)
@@ -146,7 +147,7 @@ def test_tie_between_stick_and_slip_is_flagged():
     assert "rounding" in motion.statement
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_storm_of_a_very_stiff_undamped_spring():
     motion = CRANK.stiffened(1e6, scaled_damping=False).event_driven(2.0, estimate=False)
     assert motion.status is RunStatus.STORM

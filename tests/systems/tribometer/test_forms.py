@@ -57,7 +57,7 @@ def test_error_against_regularisation_speed(exact, speed, solver):
     assert forms.model_error(speed) == pytest.approx(error, rel=0.5)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_unreliable_success_is_found_out(exact):
     """LSODA reports success at 1e-7 with an error far above that of the form."""
     motion = CRANK.regularised(10.0, speed=1e-7, solver="LSODA", times=TIMES)
@@ -109,7 +109,7 @@ def test_study_keeps_failures():
     assert np.isnan(table["error"][1])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_tolerances_against_more_digits():
     from graphsynth.systems.tribometer.precise import precise_motion
 

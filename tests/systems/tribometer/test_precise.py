@@ -67,7 +67,7 @@ def test_automaton_against_more_digits_with_crank():
         assert event.position == pytest.approx(x, abs=2.1e-14, rel=0)  # printed to about 1e-14
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     "model",
     [

@@ -77,6 +77,7 @@ def test_reference_point_of_the_specification():
     assert 0.5e6 * float(inertia.derivative(math.pi / 2)) == pytest.approx(6.2006475694504331, rel=1e-12)
 
 
+@pytest.mark.long
 def test_real_geometry_with_and_without_rotor():
     motor = DCMotor(10.0, 1.0, 0.1, 0.1, 20.0, 20.0)
     times = [0.0, 0.2, 0.4]

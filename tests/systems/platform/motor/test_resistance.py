@@ -27,7 +27,7 @@ def drive(inductance, demanded):
     return MotorDrivenPlatform.source(DCMotor(1.0, inductance, 0.1, 0.1, 20.0, demanded))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("case", TABLE)
 def test_table_of_ripples(case):
     ratio, speed, current = TABLE[case]
