@@ -11,6 +11,11 @@ import pytest
 from _pytest.doctest import DoctestModule
 
 _PACKAGE = Path(__file__).parent / "graphsynth"
+#: Examples of docstrings that take a second or more of a processor.
+_LONG = {
+    "graphsynth.intervals.cells.pave_compiled", "graphsynth.jamming.questions.largest_scale",
+    "graphsynth.jamming.space.scale.largest_scale", "graphsynth.jamming.space.scale.least_factor",
+}  # fmt: skip
 
 
 @pytest.hookimpl(wrapper=True)
@@ -48,5 +53,8 @@ def pytest_make_collect_report(collector: pytest.Collector) -> Generator[None, p
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """All workers must have the same order."""
+    """All workers must have the same order; long examples of docstrings are marked."""
     items.sort(key=lambda item: item.path)
+    for item in items:
+        if item.name in _LONG:
+            item.add_marker("long")

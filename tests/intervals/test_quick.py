@@ -169,9 +169,7 @@ def test_extrema_are_counted_as_by_the_function_of_double_doubles(turn, monkeypa
             assert p <= min(values) and max(values) <= q
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name == "sin" else pytest.mark.long) for name in NAMES]
-)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.long) for name in NAMES])
 def test_scalar_kernels_give_the_bits_of_the_loops(name):
     from graphsynth.intervals.kernels import exponential, inverse
 

@@ -12,7 +12,15 @@ from graphsynth.evidence.stress import CaseStatus, run_case, stress_cases
 PAGE = Path(__file__).parents[3] / "docs" / "explanation" / "stress.md"
 ROW = re.compile(r"^\| `([a-z]+-[\d.]+)` .* \| (\w+)(?:, slow)? \|$", re.MULTILINE)
 SAID = dict(ROW.findall(PAGE.read_text(encoding="utf-8")))
-CASES = [pytest.param(c, id=c.name, marks=pytest.mark.slow if c.slow else ()) for c in stress_cases()]
+LONG = {"lambda-12.28", "lambda-12.29"}  # seconds
+
+
+def marks_of(case):
+    """How long a case takes."""
+    return pytest.mark.slow if case.slow else pytest.mark.long if case.name in LONG else ()
+
+
+CASES = [pytest.param(c, id=c.name, marks=marks_of(c)) for c in stress_cases()]
 
 
 @pytest.mark.parametrize("case", CASES)
