@@ -169,7 +169,8 @@ def test_extrema_are_counted_as_by_the_function_of_double_doubles(turn, monkeypa
             assert p <= min(values) and max(values) <= q
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.long) for name in NAMES])
+@pytest.mark.long
+@pytest.mark.parametrize("name", NAMES)
 def test_scalar_kernels_give_the_bits_of_the_loops(name):
     from graphsynth.intervals.kernels import exponential, inverse
 

@@ -130,6 +130,8 @@ class Misalignment:
     ----------
     base, link : int
         The two links of the joint; the seat on ``base``, usually the frame, is the tilted one.
+        The rail of a guide leans where its slider is, so it lifts nothing; with exact closure
+        (`certify_in_space`) it leans about its own point, and the slider leaves the plane as it travels.
     alpha : float
         Tilt, radians (small).
     direction : float
