@@ -53,6 +53,7 @@ def probe(folder: Path) -> tuple[float, int, int]:
     return float(value), int(hits), int(misses)
 
 
+@pytest.mark.long
 def test_a_change_in_another_module_is_noticed(tmp_path: Path) -> None:
     package = tmp_path / "graphsynth_probe"
     package.mkdir()

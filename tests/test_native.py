@@ -89,6 +89,7 @@ print(lower[0], upper[0], 'numba' in sys.modules)
 COUNT = "import sys, graphsynth as gs; print(gs.count_chains(12), 'numba' in sys.modules)"
 
 
+@pytest.mark.long
 @needs_library
 def test_counting_does_not_load_numba() -> None:
     assert python(COUNT).split() == ["6856", "False"]
@@ -213,6 +214,7 @@ def test_arguments_are_told_apart_as_numba_does(change: Any, taken: bool | None)
     assert np.array_equal(out, numbas)
 
 
+@pytest.mark.long
 @needs_library
 def test_wrong_calls_say_what_numba_says() -> None:
     from graphsynth.intervals.kernels import loops

@@ -17,6 +17,7 @@ TASKS = {
     "see whether it binds": (None, r"CERTIFIED_FREE\nProved: nothing binds over the whole range"),
     "read the forces": (None, r"joint 1-2 +force up to"),
 }
+SEARCHES = ("find a four-bar through points", "design one and cut its parts")
 
 
 def code_of(task):
@@ -27,7 +28,7 @@ def code_of(task):
     return found[1]
 
 
-@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("task", [pytest.param(t, marks=pytest.mark.long) if t in SEARCHES else t for t in TASKS])
 def test_ten_lines_suffice_in_a_fresh_process(task, tmp_path):
     code = code_of(task)
     assert len(code.strip().splitlines()) <= 10

@@ -107,6 +107,7 @@ def test_a_killed_worker_is_replaced_and_its_piece_done_again(tmp_path):
     assert crew.submit(int).exception() is not None  # it is closed
 
 
+@pytest.mark.long
 def test_work_that_kills_every_worker_is_one_sentence(tmp_path):
     with processes(2) as crew, pytest.raises(GraphsynthError, match="killed while they worked, again and again"):
         crew.submit(_killed, (tmp_path, 100), 5).result()

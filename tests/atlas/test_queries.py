@@ -239,6 +239,7 @@ def test_reading_pragmas_are_answered(shipped):
     assert "graph6" in set(shipped.sql("PRAGMA table_info(chains)")["name"])
 
 
+@pytest.mark.long
 def test_ctrl_c_ends_an_endless_question():
     endless = "WITH RECURSIVE x(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM x) SELECT COUNT(*) FROM x"
     script = (

@@ -327,6 +327,7 @@ document.body.append(out);
 </script></body>"""
 
 
+@pytest.mark.long
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium here")
 def test_the_player_moves_the_links(motions: dict[str, Any], tmp_path: Path) -> None:
     motion = motions["lambda"]

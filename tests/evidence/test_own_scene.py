@@ -38,6 +38,7 @@ def stated(folder, **tables):
     return Context(replace(Scene.from_mapping(given), folder=folder))
 
 
+@pytest.mark.long
 def test_positions_are_those_of_the_mechanism_that_the_scene_states(tmp_path):
     problem = planar.positions(stated(tmp_path), QUICK)
     assert "own of the scene (4 links" in problem.question

@@ -292,6 +292,7 @@ def test_import_is_cheap():
     )
 
 
+@pytest.mark.long
 def test_a_motion_is_assessed_with_all_its_joints():
     """The same entry and the same words for any mechanism: three equal bearings are free up to 2 t_A.
 

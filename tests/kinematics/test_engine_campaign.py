@@ -217,6 +217,7 @@ def one(number: int) -> tuple[str, list[str]]:
     return examine(mechanism, span, 1.0 - before)
 
 
+@pytest.mark.long
 def test_random_mechanisms() -> None:
     ends, faults = campaign(0, 40)
     assert not faults

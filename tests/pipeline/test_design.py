@@ -70,6 +70,7 @@ def test_inputs_of_a_cylinder_are_parts_of_its_stroke() -> None:
     assert own.targets[0].inputs == (0.0, 0.5, 1.0) and own.linear  # type: ignore[attr-defined]
 
 
+@pytest.mark.long
 def test_the_page_shows_every_answer_over_its_target() -> None:
     report = execute(scene(("records", "tables", "animations", "plots", "mechanisms"), paths=[SEGMENT], answers=2))
     assert [record.good for record in report["records"]] == [True, True]
@@ -91,6 +92,7 @@ def test_the_page_shows_every_answer_over_its_target() -> None:
             assert np.abs(z - p).min() < 0.02 + 2e-3
 
 
+@pytest.mark.long
 def test_the_command_writes_a_file_of_each_mechanism(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = """
 [scene]

@@ -77,6 +77,7 @@ def test_figures_of_the_explanation(report: Any) -> None:
     assert round(square[5], 2) == 0.58 and round(square[10], 2) == 1.18
 
 
+@pytest.mark.long
 def test_tables_tell_structure_and_trust(report: Any) -> None:
     tables = {table.title: table for table in report["tables"]}
     loops = tables["Loops and the spaces they move in"].rows

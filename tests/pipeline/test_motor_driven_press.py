@@ -29,6 +29,7 @@ def largest_torque(rod: float) -> float:
     return float(np.abs(np.gradient(energy, f) - FORCE * ram_f).max())
 
 
+@pytest.mark.long
 def test_motor_driven_press() -> None:
     report = execute(load_scene("motor_driven_press"))
     for record, rod in zip(report["records"], (0.08, 0.2), strict=True):

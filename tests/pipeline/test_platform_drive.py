@@ -75,6 +75,7 @@ def test_two_resistances_behave_as_the_source_says(report: Any) -> None:
         assert np.ptp(item.run.speed[late]) == pytest.approx({5.0: 20.048, 20.0: 13.910}[item.resistance], rel=5e-3)
 
 
+@pytest.mark.long
 def test_dead_centres_are_the_printed_ones(report: Any) -> None:
     table = next(t for t in report["tables"] if t.title.startswith("Without inertia"))
     printed = [

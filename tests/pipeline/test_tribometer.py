@@ -38,6 +38,7 @@ def table(report: Any, title: str) -> Any:
     return next(t for t in report["tables"] if t.title.startswith(title))
 
 
+@pytest.mark.long
 def test_published_events(report: Any) -> None:
     """theory/tribometer 9, to the printed digits (accurate to about 1e-14)."""
     rows = table(report, "Events: 37").rows

@@ -198,6 +198,7 @@ def has_solution(spec):
         return False
 
 
+@pytest.mark.long
 @settings(max_examples=10, deadline=None)
 @example({"t0": 2, "n3": 1}, 1, 4)  # 2p = t0 + sum a*n_a is odd on the right
 @given(

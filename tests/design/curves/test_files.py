@@ -83,6 +83,7 @@ def test_shards_hold_the_rows_of_the_whole(index: CurveIndex, tmp_path: Path) ->
     assert found[0] == found[1]
 
 
+@pytest.mark.long
 def test_rows_may_be_read_with_numpy_alone(index: CurveIndex) -> None:
     (shard,) = index.shards
     for name in shard.manifest["columns"]:

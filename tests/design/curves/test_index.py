@@ -31,6 +31,7 @@ def rows(index: CurveIndex, count: int, seed: int) -> list[int]:
     return np.random.default_rng(seed).choice(len(index), count, replace=False).tolist()
 
 
+@pytest.mark.long
 def test_curves_of_the_index_are_found(index: CurveIndex) -> None:
     random = np.random.default_rng(1)
     for number in rows(index, 40, 1):

@@ -36,6 +36,7 @@ def digits(z, task):
     return x
 
 
+@pytest.mark.long
 def test_roots_lie_in_their_boxes(solved):
     task, roots = solved
     assert roots.certified.all() and roots.distinct.all() and (roots.real ^ roots.complex).all()

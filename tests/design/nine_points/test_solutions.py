@@ -36,6 +36,7 @@ def test_counts_of_the_literature(problem_3):
     assert len(repr(problem_3).splitlines()) <= 10
 
 
+@pytest.mark.long
 def test_linkages_pass_their_points(problem_3):
     points = problem_3.points
     for linkage in problem_3.linkages:
@@ -95,6 +96,7 @@ def test_a_crank_rocker_is_found_without_defects(in_order):
     assert all(farthest(one, found.points) < 1e-10 for one in found.linkages if one.one_branch)
 
 
+@pytest.mark.long
 def test_branch_and_order_are_those_of_the_sampled_motion(in_order):
     """Linkages with a full turn: every point within reach of both branches of a sampled motion."""
     found = in_order[1]

@@ -111,6 +111,7 @@ def brute(found: DesignedMechanism, goal: Any) -> float:
     return max(float(np.abs(z - p).min()) for p in goal)
 
 
+@pytest.mark.long
 def test_a_hidden_four_bar_is_found_from_its_curve_and_pivots() -> None:
     """Twenty points without times, both pivots given: curve, lengths and place come back."""
     motion = hidden()
@@ -393,6 +394,7 @@ def test_a_search_rests_when_it_finds_no_other_answer() -> None:
     assert 1 <= len(found) < 9 and found.accepted and "no other was found" in found.statement
 
 
+@pytest.mark.long
 def test_an_interruption_gives_the_best_so_far() -> None:
     def stop(progress: Any) -> None:
         if progress.pieces == 3:
@@ -403,6 +405,7 @@ def test_an_interruption_gives_the_best_so_far() -> None:
     assert found.pieces == 3 and len(found) and "interrupted" in found.statement
 
 
+@pytest.mark.long
 def test_a_search_that_finds_nothing_says_only_that() -> None:
     """A time ratio of ten with a stroke of two thirds of a turn: nothing is near; no claim is made."""
     task = DesignTask(targets=[SwingTarget(least="250 deg", time_ratio=10)], links=[4], transmission="60 deg")

@@ -42,6 +42,7 @@ boxes = st.tuples(
 )
 
 
+@pytest.mark.long
 @settings(max_examples=25, deadline=None)
 @given(boxes, boxes, st.integers(0, 2**31))
 @example(((0.1, 0.1), (0.0, 0.0)), ((-0.1, 0.2), (0.3, 3.2)), 0)
