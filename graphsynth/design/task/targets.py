@@ -24,10 +24,24 @@ Point = tuple[float, float]
 Pose = tuple[float, float, float]
 #: Angles or parts of a stroke, if any; type checkers forget what is kept of a frozen field that is inherited.
 Inputs = Kept[Sequence[float | str] | None, tuple[float, ...] | None]
+#: An angle, of sliders a length.
+Tolerance = Kept[float | str, float]
 #: Points of a curve that is given as a whole: a segment, an arc, a drawing.
 _COUNT = 48
 #: Most points, poses or values of a target.
 MOST = 400
+
+
+def _part(name: str, value: float | str) -> float:
+    """Read a part of a size."""
+    if isinstance(value, str):
+        raise GeometryError(f"{name} = {value!r} of a path or of poses is a part of their size; give a number")
+    return positive(name, value)
+
+
+def _within(name: str, value: float | str) -> float:
+    """Read a positive angle or length."""
+    return positive(name, angle(name, value))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,17 +50,17 @@ class Target:
 
     Parameters
     ----------
-    tolerance : float
-        Largest error with which the target counts as met: of paths and poses a part of their size, else radians.
+    tolerance : float or str
+        Largest error with which the target counts as met: of paths and poses a part of their size, else radians or a
+        text such as "4 deg", of sliders a length.
     weight : float
         Weight among several targets.
     """
 
-    tolerance: float = 0.01
+    tolerance: Tolerance = Kept(_part, 0.01)
     weight: float = 1.0
 
     def __post_init__(self) -> None:
-        positive("tolerance", self.tolerance)
         positive("weight", self.weight)
 
     @property
@@ -121,6 +135,7 @@ class PathTarget(TimedTarget):
     inputs: Inputs = Kept(optional(listed), None)
     closed: bool = False
     point: str = "P"
+    tolerance: Tolerance = Kept(_part, 0.01)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -245,6 +260,7 @@ class PosesTarget(TimedTarget):
     poses: Kept[Sequence[tuple[float, float, float | str]], tuple[Pose, ...]] = Kept(_poses)
     inputs: Inputs = Kept(optional(listed), None)
     point: str = "P"
+    tolerance: Tolerance = Kept(_part, 0.01)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -291,6 +307,7 @@ class FunctionTarget(TimedTarget):
     inputs: Inputs = Kept(optional(listed), None)
     link: str = "output"
     slides: bool = False
+    tolerance: Tolerance = Kept(_within, 0.01)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -351,6 +368,7 @@ class DwellTarget(Target):
     start: Kept[float | str | None, float | None] = Kept(optional(angle), None)
     link: str = "output"
     slides: bool = False
+    tolerance: Tolerance = Kept(_within, 0.01)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -389,6 +407,7 @@ class SwingTarget(Target):
     time_ratio: float | None = None
     link: str = "output"
     slides: bool = False
+    tolerance: Tolerance = Kept(_within, 0.01)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -60,8 +60,20 @@ def test_formulas_are_arithmetic_and_nothing_else() -> None:
 
 def test_a_function_is_drawn_out_over_its_ranges() -> None:
     found = FunctionTarget.of(np.square, (1, 3), input_range="60 deg", output_range="-90 deg", count=3)
+    assert found.inputs is not None
     assert np.allclose(found.inputs, [0.0, math.pi / 6, math.pi / 3])
     assert np.allclose(found.outputs, [0.0, -math.pi / 2 * 3 / 8, -math.pi / 2])
+
+
+def test_a_tolerance_is_an_angle_with_its_unit_or_a_part_of_the_size() -> None:
+    angle = math.radians(4.0)
+    wanted = FunctionTarget(inputs=[0, 1], outputs=["0 deg", "30 deg"], tolerance="4 deg")
+    assert math.isclose(wanted.tolerance, angle) and FunctionTarget(inputs=[0, 1], outputs=[0, 1]).tolerance == 0.01
+    assert all(
+        math.isclose(t.tolerance, angle)
+        for t in (DwellTarget(span=1, tolerance="4 deg"), SwingTarget(least=1, tolerance="4 deg"))
+    )
+    assert PathTarget.segment((0, 0), (4, 0), tolerance=0.02).tolerance == 0.02
 
 
 @pytest.mark.parametrize(
@@ -73,6 +85,9 @@ def test_a_function_is_drawn_out_over_its_ranges() -> None:
         (lambda: PathTarget(points=[(0, 0), (1, 0)], inputs=[0]), "2 values but 1 inputs"),
         (lambda: PathTarget(points=[(0, 0), (1, 0)], inputs=[0, 7]), "at most one turn"),
         (lambda: PathTarget(points=[(0, 0), (1, 0)], tolerance=0), "tolerance"),
+        (lambda: PathTarget(points=[(0, 0), (1, 0)], tolerance="4 deg"), "a part of their size"),
+        (lambda: PosesTarget(poses=[(0, 0, 0), (1, 0, 0)], tolerance="4 deg"), "a part of their size"),
+        (lambda: SwingTarget(least=1, tolerance="-4 deg"), "tolerance"),
         (lambda: PathTarget.svg("nonsense"), "SVG path data"),
         (lambda: PathTarget.svg("M0 0"), "draws nothing"),
         (lambda: FunctionTarget(outputs=[0, 1]), "needs inputs"),
