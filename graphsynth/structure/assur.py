@@ -98,6 +98,11 @@ class Decomposition:
         """The highest class of a group; 1 when there is none."""
         return max((group.group_class for group in self.groups), default=1)
 
+    @property
+    def dyadic(self) -> bool:
+        """Whether it is assembled dyad by dyad: no group, floating ones included, has more than two bodies."""
+        return all(len(own.bodies) <= 2 for group in self.groups for own in (group, *group.floating))
+
     def __str__(self) -> str:
         steps = "; ".join(map(str, self.groups)) or "no groups"
         return f"mechanism of class {_roman(self.mechanism_class)}: {steps}"

@@ -52,7 +52,7 @@ class Family:
     @property
     def dyadic(self) -> bool:
         """Whether all groups are dyads."""
-        return max(self.groups) <= 2
+        return decompose(self.design.graph, self.design.drivers).dyadic
 
     @property
     def turns(self) -> bool:

@@ -9,7 +9,7 @@ from itertools import combinations, permutations, product
 from graphsynth.design.task.targets import Point
 from graphsynth.design.task.task import DesignTask
 from graphsynth.kinematics.dimensional.design import Design, choices
-from graphsynth.structure.assur import find_fault
+from graphsynth.structure.assur import decompose, find_fault
 from graphsynth.structure.graph import MechanismGraph
 
 
@@ -46,6 +46,8 @@ def plans(task: DesignTask, links: int) -> Iterator[Plan]:
 
 def fitting(task: DesignTask, design: Design) -> Iterator[Plan]:
     """Yield the plans of a design: carriers of names and given pivots in every way."""
+    if task.dyads_only and not decompose(design.graph, design.drivers).dyadic:
+        return
     pins = None
     if task.drive == "cylinder":
         (own,) = design.driver_joints

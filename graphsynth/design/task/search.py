@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain, cycle, repeat
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.checks import positive, whole
 from graphsynth.core.errors import GeometryError, GraphsynthError
+from graphsynth.core.limits import Clock, here, told
 from graphsynth.core.ordered import in_order
 from graphsynth.core.shown import Shown
 from graphsynth.design.task.answers import Candidate, DesignedMechanism, Origin, built, judged, proved, signature
@@ -128,6 +129,7 @@ def design(
     task: DesignTask,
     *,
     seconds: float = 60.0,
+    processor_seconds: float | None = None,
     seed: int = 0,
     count: int = 5,
     executor: Executor | None = None,
@@ -142,8 +144,11 @@ def design(
     seconds : float
         Time limit of the search; it ends before where enough answers were found, or some and long no other.  They
         are then certified.
+    processor_seconds : float, optional
+        Limit of the processor time of the search, that of all workers together; a busy machine does not change what it
+        allows.
     seed : int
-        Same task and seed, same answers, for any executor, unless the time limit cuts the search short.
+        Same task and seed, same answers, for any executor, unless a time limit cuts the search short.
     count : int
         Answers wanted.
     executor : concurrent.futures.Executor, optional
@@ -177,9 +182,11 @@ def design(
     """
     if not isinstance(task, DesignTask):
         raise GeometryError(f"{type(task).__name__} is not a DesignTask; give one")
-    positive("seconds", seconds)
     whole("count", count, 1, 1000)
-    run = _Run(task, seed, count, perf_counter(), seconds, starts)
+    limits = positive("seconds", seconds), math.inf
+    if processor_seconds is not None:
+        limits = limits[0], positive("processor_seconds", processor_seconds)
+    run = _Run(task, whole("seed", seed, 0, 2**63), count, starts, Clock(*limits))
     impossible = proof(task)
     if not impossible:
         try:
@@ -192,17 +199,8 @@ def design(
 class _Run:
     """One call: candidates found, those judged, reasons counted."""
 
-    def __init__(
-        self, task: DesignTask, seed: int, count: int, begin: float, seconds: float, starts: Starts | None
-    ) -> None:
-        self.task, self.seed, self.count, self.begin, self.starts = (
-            task,
-            whole("seed", seed, 0, 2**63),
-            count,
-            begin,
-            starts,
-        )
-        self.deadline = begin + seconds
+    def __init__(self, task: DesignTask, seed: int, count: int, starts: Starts | None, clock: Clock) -> None:
+        self.task, self.seed, self.count, self.starts, self.clock = task, seed, count, starts, clock
         self.found: list[Candidate] = []
         self.judged: dict[int, tuple[Candidate, DesignedMechanism]] = {}
         self.reasons: Counter[str] = Counter()
@@ -219,7 +217,7 @@ class _Run:
             )
         for links, own in every.items():
             np.random.default_rng([self.seed, links]).shuffle(own)
-        begun = planned(self.task, self.starts, self.deadline - self.begin)
+        begun = planned(self.task, self.starts, min(self.clock.seconds, self.clock.processor))
         given = [Origin(plan, k, mechanism) for k, (plan, mechanism) in enumerate(begun)]
         for k in range(0, len(given), _WAVE):
             if self._wave([(origin, None) for origin in given[k : k + _WAVE]], executor, progress):
@@ -250,9 +248,10 @@ class _Run:
         for number, (origin, x) in enumerate(chosen, self.pieces):
             own = origin if x is not None else origin._replace(number=number)
             begun.append(Piece(self.task, self.seed, number, own, x))
-        results = in_order(executor, worked, begun)
+        results = in_order(executor, partial(told, worked, here()), begun)
         try:
-            for found, reasons in results:
+            for (found, reasons), spent in results:
+                self.clock.elsewhere += spent
                 self.found += found
                 self.reasons.update(reasons)
                 self.pieces += 1
@@ -261,9 +260,9 @@ class _Run:
                 if progress is not None:
                     least = min((c.error for c in self.found), default=math.inf)
                     good = sum(answer.accepted for _, answer in self.judged.values())
-                    progress(Progress(self.pieces, least, good, perf_counter() - self.begin))
-                if perf_counter() > self.deadline:
-                    self.stopped = "the time limit was reached"
+                    progress(Progress(self.pieces, least, good, self.clock.passed))
+                if limit := self.clock.over:
+                    self.stopped = f"{limit} was reached"
                 if self.stopped or self._enough():
                     return True
         finally:
@@ -347,7 +346,7 @@ class _Run:
             impossible,
             text,
             self.pieces,
-            perf_counter() - self.begin,
+            self.clock.passed,
             self.seed,
         )
 

@@ -44,6 +44,8 @@ class DesignTask(Shown):
         Numbers of links that are allowed; fewer links are tried first.
     sliders : int
         Most prismatic joints, the drive not counted.
+    dyads_only : bool
+        Only mechanisms that are assembled dyad by dyad, none with a larger structural group.
     pivots : sequence of (x, y)
         Given revolute joints on the frame; a chain may have more of them.
     pivot_region, box : (x0, y0, x1, y1), optional
@@ -77,6 +79,7 @@ class DesignTask(Shown):
     stroke: tuple[float, float] | None = None
     links: Sequence[int] = (4, 6)
     sliders: int = 0
+    dyads_only: bool = False
     pivots: Sequence[Point] = ()
     pivot_region: Box | None = None
     box: Box | None = None

@@ -54,6 +54,7 @@ def search(context: Context) -> Designs:
         return design(
             own.task(),
             seconds=own.seconds,
+            processor_seconds=own.processor_seconds,
             count=own.answers,
             seed=context.scene.scene.seed,
             executor=context.executor,

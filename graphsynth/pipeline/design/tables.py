@@ -214,6 +214,7 @@ class DesignTable:
     stroke: tuple[float, float] | None = None
     links: tuple[int, ...] = (4, 6)
     sliders: Annotated[int, In(least=0, most=3)] = 0
+    dyads_only: bool = False
     pivots: tuple[Point, ...] = ()
     pivot_region: Box | None = None
     box: Box | None = None
@@ -227,6 +228,7 @@ class DesignTable:
     begin: tuple[str, ...] = ()  # files of mechanisms to begin with
     index: str = ""  # folder of an index of curves to begin with
     seconds: Annotated[float, In(above=0)] = 60.0
+    processor_seconds: Annotated[float | None, In(above=0)] = None
     answers: Annotated[int, In(least=1, most=100)] = 5
 
     def __post_init__(self) -> None:
@@ -241,6 +243,6 @@ class DesignTable:
         tables: tuple[Any, ...] = (*self.paths, *self.poses, *self.functions, *self.dwells, *self.swings)
         targets: list[Target] = [table.target(turn) for table in tables]
         own = ("drive", "span", "stroke", "links", "sliders", "pivots", "pivot_region", "box", "lengths", "crank")
-        wishes = ("bars", "length_ratio", "transmission", "misalignment", "joint_tilt")
+        wishes = ("dyads_only", "bars", "length_ratio", "transmission", "misalignment", "joint_tilt")
         more: dict[str, Any] = {name: getattr(self, name) for name in (*own, *wishes)}
         return DesignTask(targets=targets, **more)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from time import process_time
 from typing import Any
-from unittest import mock
 
 import numpy as np
 
@@ -22,7 +20,6 @@ from graphsynth.design import (
     dyads,
     four_bars_for_poses,
 )
-from graphsynth.design.task import search as module
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.assur import decompose
 from tests.bench.design import measure
@@ -50,27 +47,11 @@ class Result:
 
 def dyadic(graph: Any, drivers: Any) -> bool:
     """Tell whether a mechanism is assembled dyad by dyad."""
-    groups = decompose(graph, drivers).groups
-    return all(len(own.bodies) <= 2 for group in groups for own in (group, *group.floating))
+    return decompose(graph, drivers).dyadic
 
 
-@contextmanager
-def restricted(only: bool) -> Iterator[None]:
-    """Let the search see dyadic chains alone."""
-    if not only:
-        yield
-        return
-    plans = module.plans
-
-    def few(task: DesignTask, links: int) -> Iterator[Any]:
-        return (plan for plan in plans(task, links) if dyadic(plan.design.graph, plan.design.drivers))
-
-    with mock.patch.object(module, "plans", few):
-        yield
-
-
-def nearest(index: CurveIndex | None, only: bool, count: int = 24) -> Callable[[DesignTask], list[Mechanism]]:
-    """Begin with the nearest curves of an index, of dyadic mechanisms alone if so wished."""
+def nearest(index: CurveIndex | None, count: int = 24) -> Callable[[DesignTask], list[Mechanism]]:
+    """Begin with the nearest curves of an index, of dyadic mechanisms alone if the task asks for them."""
 
     def starts(task: DesignTask) -> list[Mechanism]:
         path = task.targets[0]
@@ -81,7 +62,7 @@ def nearest(index: CurveIndex | None, only: bool, count: int = 24) -> Callable[[
             return (
                 own.graph.links in task.links
                 and set(own.kinds) == {"R"}
-                and (not only or dyadic(own.graph, own.drivers))
+                and (not task.dyads_only or dyadic(own.graph, own.drivers))
             )
 
         found = [match.mechanism for match in index.find(path.points, count, closed=True, only=fits)]
@@ -96,31 +77,25 @@ def ours(trial: Trial, seconds: float, *, only_dyads: bool = False, index: Curve
         return algebra(trial)
     begin, tolerance, seed = process_time(), trial.tolerance, 0
     best: tuple[float, DesignedMechanism | None] = (float("inf"), None)
+    while (left := seconds - (process_time() - begin)) > 0.0 and best[0] > 1e-12:
+        given = [] if best[1] is None else [best[1].mechanism]
+        more = nearest(index) if seed == 0 else None
+        task = dataclasses.replace(trial.task(tolerance), dyads_only=only_dyads)
 
-    def watch(_: object) -> None:
-        if process_time() - begin > seconds:
-            raise KeyboardInterrupt  # the search then gives what it has
+        def starts(task: DesignTask, given: Any = given, more: Any = more) -> list[Mechanism]:
+            return [*given, *(more(task) if more is not None else ())]
 
-    with restricted(only_dyads):
-        while process_time() - begin < seconds and best[0] > 1e-12:
-            given = [] if best[1] is None else [best[1].mechanism]
-            more = nearest(index, only_dyads) if seed == 0 else None
-            task = trial.task(tolerance)
-
-            def starts(task: DesignTask, given: Any = given, more: Any = more) -> list[Mechanism]:
-                return [*given, *(more(task) if more is not None else ())]
-
-            try:
-                found = design(task, seconds=_FOREVER, seed=seed, count=_COUNT, starts=starts, progress=watch)
-            except gs.GeometryError as fault:  # no chain fits
-                return Result(float("inf"), seconds=process_time() - begin, note=str(fault).partition(":")[0])
-            for answer in found.answers:
-                if all(reason.endswith("is missed") for reason in answer.reasons):
-                    error = measured(trial, answer)
-                    best = min(best, (error, answer), key=lambda pair: pair[0])
-            if found.accepted:
-                tolerance = max(min(tolerance * _TIGHTER, _TIGHTER * _near(found)), 1e-9)
-            seed += 1
+        try:
+            found = design(task, seconds=_FOREVER, processor_seconds=left, seed=seed, count=_COUNT, starts=starts)
+        except gs.GeometryError as fault:  # no chain fits
+            return Result(float("inf"), seconds=process_time() - begin, note=str(fault).partition(":")[0])
+        for answer in found.answers:
+            if all(reason.endswith("is missed") for reason in answer.reasons):
+                error = measured(trial, answer)
+                best = min(best, (error, answer), key=lambda pair: pair[0])
+        if found.accepted:
+            tolerance = max(min(tolerance * _TIGHTER, _TIGHTER * _near(found)), 1e-9)
+        seed += 1
     return _result(trial, best[1], best[0], begin)
 
 
