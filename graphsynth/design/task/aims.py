@@ -17,8 +17,9 @@ from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, follo
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-#: Samples of a dwell; inputs before and after a dead centre between which its speed is differentiated.
+#: Samples of a dwell; inputs next to a dead centre, and weights of the values there that give its speed (order six).
 _STILL, _NEAR = 13, 0.02
+_OFFSETS, _DIFFERENCE = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]), np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
 #: Samples all over a curve that shall draw a closed path, and half the width of the band that holds it, over a side.
 _WHOLE, _BAND = 48, 0.2
 #: Steps of the times of a path after each step of its mechanism.
@@ -283,7 +284,7 @@ class SwingAim(Aim):
         values = self.measure.values(moved.frames, u)
         values = values if self.measure.guide >= 0 else np.unwrap(values, axis=1)
         rates = self.measure.rates(moved.rates, u)
-        return np.stack([_extreme(moved, values, rates, 1.0), _extreme(moved, values, rates, -1.0)], axis=1)
+        return np.stack([extreme(moved, values, rates, 1.0), extreme(moved, values, rates, -1.0)], axis=1)
 
     def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
         """Return what the stroke lacks or has too much."""
@@ -299,7 +300,7 @@ class SwingAim(Aim):
         )
 
 
-def _extreme(moved: Moved, values: Array, rates: Array, sign: float) -> Array:
+def extreme(moved: Moved, values: Array, rates: Array, sign: float) -> Array:
     """Input of the largest value times the sign (sets,), where the rate passes zero next to the largest sample."""
     k = (sign * values).argmax(axis=1)
     row = np.arange(len(k))
@@ -332,8 +333,9 @@ class RatioAim(Aim):
         self.slow = math.tau * ratio / (1.0 + ratio)
 
     def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
-        """Just before and after both dead centres (sets, 4)."""
-        return np.asarray(self.own(u, 0) + np.array([-_NEAR, _NEAR, self.slow - _NEAR, self.slow + _NEAR]))
+        """Just before and after both dead centres (sets, 12)."""
+        near = _NEAR * _OFFSETS
+        return np.asarray(self.own(u, 0) + np.concatenate([near, self.slow + near]))
 
     def begin(self, times: Array, moved: Moved, u: Unknowns, random: np.random.Generator) -> Array:
         """Begin at a dead centre, the largest or the smallest value."""
@@ -346,11 +348,11 @@ class RatioAim(Aim):
 
     def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
         """Both speeds by differences, so that their derivatives are those of the poses."""
-        mix = np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]]) / (2.0 * _NEAR)
+        mix = np.kron(np.eye(2), _DIFFERENCE / _NEAR)
         values = self.measure.values(frames, u)
         if self.measure.guide < 0:
             values = np.unwrap(values, axis=1)
-        loads, direct = self.blank(len(values), 1, 4)
+        loads, direct = self.blank(len(values), 1, len(mix.T))
         self.measure.put(loads, direct, frames, u)
         return Rows(times, (values @ mix.T)[:, None], loads, direct, self.weight, mix=mix, start=self.at)
 

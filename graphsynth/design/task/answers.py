@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.shown import Shown
-from graphsynth.design.task.aims import TimedAim, beside
+from graphsynth.design.task.aims import TimedAim, beside, extreme
+from graphsynth.design.task.model import Moved
 from graphsynth.design.task.plans import Plan
 from graphsynth.design.task.problem import TaskProblem
 from graphsynth.design.task.targets import DwellTarget, FunctionTarget, PathTarget, PosesTarget, SwingTarget, Target
@@ -353,19 +354,22 @@ def _slides(motion: Motion, carriers: Mapping[str, int], target: FunctionTarget 
 
 def _swing_error(task: DesignTask, target: SwingTarget, motion: Motion, link: int) -> float:
     """Return what the stroke lacks or has too much, and how far the slow stroke is from its time (input)."""
-    values, _ = _output(motion, link)
-    swing = float(np.ptp(values))
+    from scipy.interpolate import CubicHermiteSpline
+
+    values, rates = _output(motion, link)
+    ends = [_extreme(task, motion.inputs, values, rates, sign) for sign in (1.0, -1.0)]
+    high, low = CubicHermiteSpline(motion.inputs, values, rates)(ends)
+    swing = float(high - low)
     error = abs(swing - min(max(swing, target.least), target.most))
     if target.time_ratio is None:
         return error
-    apart = abs(_peak(motion.inputs, values) - _peak(motion.inputs, -values))
+    apart = abs(ends[0] - ends[1])
     slow = max(apart, math.tau - apart)
     return max(error, abs(slow - math.tau * target.time_ratio / (1.0 + target.time_ratio)))
 
 
-def _peak(u: Array, values: Array) -> float:
-    """Input of the largest value of a periodic function, by the parabola through it and its neighbours."""
-    k = int(values[:-1].argmax())
-    a, b, c = values[k - 1 if k else -2], values[k], values[k + 1]
-    bend = a - 2.0 * b + c
-    return float(u[k] + (0.5 * (a - c) / bend if bend else 0.0) * (u[1] - u[0]))
+def _extreme(task: DesignTask, u: Array, values: Array, rates: Array, sign: float) -> float:
+    """Input of the largest value times the sign, where the rate passes zero."""
+    period = task.span if task.drive == "rotation" else 0.0
+    moved = Moved(u, np.zeros(0), np.zeros(0), np.ones(1, dtype=np.bool_), period)
+    return float(extreme(moved, values[None], rates[None], sign)[0])

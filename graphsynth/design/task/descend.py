@@ -5,7 +5,6 @@ Bounds are penalties whose weight grows from stage to stage.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -22,8 +21,6 @@ _GAIN, _REFUSED = 1e-6, 7
 _STEP = 0.5
 #: An error that is as good as none, in tolerances.
 NONE = 1e-9
-#: Rounds in which large errors are evened out, steps of each, and the increase at which they end.
-_EVENED, _STEPS, _WORSENED = 20, 8, 3.0
 
 
 class Descended(NamedTuple):
@@ -33,10 +30,6 @@ class Descended(NamedTuple):
     error: Array
     times: list[Array]
 
-    def one(self, k: int) -> Descended:
-        """Return one of them."""
-        return Descended(self.X[k : k + 1], self.error[k : k + 1], [part[k : k + 1] for part in self.times])
-
 
 def descend(
     problem: TaskProblem,
@@ -44,11 +37,10 @@ def descend(
     strict: float,
     iterations: int,
     times: list[Array] | None = None,
-    stress: list[Array] | None = None,
 ) -> Descended:
-    """Take candidates towards their optima, with one weight of the bounds and of every sample; the best come first."""
+    """Take candidates towards their optima, with one weight of the bounds; the best come first."""
     X, model = X.copy(), problem.model
-    (error, r, J), times = problem.linearise(X, times, strict, stress)
+    (error, r, J), times = problem.linearise(X, times, strict)
     damping, refused = np.full(len(X), _DAMPING), np.zeros(len(X), dtype=np.intp)
     longest = _STEP * np.where(np.arange(model.size) < model.own_at, model.task.size, 1.0)
     live = np.isfinite(error)
@@ -64,8 +56,7 @@ def descend(
         H += (damping[at, None] * scale)[:, :, None] * np.eye(model.size)
         step = -np.linalg.solve(H, g)[:, :, 0]
         step /= np.maximum(1.0, np.abs(step / longest).max(axis=1, keepdims=True))
-        by = None if stress is None else [part[at] for part in stress]
-        (found, q, K), later = problem.linearise(X[at] + step, [part[at] for part in times], strict, by)
+        (found, q, K), later = problem.linearise(X[at] + step, [part[at] for part in times], strict)
         good = found < error[at]
         gained = error[at] ** 2 - found**2 > _GAIN * error[at] ** 2
         taken = at[good]
@@ -84,28 +75,3 @@ def best(found: Descended, count: int) -> Descended:
     order = np.argsort(found.error, kind="stable")[:count]
     order = order[np.isfinite(found.error[order])]
     return Descended(found.X[order], found.error[order], [own[order] for own in found.times])
-
-
-def evened(problem: TaskProblem, own: Descended, strict: float) -> Array:
-    """Return the vector of one candidate after its largest error, not the sum of squares, was made small.
-
-    Samples with large errors count more and more; it stays as it is where that does not help (theory:
-    docs/explanation/embodiment.md, "Many targets at once").
-    """
-    least, x = math.inf, own.X[0]
-    stress = [np.ones_like(part) for part in own.times]
-    for _ in range(_EVENED):
-        sizes = problem.sizes(own.X, own.times)
-        bounds, _ = problem.linearise(own.X, own.times, strict, [0.0 * part for part in own.times])
-        worst = max(float(part.max()) * math.sqrt(part.size) for part in sizes) + float(bounds.error[0])
-        if worst < least:
-            least, x = worst, own.X[0]
-        if not NONE < worst < _WORSENED * least:
-            break
-        for part, size in zip(stress, sizes):
-            part *= size / max(float(size.max()), 1e-300) + 1e-3
-            part *= math.sqrt(part.size / float((part**2).sum()))
-        own = descend(problem, own.X, strict, _STEPS, own.times, stress)
-        if not len(own.X):
-            break
-    return np.asarray(x)

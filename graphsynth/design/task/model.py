@@ -84,18 +84,6 @@ class Rows(NamedTuple):
     mix: Array | None = None
     start: int = -1
 
-    def stressed(self, by: Array) -> Rows:
-        """Return the same numbers times factors (sets, n) of the samples."""
-        by = by[:, None]
-        return self._replace(
-            values=self.values * by, loads=self.loads * by[:, :, None, None], direct=self.direct * by[..., None]
-        )
-
-    @property
-    def sizes(self) -> Array:
-        """Sizes (sets, n) of the numbers of every sample, times the weight."""
-        return np.asarray(self.weight * np.sqrt((self.values**2).sum(axis=1)))
-
 
 class Model:
     """Candidates of a plan for one sense of the drive and one choice of assembly modes.
@@ -198,11 +186,17 @@ class Model:
 
     # --- motions
 
-    def move(self, u: Unknowns) -> Moved:
-        """Move candidates over the range."""
+    def move(self, u: Unknowns, more: Array | None = None) -> Moved:
+        """Move candidates over the range, through further inputs, too, if they are given."""
+        inputs = self.inputs
+        if more is not None:
+            period = self.task.drive == "rotation"
+            more = np.mod(more, self.task.span) if period else np.clip(more, 0.0, self.task.span)
+            inputs = np.sort(np.concatenate([inputs, more]))
+            inputs = inputs[np.concatenate([[True], np.diff(inputs) > 1e-12])]
         scale = u.stroke[:, None, None]
         table = self.plan.design.dimensions(u.places / scale, u.numbers)
-        motion = simulate_batch(self.base, self.inputs, table, modes=self.modes, rates=True)
+        motion = simulate_batch(self.base, inputs, table, modes=self.modes, rates=True)
         complete = motion.completed.copy()
         period = self.task.span if self.task.drive == "rotation" else 0.0
         if period:
@@ -213,7 +207,7 @@ class Model:
         rates[..., :2] *= scale[..., None]
         complete &= np.isfinite(rates).all(axis=(1, 2, 3))
         frames[~complete], rates[~complete] = _REST, _SLOW
-        return Moved(self.inputs, frames, rates, complete, period)
+        return Moved(inputs, frames, rates, complete, period)
 
     def untransmitted(self, X: Array) -> Array:
         """Return what groups larger than dyads lack of the transmission angle (sets,), in hundredths of its sine."""

@@ -5,6 +5,7 @@ Theory: docs/explanation/embodiment.md, "Many targets at once".
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,23 @@ class Linearised(NamedTuple):
     slopes: Array
 
 
+class Exact(NamedTuple):
+    """One candidate where its motion is exact: errors (d, n) of every target and their slopes (d, n, size).
+
+    ``bounds`` (m,) are kept where they are negative, ``steep`` (m, size) their slopes; ``times`` of the targets, None
+    if it does not complete its range.
+    """
+
+    errors: list[tuple[Array, Array]]
+    bounds: Array
+    steep: Array
+    times: list[Array] | None
+
+
+#: Rounds in which samples come nearer to where bounds are worst; samples on either side, over the step before.
+_PASSES, _AROUND = 3, np.linspace(-1.0, 1.0, 17)
+
+
 class TaskProblem:
     """What the candidates of a model shall achieve; ``few``: at so many points of a path, for a first look."""
 
@@ -33,12 +51,10 @@ class TaskProblem:
         self.model = model
         self.aims = aims_of(model, few)
 
-    def linearise(
-        self, X: Array, times: list[Array] | None, strict: float, stress: list[Array] | None = None
-    ) -> tuple[Linearised, list[Array]]:
+    def linearise(self, X: Array, times: list[Array] | None, strict: float) -> tuple[Linearised, list[Array]]:
         """Return errors and derivatives of candidates (sets, size), and the times found, from those given if any.
 
-        ``strict``: weight of the bounds; ``stress``: factors (sets, n) of the samples of every target.
+        ``strict``: weight of the bounds.
         """
         model = self.model
         u = model.read(X)
@@ -49,13 +65,8 @@ class TaskProblem:
         for aim, own in zip(self.aims, times):
             frames, rates = moved.at(own)
             every.append((aim.rows(own, frames, rates, u), frames, rates))
-        if stress is not None:
-            every = [
-                (rows if rows.mix is not None else rows.stressed(own), frames, rates)
-                for own, (rows, frames, rates) in zip(stress, every)
-            ]
         every += [(rows, *moved.at(rows.times)) for rows in sampled_wishes(model, moved, u, strict)]
-        values, slopes = self._pulled(every, u)
+        values, slopes = (np.concatenate(part, axis=1) for part in zip(*self._pulled(every, u)))
         more, steep = direct_wishes(model, u, strict)
         values, slopes = np.concatenate([values, more], axis=1), np.concatenate([slopes, steep], axis=1)
         error = np.sqrt((values**2).sum(axis=1))
@@ -63,13 +74,35 @@ class TaskProblem:
         values[bad], slopes[bad] = 0.0, 0.0
         return Linearised(np.where(bad, np.inf, error), values, slopes), times
 
-    def sizes(self, X: Array, times: list[Array]) -> list[Array]:
-        """Return errors (sets, n) of the samples of every target at its times."""
-        u = self.model.read(X)
-        moved = self.model.move(u)
-        return [aim.rows(own, *moved.at(own), u).sizes for aim, own in zip(self.aims, times)]
+    def exactly(self, x: Array, before: list[Array] | None) -> Exact:
+        """Look at one candidate (size,) at exact points of its motion: its samples go to where it is looked at."""
+        model = self.model
+        u = model.read(x[None])
+        moved, step, more = model.move(u), self.model.task.span / len(model.inputs), np.zeros(0)
+        times: list[Array | None] = [None] * len(self.aims) if before is None else [*before]
+        for k in range(_PASSES):
+            if not moved.complete.all():
+                return Exact([], np.zeros(0), np.zeros((0, model.size)), None)
+            times = [aim.times(moved, u, own) for aim, own in zip(self.aims, times)]
+            worst = [rows.times.ravel() for rows in sampled_wishes(model, moved, u, math.inf)]
+            near = [at + step * _AROUND[:, None] / (len(_AROUND) // 2) ** k for at in worst]
+            more = np.concatenate([own.ravel() for own in (*times, *near) if own is not None])
+            moved = model.move(u, more)
+        found = [aim.times(moved, u, own) for aim, own in zip(self.aims, times)]
+        every = [(aim.rows(own, *moved.at(own), u), *moved.at(own)) for aim, own in zip(self.aims, found)]
+        every += [(rows, *moved.at(rows.times)) for rows in sampled_wishes(model, moved, u, math.inf)]
+        pulled = [(values[0], slopes[0]) for values, slopes in self._pulled(every, u)]
+        errors = [
+            (values.reshape(rows.values.shape[1:]), slopes.reshape(*rows.values.shape[1:], -1))
+            for (values, slopes), (rows, _, _) in zip(pulled, every[: len(found)])
+        ]
+        direct, steep = direct_wishes(model, u, math.inf)
+        bounds = np.concatenate([*(values for values, _ in pulled[len(found) :]), direct[0]])
+        steep = np.concatenate([*(slopes for _, slopes in pulled[len(found) :]), steep[0]])
+        good = moved.complete.all() and np.isfinite(steep).all() and all(np.isfinite(J).all() for _, J in errors)
+        return Exact(errors, bounds, steep, found if good else None)
 
-    def _pulled(self, every: list[tuple[Rows, Array, Array]], u: Unknowns) -> tuple[Array, Array]:
+    def _pulled(self, every: list[tuple[Rows, Array, Array]], u: Unknowns) -> list[tuple[Array, Array]]:
         """Take loads on the poses back to the unknowns, all targets in one pass."""
         model, sets, scale = self.model, len(u.places), u.stroke[:, None, None, None]
         deep = max(rows.loads.shape[1] for rows, _, _ in every)
@@ -97,7 +130,7 @@ class TaskProblem:
             slopes[..., model.stroke_at] = (
                 inner - np.einsum("sdnjk,sjk->sdn", _unpinned(places, model), u.places)
             ) / u.stroke[:, None, None]
-        found, slope = [], []
+        found = []
         for k, (rows, _, rates) in enumerate(every):
             J = slopes[:, : rows.loads.shape[1], at[k] : at[k + 1]] + rows.direct
             along = np.einsum("sdlan,snla->sdn", rows.loads, rates)
@@ -108,9 +141,9 @@ class TaskProblem:
                 J = J - unit[..., None] * (unit[..., None] * J).sum(axis=1, keepdims=True)
             if rows.mix is not None:
                 J = np.einsum("mn,sdni->sdmi", rows.mix, J)
-            found.append(rows.weight * rows.values.reshape(sets, -1))
-            slope.append(rows.weight * J.reshape(sets, -1, model.size))
-        return np.concatenate(found, axis=1), np.concatenate(slope, axis=1)
+            J = rows.weight * J.reshape(sets, -1, model.size)
+            found.append((rows.weight * rows.values.reshape(sets, -1), J))
+        return found
 
 
 def _unpinned(places: Array, model: Model) -> Array:

@@ -24,11 +24,12 @@ from graphsynth.core.limits import Clock, here, told
 from graphsynth.core.ordered import in_order
 from graphsynth.core.shown import Shown
 from graphsynth.design.task.answers import Candidate, DesignedMechanism, Origin, built, judged, proved, signature
-from graphsynth.design.task.descend import Descended, best, descend, evened
+from graphsynth.design.task.descend import Descended, best, descend
 from graphsynth.design.task.impossible import proof
 from graphsynth.design.task.model import Model, Unknowns
 from graphsynth.design.task.plans import plans
 from graphsynth.design.task.problem import TaskProblem
+from graphsynth.design.task.settle import levelled, settled
 from graphsynth.design.task.starts import Starts, from_mechanism, placed_starts, planned, random_starts, shaken
 from graphsynth.design.task.task import DesignTask
 
@@ -282,21 +283,38 @@ class _Run:
         return self._accepted() >= self.count
 
     def _judge(self) -> None:
-        """Judge the best candidates that were not judged yet."""
+        """Judge the best candidates that were not judged yet; those nearly good enough go to their optimum first."""
         self.found.sort(key=lambda candidate: candidate.error)
-        for candidate in self.found[: _JUDGED * self.count]:
+        for k, candidate in enumerate(self.found[: _JUDGED * self.count]):
             if id(candidate) not in self.judged:
-                self.judged[id(candidate)] = candidate, judged(self.task, candidate)
-                if candidate.error < 1.0:  # then the largest error may be small enough, too
-                    self._even(candidate)
+                own = self.found[k] = self._settled(candidate) if candidate.error < _NEAR else candidate
+                self.judged[id(own)] = own, judged(self.task, own)
+                if own.error < 1.0:  # then the largest error may be small enough, too
+                    self._level(own)
 
-    def _even(self, candidate: Candidate) -> None:
+    def _settled(self, candidate: Candidate) -> Candidate:
+        """Return a candidate at its least sum of squares, its motion and bounds taken exactly."""
+        with suppress(GraphsynthError):
+            problem = TaskProblem(_modelled(self.task, self.seed, candidate.origin)[0])
+            x, error = settled(problem, candidate.x)
+            error += float(problem.model.untransmitted(x[None])[0])
+            if error < candidate.error:
+                mechanism, starts = built(problem, x)
+                return Candidate(error, candidate.origin, x, mechanism, starts)
+        return candidate
+
+    def _level(self, candidate: Candidate) -> None:
         """Make the largest error of a candidate small that was judged and missed a target; keep what is better."""
         _, answer = self.judged[id(candidate)]
         if answer.accepted:
             return
         with suppress(GraphsynthError):
-            other = judged(self.task, _evened(self.task, self.seed, candidate))
+            problem = TaskProblem(_modelled(self.task, self.seed, candidate.origin)[0])
+            x, error = levelled(problem, candidate.x)
+            if not error < math.inf:
+                return
+            mechanism, starts = built(problem, x)
+            other = judged(self.task, candidate._replace(x=x, mechanism=mechanism, starts=starts))
             if (len(other.reasons), other.score) < (len(answer.reasons), answer.score):
                 self.judged[id(candidate)] = candidate, other
 
@@ -322,7 +340,11 @@ class _Run:
         nearest = self._ranked()[: self.count]
         if not any(answer.accepted for answer in nearest):
             for candidate in [own for own, answer in self.judged.values() if answer in nearest and own.error < _EVEN]:
-                self._even(candidate)
+                own = candidate if candidate.error < _NEAR else self._settled(candidate)
+                if own is not candidate:
+                    self.judged[id(own)] = own, judged(self.task, own)
+                    self.found.append(own)  # keeps its place among those judged
+                self._level(own)
         every = self._ranked()
         good = [answer for answer in every if answer.accepted]
         chosen = (good or every)[: self.count]
@@ -389,15 +411,6 @@ def _modelled(task: DesignTask, seed: int, origin: Origin) -> tuple[Model, Unkno
         return Model(task, origin.plan, random), None
     given, sense = from_mechanism(task, origin.plan, origin.given)
     return Model(task, origin.plan, random, given, sense), given
-
-
-def _evened(task: DesignTask, seed: int, candidate: Candidate) -> Candidate:
-    """Return a candidate after its largest error, not the sum of squares, was made small."""
-    problem, x, strict = TaskProblem(_modelled(task, seed, candidate.origin)[0]), candidate.x[None], _STAGES[-1][1]
-    found, times = problem.linearise(x, None, strict)
-    own = evened(problem, Descended(x, found.error, times), strict)
-    mechanism, starts = built(problem, own)
-    return candidate._replace(x=own, mechanism=mechanism, starts=starts)
 
 
 def _children(problem: TaskProblem, parent: Array, random: np.random.Generator) -> tuple[Array, list[Array]]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from itertools import islice
 from typing import Protocol
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.design.curves.index import CurveIndex
+from graphsynth.design.curves.matches import CurveMatch
 from graphsynth.design.task.aims import FunctionAim, PointAim, TimedAim
 from graphsynth.design.task.classical import solutions
 from graphsynth.design.task.model import Model, Moved, Unknowns
@@ -23,6 +25,7 @@ from graphsynth.design.task.targets import PathTarget
 from graphsynth.design.task.task import DesignTask
 from graphsynth.kinematics.dimensional.design import Design
 from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted
+from graphsynth.kinematics.engine.batch import simulate_batch
 from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.model import Mechanism
 
@@ -32,6 +35,8 @@ Complex = NDArray[np.complex128]
 _PARTS, _PHASES, _COMPARED = (0.12, 0.2, 0.3, 0.45, 0.65, 0.9), 32, 14
 #: Weight of given pivots when a start is placed; points tried on each link; sets looked at together.
 _HELD, _TRIED, _TOGETHER = 30.0, 2, 128
+#: Matches of an index for every one that is wanted within a range; by how much the range may be too short; samples.
+_RANGES, _SLACK, _STEPS = 3, 0.03, 60
 
 
 class Starts(Protocol):
@@ -71,12 +76,42 @@ def index_starts(index: CurveIndex, count: int = 32) -> Starts:
         def fits(design: Design) -> bool:
             turns, sliders = design.kinds[design.driver_joints[0]] == "R", design.kinds.count("P")
             few = sliders <= task.sliders + (not turns) and design.graph.links in task.links
-            return few and turns == (task.drive == "rotation")
+            return few and turns == (task.drive in ("rotation", "rocking"))
 
-        every = [match.mechanism for match in index.find(_pairs(path.goal), count, closed=path.closed, only=fits)]
-        return [Mechanism(m.graph, m.joints, m.drivers, {path.point: m.points["P"]}, m.pose) for m in every]
+        rocking = task.drive == "rocking"
+        every = index.find(_pairs(path.goal), _RANGES * count if rocking else count, closed=path.closed, only=fits)
+        begun = (within(match, task.span) if rocking else match.mechanism for match in every)
+        return [
+            Mechanism(m.graph, m.joints, m.drivers, {path.point: m.points["P"]}, m.pose)
+            for m in islice((m for m in begun if m is not None), count)
+        ]
 
     return starts
+
+
+def within(match: CurveMatch, span: float) -> Mechanism | None:
+    """Return the mechanism of a match so that a range holds its curve; None if it does not go so far, or too far.
+
+    The range begins with the curve if it can, else as much earlier as it has to.
+    """
+    own, spare = match.mechanism, span - match.start.span
+    if spare < -_SLACK * span:
+        return None
+    for early in (0.0, 0.5 * spare, spare) if spare > 0.0 else (0.0,):
+        ahead, back = (_driven(own, end) for end in (span - early, -early))
+        if ahead is not None and back is not None:
+            return Mechanism(own.graph, own.joints, own.drivers, own.points, tuple(map(tuple, back.tolist())))
+    return None
+
+
+def _driven(mechanism: Mechanism, end: float) -> Array | None:
+    """Return the poses (links, 3) at an input, where the motion from its pose at 0 goes so far."""
+    if end == 0.0:
+        assert mechanism.pose is not None
+        return np.array(mechanism.pose)
+    inputs = np.linspace(0.0, end, _STEPS)
+    motion = simulate_batch(mechanism, inputs, mechanism.dimensions[None], rates=False)
+    return np.asarray(motion.poses[0, -1]) if motion.completed[0] else None
 
 
 def planned(task: DesignTask, starts: Starts | None, seconds: float) -> Iterator[tuple[Plan, Mechanism]]:

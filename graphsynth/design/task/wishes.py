@@ -13,20 +13,27 @@ from numpy.typing import NDArray
 from graphsynth.design.task.model import Corner, Model, Moved, Rows, Unknowns
 
 Array = NDArray[np.float64]
-#: How much of a bound is asked beyond, and the violation that counts like a tolerance.
+#: How much of a bound is asked beyond by a penalty, and the violation that counts like a tolerance.
 _BEYOND, _SPARE, _UNIT = 1.03, 0.003, 0.01
+#: What is asked beyond where bounds are kept exactly.
+_HAIR = 1e-7
 
 
 def sampled_wishes(model: Model, moved: Moved, u: Unknowns, strict: float) -> list[Rows]:
-    """Return transmission angles of dyads and cylinders, and the box."""
-    found = [_transmission(model, moved, u, corner, strict / _UNIT) for corner in model.corners]
+    """Return transmission angles of dyads and cylinders, and the box.
+
+    ``strict``: weight of the penalties; infinite for the numbers themselves, which then are negative where a bound is
+    kept.
+    """
+    found = [_transmission(model, moved, u, corner, strict) for corner in model.corners]
     if model.task.box is not None:
-        found.append(_box(model, moved, u, model.task.box, strict / _UNIT))
+        found.append(_box(model, moved, u, model.task.box, strict))
     return found
 
 
-def _transmission(model: Model, moved: Moved, u: Unknowns, corner: Corner, weight: float) -> Rows:
+def _transmission(model: Model, moved: Moved, u: Unknowns, corner: Corner, strict: float) -> Rows:
     """Return what the sine of the angle at the middle of three joints (joint, link) lacks where it is least."""
+    exact = strict == math.inf
     arms, at, motions = [], [], moved.frames.view(np.complex128)  # places and directions
     for joint, link in corner:
         own = motions[:, :, link]
@@ -36,10 +43,12 @@ def _transmission(model: Model, moved: Moved, u: Unknowns, corner: Corner, weigh
     mu = two * np.conj(one) / np.maximum(np.abs(two * one), 1e-300)
     mu = mu * np.where(mu[:, :1].imag < 0.0, -1.0, 1.0)
     worst = mu.imag.argmin(axis=1)
-    row, least = np.arange(len(mu)), max(_BEYOND * math.sin(model.task.transmission), 1e-3)
+    row, least = np.arange(len(mu)), math.sin(model.task.transmission)
+    least = least + _HAIR if exact else max(_BEYOND * least, 1e-3)
     mu, one, two = mu[row, worst], one[row, worst], two[row, worst]
-    short = (least - mu.imag) / least
-    slope = np.where(short > 0.0, -mu.real / least, 0.0)
+    unit = 1.0 if exact else least
+    short = (least - mu.imag) / unit
+    slope = np.where(exact | (short > 0.0), -mu.real / unit, 0.0)
     # directions of both arms: what their angle does when the joints move
     turns = [1j * slope * way / np.maximum(np.abs(way) ** 2, 1e-300) for way in (one, two)]
     loads, direct = np.zeros((len(mu), 1, model.links, 3, 1)), np.zeros((len(mu), 1, 1, model.size))
@@ -51,11 +60,13 @@ def _transmission(model: Model, moved: Moved, u: Unknowns, corner: Corner, weigh
             own = np.conj(by) * motions[row, worst, link, 1]
             direct[:, 0, 0, column] += own.real
             direct[:, 0, 0, column + 1] -= own.imag
-    return Rows(moved.inputs[worst][:, None], np.maximum(short, 0.0)[:, None, None], loads, direct, weight)
+    values = short if exact else np.maximum(short, 0.0)
+    return Rows(moved.inputs[worst][:, None], values[:, None, None], loads, direct, 1.0 if exact else strict / _UNIT)
 
 
-def _box(model: Model, moved: Moved, u: Unknowns, box: tuple[float, ...], weight: float) -> Rows:
+def _box(model: Model, moved: Moved, u: Unknowns, box: tuple[float, ...], strict: float) -> Rows:
     """How far joints and points leave the box on each of its four sides, over the size of the task."""
+    exact = strict == math.inf
     links = [joint.a for joint in model.plan.design.graph.joints]
     columns = [model.column(k) for k in range(model.joints)]
     for name, of_point in model.task.names.items():
@@ -72,10 +83,10 @@ def _box(model: Model, moved: Moved, u: Unknowns, box: tuple[float, ...], weight
     for side, (z, sign, limit, axis) in enumerate(
         ((x, -1.0, box[0], 0), (y, -1.0, box[1], 1), (x, 1.0, box[2], 0), (y, 1.0, box[3], 1))
     ):
-        over = (sign * (z - limit) / size + _SPARE).reshape(sets, -1)
+        over = (sign * (z - limit) / size + (_HAIR if exact else _SPARE)).reshape(sets, -1)
         worst = over.argmax(axis=1)
         sample, place = np.divmod(worst, len(links))
-        out = over[row, worst] > 0.0
+        out = exact | (over[row, worst] > 0.0)
         values[:, 0, side], times[:, side] = np.where(out, over[row, worst], 0.0), moved.inputs[sample]
         at, p, unit = w[row, sample, place], local[row, place], np.where(out, sign / size, 0.0)
         arm = (at[:, 2] + 1j * at[:, 3]) * (p[:, 0] + 1j * p[:, 1])
@@ -87,42 +98,48 @@ def _box(model: Model, moved: Moved, u: Unknowns, box: tuple[float, ...], weight
         by = (at[:, 2], -at[:, 3]) if axis == 0 else (at[:, 3], at[:, 2])
         for k in (0, 1):
             direct[row[free], 0, side, column[free] + k] = (unit * by[k])[free]
-    return Rows(times, values, loads, direct, weight)
+    return Rows(times, values, loads, direct, 1.0 if exact else strict / _UNIT)
 
 
 def direct_wishes(model: Model, u: Unknowns, strict: float) -> tuple[Array, Array]:
-    """Lengths, pivots and the stroke: numbers (sets, m) and their derivatives (sets, m, size)."""
-    task, sets = model.task, len(u.places)
+    """Lengths, pivots and the stroke: numbers (sets, m) and their derivatives (sets, m, size).
+
+    ``strict`` as of `sampled_wishes`; what shall be equal then comes twice, with both signs.
+    """
+    task, sets, exact = model.task, len(u.places), strict == math.inf
+    beyond, spare = (1.0 + _HAIR, _HAIR) if exact else (_BEYOND, _SPARE)
     values: list[Array] = []
     slopes: list[Array] = []
 
     def add(value: Array, slope: Array) -> None:
-        active = value > 0.0
+        active = exact | (value > 0.0)
         values.append(np.where(active, value, 0.0))
         slopes.append(slope * active[:, None])
+
+    def equal(value: Array, slope: Array) -> None:
+        values.extend((value, -value) if exact else (value,))
+        slopes.extend((slope, -slope) if exact else (slope,))
 
     sides, arms = _pairs(model)
     length, by = _logarithms(model, u, sides + arms)
     short = length[:, : len(sides)].argmin(axis=1)
     row = np.arange(sets)
     for k in range(len(sides) + len(arms)):
-        over = length[:, k] - length[row, short] - math.log(task.length_ratio / _BEYOND)
+        over = length[:, k] - length[row, short] - math.log(task.length_ratio / beyond)
         add(over, by[:, k] - by[row, short])
     if task.lengths is not None:
         for k in range(len(sides)):
-            add(math.log(task.lengths[0]) + _SPARE - length[:, k], -by[:, k])
-            add(length[:, k] - math.log(task.lengths[1]) + _SPARE, by[:, k])
+            add(math.log(task.lengths[0]) + spare - length[:, k], -by[:, k])
+            add(length[:, k] - math.log(task.lengths[1]) + spare, by[:, k])
     if task.crank is not None and (k := _crank(model, sides)) >= 0:
-        values.append(length[:, k] - math.log(task.crank))
-        slopes.append(by[:, k])
+        equal(length[:, k] - math.log(task.crank), by[:, k])
     used = np.zeros((sets, len(sides)), dtype=np.bool_)
     used[:, [p in model.fixed and q in model.fixed for p, q in sides]] = True  # sides of the frame are no bars
     for bar in task.bars:
         away = np.where(used, np.inf, np.abs(length[:, : len(sides)] - math.log(bar)))
         k = away.argmin(axis=1)
         used[row, k] = True
-        values.append(np.where(np.isfinite(away[row, k]), length[row, k] - math.log(bar), 1.0))
-        slopes.append(by[row, k])
+        equal(np.where(np.isfinite(away[row, k]), length[row, k] - math.log(bar), 1.0), by[row, k])
     if task.pivot_region is not None:
         frame = model.plan.design.graph.frame
         assert frame is not None
@@ -132,13 +149,13 @@ def direct_wishes(model: Model, u: Unknowns, strict: float) -> tuple[Array, Arra
                     for sign, limit in ((-1.0, task.pivot_region[axis]), (1.0, task.pivot_region[axis + 2])):
                         slope = np.zeros((sets, model.size))
                         slope[:, at + axis] = sign / task.size
-                        add(sign * (u.places[:, joint, axis] - limit) / task.size + _SPARE, slope)
+                        add(sign * (u.places[:, joint, axis] - limit) / task.size + spare, slope)
     if task.linear and task.stroke is not None:
         for sign, bound in ((-1.0, task.stroke[0]), (1.0, task.stroke[1])):
             slope = np.zeros((sets, model.size))
             slope[:, model.stroke_at] = sign / u.stroke
-            add(sign * (np.log(np.maximum(u.stroke, 1e-300)) - math.log(bound)) + _SPARE, slope)
-    weight = strict / _UNIT
+            add(sign * (np.log(np.maximum(u.stroke, 1e-300)) - math.log(bound)) + spare, slope)
+    weight = 1.0 if exact else strict / _UNIT
     if not values:
         return np.zeros((sets, 0)), np.zeros((sets, 0, model.size))
     return weight * np.stack(values, axis=1), weight * np.stack(slopes, axis=1)

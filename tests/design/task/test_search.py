@@ -23,10 +23,11 @@ from graphsynth.design import (
 )
 from graphsynth.design.task.answers import Candidate, Origin, judged, signature
 from graphsynth.design.task.classical import solutions
-from graphsynth.design.task.descend import descend, evened
+from graphsynth.design.task.descend import descend
 from graphsynth.design.task.model import Model
 from graphsynth.design.task.plans import plans
 from graphsynth.design.task.problem import TaskProblem
+from graphsynth.design.task.settle import levelled
 from graphsynth.design.task.starts import _moved, _posed, _some, placed_starts, random_starts
 
 POINTS = [(0.0, 0.0), (1.0, 0.5), (2.0, 0.2), (3.0, -0.5)]
@@ -216,13 +217,14 @@ def test_the_largest_error_is_made_small_in_the_end() -> None:
     model = Model(task, next(plans(task, 4)), random)
     problem = TaskProblem(model)
     X, times = placed_starts(problem, random_starts(model, 300, random), 20, random)
-    found = descend(problem, X, 3.0, 100, times).one(0)
+    x = descend(problem, X, 3.0, 100, times).X[0]
 
     def sizes(x: Any) -> Any:
-        return 0.01 * math.sqrt(33) * problem.sizes(x[None], found.times)[0][0]
+        return 0.01 * math.sqrt(33) * np.abs(problem.exactly(x, None).errors[0][0][0])
 
-    before, after = sizes(found.X[0]), sizes(evened(problem, found, 3.0))
-    assert after.max() < 0.8 * before.max()
+    found = levelled(problem, x)
+    before, after = sizes(x), sizes(found.x)
+    assert 0.01 * found.error == pytest.approx(after.max()) and after.max() < 0.8 * before.max()
     assert (after > 0.9 * after.max()).sum() >= 7 > (before > 0.9 * before.max()).sum()  # six numbers of a four-bar
     assert (after**2).sum() > (before**2).sum()  # which least squares had made small
 
