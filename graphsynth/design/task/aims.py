@@ -19,7 +19,10 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 #: Samples of a dwell; inputs next to a dead centre, and weights of the values there that give its speed (order six).
 _STILL, _NEAR = 13, 0.02
-_OFFSETS, _DIFFERENCE = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]), np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
+_OFFSETS, _DIFFERENCE = (
+    np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]),
+    np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0,
+)
 #: Samples all over a curve that shall draw a closed path, and half the width of the band that holds it, over a side.
 _WHOLE, _BAND = 48, 0.2
 #: Steps of the times of a path after each step of its mechanism.

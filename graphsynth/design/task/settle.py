@@ -169,7 +169,9 @@ def _unweighted(part: Array) -> Array:
 
 def _stacked(now: Exact) -> tuple[Array, Array]:
     size = now.steep.shape[1]
-    return np.concatenate([r.ravel() for r, _ in now.errors]), np.concatenate([J.reshape(-1, size) for _, J in now.errors])
+    return np.concatenate([r.ravel() for r, _ in now.errors]), np.concatenate(
+        [J.reshape(-1, size) for _, J in now.errors]
+    )
 
 
 def _squares(now: Exact) -> float:

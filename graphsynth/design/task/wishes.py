@@ -15,8 +15,8 @@ from graphsynth.design.task.model import Corner, Model, Moved, Rows, Unknowns
 Array = NDArray[np.float64]
 #: How much of a bound is asked beyond by a penalty, and the violation that counts like a tolerance.
 _BEYOND, _SPARE, _UNIT = 1.03, 0.003, 0.01
-#: What is asked beyond where bounds are kept exactly.
-_HAIR = 1e-7
+#: What is asked beyond where bounds are kept exactly; the least sine of a transmission angle while they are not.
+_HAIR, _LEAST = 1e-7, 0.02
 
 
 def sampled_wishes(model: Model, moved: Moved, u: Unknowns, strict: float) -> list[Rows]:
@@ -32,7 +32,10 @@ def sampled_wishes(model: Model, moved: Moved, u: Unknowns, strict: float) -> li
 
 
 def _transmission(model: Model, moved: Moved, u: Unknowns, corner: Corner, strict: float) -> Rows:
-    """Return what the sine of the angle at the middle of three joints (joint, link) lacks where it is least."""
+    """Return by how much the cosine of the angle at the middle of three joints (joint, link) is too large, at most.
+
+    The cosine is smooth even where a dyad cannot be assembled, so that a gap between two samples shows.
+    """
     exact = strict == math.inf
     arms, at, motions = [], [], moved.frames.view(np.complex128)  # places and directions
     for joint, link in corner:
@@ -41,27 +44,45 @@ def _transmission(model: Model, moved: Moved, u: Unknowns, corner: Corner, stric
         at.append(own[..., 0] + arms[-1])
     one, two = at[1] - at[0], at[1] - at[2]
     mu = two * np.conj(one) / np.maximum(np.abs(two * one), 1e-300)
-    mu = mu * np.where(mu[:, :1].imag < 0.0, -1.0, 1.0)
-    worst = mu.imag.argmin(axis=1)
-    row, least = np.arange(len(mu)), math.sin(model.task.transmission)
-    least = least + _HAIR if exact else max(_BEYOND * least, 1e-3)
-    mu, one, two = mu[row, worst], one[row, worst], two[row, worst]
-    unit = 1.0 if exact else least
-    short = (least - mu.imag) / unit
-    slope = np.where(exact | (short > 0.0), -mu.real / unit, 0.0)
+    peaks, near, share = _peaks(moved, np.abs(mu.real))
+    row, least = np.arange(len(mu))[:, None], math.sin(model.task.transmission)
+    most = math.sqrt(1.0 - (least if exact else max(_BEYOND * least, _LEAST)) ** 2) - exact * _HAIR
+    mu, one, two = mu[row, near], one[row, near], two[row, near]
+    unit = 1.0 if exact else 1.0 - most
+    over = (peaks - most) / unit
+    slope = np.where(exact | (over > 0.0)[:, None], -share * np.sign(mu.real) * mu.imag / unit, 0.0)
     # directions of both arms: what their angle does when the joints move
     turns = [1j * slope * way / np.maximum(np.abs(way) ** 2, 1e-300) for way in (one, two)]
-    loads, direct = np.zeros((len(mu), 1, model.links, 3, 1)), np.zeros((len(mu), 1, 1, model.size))
+    loads, direct = np.zeros((len(mu), 1, model.links, 3, 3)), np.zeros((len(mu), 1, 3, model.size))
     for (joint, link), arm, by in zip(corner, arms, (turns[0], turns[1] - turns[0], -turns[1])):
-        loads[:, 0, link, 0, 0] += by.real
-        loads[:, 0, link, 1, 0] += by.imag
-        loads[:, 0, link, 2, 0] += (np.conj(by) * 1j * arm[row, worst]).real
+        loads[:, 0, link, 0] += by.real
+        loads[:, 0, link, 1] += by.imag
+        loads[:, 0, link, 2] += (np.conj(by) * 1j * arm[row, near]).real
         if (column := model.column(joint)) >= 0:
-            own = np.conj(by) * motions[row, worst, link, 1]
-            direct[:, 0, 0, column] += own.real
-            direct[:, 0, 0, column + 1] -= own.imag
-    values = short if exact else np.maximum(short, 0.0)
-    return Rows(moved.inputs[worst][:, None], values[:, None, None], loads, direct, 1.0 if exact else strict / _UNIT)
+            own = np.conj(by) * motions[row, near, link, 1]
+            direct[:, 0, :, column] += own.real
+            direct[:, 0, :, column + 1] -= own.imag
+    values = (over if exact else np.maximum(over, 0.0))[:, None, None]
+    return Rows(moved.inputs[near], values, loads, direct, 1.0 if exact else strict / _UNIT, mix=np.ones((1, 3)))
+
+
+def _peaks(moved: Moved, values: Array) -> tuple[Array, NDArray[np.intp], Array]:
+    """Return the largest value (sets,) of parabolas through a sample and its neighbours, these three, their shares."""
+    n, row = values.shape[1], np.arange(len(values))[:, None]
+    middle = np.arange(n)
+    left, right = middle - 1, middle + 1
+    left[0], right[-1] = (n - 2, 1) if moved.period else (0, n - 1)
+    h = np.diff(moved.inputs)
+    before, after = np.append(h[-1], h), np.append(h, h[0])
+    rise, fall = (values - values[:, left]) / before, (values[:, right] - values) / after
+    bend, slope = (fall - rise) / (before + after), (rise * after + fall * before) / (before + after)
+    top = (rise > 0.0) & (fall < 0.0)
+    away = np.where(top, -slope / (2.0 * np.where(top, bend, -1.0)), 0.0)
+    worst = (values + 0.5 * slope * away).argmax(axis=1)[:, None]
+    x, b, a = away[row, worst], before[worst], after[worst]
+    share = [x * (x - a) / (b * (a + b)), (x + b) * (a - x) / (a * b), x * (x + b) / (a * (a + b))]
+    near = np.concatenate([left[worst], worst, right[worst]], axis=1)
+    return (values + 0.5 * slope * away)[row, worst][:, 0], near, np.concatenate(share, axis=1)
 
 
 def _box(model: Model, moved: Moved, u: Unknowns, box: tuple[float, ...], strict: float) -> Rows:

@@ -43,7 +43,7 @@ _SEED = 20_261_123
 
 
 class Hidden(NamedTuple):
-    """A mechanism that moves: links, dyads only, drive, its range, inputs (n,) and the curve or angle it shows there."""
+    """A mechanism that moves: links, dyads only, drive, its range; inputs (n,) and a curve or angle."""
 
     links: int
     dyadic: bool
