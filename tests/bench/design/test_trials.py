@@ -9,7 +9,7 @@ import pytest
 
 import graphsynth as gs
 from graphsynth.mechanism.laws import Driver, Linear
-from tests.bench.design import measure, table
+from tests.bench.design import hidden, measure, table
 from tests.bench.design.__main__ import compete
 from tests.bench.design.four_bars import FourBar, of_mechanism
 from tests.bench.design.letters import LETTERS, area, outline
@@ -149,6 +149,33 @@ def test_the_page_shows_the_results():
     assert table.classical(rows) in text and table.letters(rows) in text
     for trial in CLASSICAL:
         assert trial.published[1] in (text if math.isfinite(trial.published[0]) else "none found")
+
+
+def test_hidden_mechanisms_are_drawn_alike_and_measured_by_the_whole_motion():
+    one, two = (hidden.hidden("curves", 1) for _ in range(2))
+    assert (one.values == two.values).all() and one.links == two.links and one.size > 0.0
+    bar = gs.Mechanism.four_bar(2.0, 0.7, 2.5, 1.8, coupler_point=(1.2, 0.9))
+    u = np.linspace(0.0, TURN, 1025)
+    motion = gs.simulate(bar, u)
+    z, theta = motion.point("P").position @ [1.0, 1.0j], np.unwrap(motion.poses[:, 3, 2])
+    curve = hidden.Hidden(4, True, "rotation", TURN, u, z)
+    assert hidden.error_of("curves", curve, bar, 2) < 1e-5
+    assert hidden.error_of("curves", curve._replace(values=z + 0.01 * curve.size), bar, 2) == pytest.approx(
+        0.01, rel=1e-2
+    )
+    function = hidden.Hidden(4, True, "rotation", TURN, u, theta)
+    assert hidden.error_of("functions", function, bar, 3) < 1e-5
+    other = function._replace(values=theta + 0.02 * function.size * np.sin(u))
+    assert hidden.error_of("functions", other, bar, 3) == pytest.approx(0.02, rel=0.05)
+    task = hidden.task_of("curves", curve)
+    assert task.targets[0].closed and task.targets[0].size == pytest.approx(curve.size, rel=1e-3)
+
+
+def test_shares_have_the_bounds_of_wilson():
+    """They solve (p - k / n)^2 = z^2 p (1 - p) / n."""
+    for k, n in ((0, 10), (9, 10), (170, 200)):
+        for p in hidden.share(k, n):
+            assert (p - k / n) ** 2 == pytest.approx(1.96**2 * p * (1.0 - p) / n, abs=1e-12)
 
 
 @pytest.mark.slow
