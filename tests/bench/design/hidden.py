@@ -57,7 +57,7 @@ class Hidden(NamedTuple):
         """Of a curve its largest distance from its middle, of a function its swing."""
         if self.values.dtype == np.float64:
             return float(np.ptp(self.values))
-        z = evenly(self.values, _POINTS[0], False)
+        z = evenly(self.values, _POINTS[0], self.drive == "rotation")
         return float(np.abs(z - z.mean()).max())
 
 
