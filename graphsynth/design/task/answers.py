@@ -237,6 +237,10 @@ def _bounds(task: DesignTask, motion: Motion, places: Array) -> dict[str, bool]:
             k = min(range(len(lengths)), key=lambda k: abs(math.log(lengths[k] / bar)), default=-1)
             fits = k >= 0 and abs(math.log(lengths.pop(k) / bar)) <= _FIT
             broken["a given bar is not used"] = broken.get("a given bar is not used", False) or not fits
+    if task.crank is not None or task.crank_start is not None:
+        broken |= _crank_bounds(task, motion)
+    if task.symmetric:
+        broken["its curve is not symmetric"] = not _symmetric(motion, task.symmetric_point)
     if task.linear and task.stroke is not None:
         law = mechanism.drivers[0].law
         stroke = abs(law.rate) if isinstance(law, Linear) else math.nan
@@ -244,6 +248,36 @@ def _bounds(task: DesignTask, motion: Motion, places: Array) -> dict[str, bool]:
             task.stroke[0] * (1 - SLACK) <= stroke <= task.stroke[1] * (1 + SLACK)
         )
     return broken
+
+
+def _crank_bounds(task: DesignTask, motion: Motion) -> dict[str, bool]:
+    """Tell whether the driven link has not its length or begins elsewhere; of the motion as it is."""
+    mechanism, driven = motion.mechanism, motion.mechanism.drivers[0].link
+    own = [k for k, joint in enumerate(mechanism.joints) if driven in joint.pair and joint.kind == "R"]
+    fixed = [k for k, joint in enumerate(mechanism.joints) if mechanism.frame in joint.pair]
+    at = _places(motion)[0] @ [1.0, 1.0j]
+    pivot = next((k for k in own if k in fixed), -1)
+    ways = [at[k] - at[pivot] for k in own if k != pivot] if pivot >= 0 else []
+    broken: dict[str, bool] = {}
+    if task.crank is not None and ways:
+        broken["the crank has not its length"] = abs(math.log(abs(ways[0]) / task.crank)) > _FIT
+    if task.crank_start is not None:
+        base = at[next(k for k in fixed if k != pivot)] - at[pivot] if task.crank_from == "frame" else 1.0
+        low, high = task.crank_start
+        off = math.remainder(float(np.angle(ways[0] / base)) - 0.5 * (low + high), math.tau)
+        broken["the crank begins elsewhere"] = abs(off) > 0.5 * (high - low) + SLACK
+    return broken
+
+
+def _symmetric(motion: Motion, point: str) -> bool:
+    """Whether a point of a four-bar, its crank pin and the pivot of its follower are equally far from a joint."""
+    mechanism = motion.mechanism
+    tracing = mechanism.points[point].link
+    far = [link for link in range(4) if link not in (mechanism.frame, mechanism.drivers[0].link, tracing)]
+    middle = next(j for j in mechanism.joints if {*j.pair} == {tracing, far[0]})
+    at = middle.at_a if middle.a == tracing else middle.at_b
+    lengths = [math.dist(at, mechanism.points[point].at), *side_lengths(mechanism, [tracing, far[0]])]
+    return max(lengths) - min(lengths) <= SLACK * max(lengths)
 
 
 def signature(task: DesignTask, answer: DesignedMechanism) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from graphsynth.design.task.plans import Plan
 from graphsynth.design.task.task import DesignTask
+from graphsynth.design.task.ties import ties
 from graphsynth.kinematics.dimensional.matching import MovingLink, at_times
 from graphsynth.kinematics.dimensional.sketch import layout
 from graphsynth.kinematics.dimensional.verify import group_forms, transmission_sines
@@ -95,7 +96,8 @@ class Model:
         self, task: DesignTask, plan: Plan, random: np.random.Generator, given: Unknowns | None = None, sense: int = 0
     ) -> None:
         self.task, self.plan = task, plan
-        self.sense = sense or int(random.choice([-1, 1]))
+        self.sense = sense or task.sense or int(random.choice([-1, 1]))
+        self.ties = ties(task, plan)
         design = plan.design
         self.joints, self.links = len(design.kinds), design.graph.links
         self.names = list(task.names)
@@ -148,18 +150,49 @@ class Model:
         number = self.plan.design.numbers.index((joint, "angle"))
         return 2 * len(self.free) + self.angles.index(number)
 
+    def free_places(self, X: Array) -> Array:
+        """Return the places (sets, joints, 2) in vectors, and those that are given."""
+        places = np.zeros((len(X), self.joints, 2))
+        places[:, self.free] = X[:, : 2 * len(self.free)].reshape(len(X), -1, 2)
+        places[:, self.given] = [p for _, p in self.plan.given] or np.zeros((0, 2))
+        return places
+
     def read(self, X: Array) -> Unknowns:
         """Read vectors (sets, size)."""
-        sets, count = len(X), 2 * len(self.free)
-        places = np.zeros((sets, self.joints, 2))
-        places[:, self.free] = X[:, :count].reshape(sets, -1, 2)
-        places[:, self.given] = [p for _, p in self.plan.given] or np.zeros((0, 2))
+        sets, count, places = len(X), 2 * len(self.free), self.free_places(X)
         numbers = np.zeros((sets, len(self.plan.design.numbers)))
         numbers[:, self.angles] = X[:, count : self.points_at]
         places, numbers = self.tied(places, numbers)
         points = X[:, self.points_at : self.own_at].reshape(sets, -1, 2)
         stroke = X[:, self.stroke_at] if self.task.linear else np.ones(sets)
-        return Unknowns(places, numbers, points, X[:, self.own_at : self.stroke_at], stroke)
+        return self.kept(Unknowns(places, numbers, points, X[:, self.own_at : self.stroke_at], stroke))
+
+    def kept(self, u: Unknowns) -> Unknowns:
+        """Put the places that depend on others where they have to be."""
+        every = np.concatenate([u.places, u.points], axis=1)
+        for tie in self.ties:
+            every = tie.kept(every)
+        return u._replace(places=every[:, : self.joints], points=every[:, self.joints :]) if self.ties else u
+
+    def through_ties(self, X: Array, slopes: Array) -> Array:
+        """Return derivatives (sets, m, size) by the vector from those by the places that it gives."""
+        every = np.concatenate([self.free_places(X), X[:, self.points_at : self.own_at].reshape(len(X), -1, 2)], axis=1)
+        steps = []
+        for tie in self.ties:
+            steps.append((tie, tie.slopes(every)))
+            every = tie.kept(every)
+        for tie, by in reversed(steps):
+            at = self.place_at(tie.places[0])
+            own = slopes[..., at : at + 2].copy()
+            slopes[..., at : at + 2] = 0.0
+            for k, place in enumerate(tie.places):
+                if (to := self.place_at(place)) >= 0:
+                    slopes[..., to : to + 2] += own @ by[:, :, k]
+        return slopes
+
+    def place_at(self, place: int) -> int:
+        """Return where a joint, or a named point counted after the joints, begins in the vector; -1 if it is given."""
+        return self.column(place) if place < self.joints else self.points_at + 2 * (place - self.joints)
 
     def write(self, u: Unknowns) -> Array:
         """Write vectors: the reverse of `read`."""

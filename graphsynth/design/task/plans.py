@@ -48,6 +48,8 @@ def fitting(task: DesignTask, design: Design) -> Iterator[Plan]:
     """Yield the plans of a design: carriers of names and given pivots in every way."""
     if task.dyads_only and not decompose(design.graph, design.drivers).dyadic:
         return
+    if task.crank_start is not None and sum(design.kinds[k] == "R" for k in design.joints_of(design.drivers[0][1])) < 2:
+        return  # a driven link without a second joint that turns has no direction
     pins = None
     if task.drive == "cylinder":
         (own,) = design.driver_joints

@@ -69,6 +69,8 @@ class TaskProblem:
         values, slopes = (np.concatenate(part, axis=1) for part in zip(*self._pulled(every, u)))
         more, steep = direct_wishes(model, u, strict)
         values, slopes = np.concatenate([values, more], axis=1), np.concatenate([slopes, steep], axis=1)
+        if model.ties:
+            slopes = model.through_ties(X, slopes)
         error = np.sqrt((values**2).sum(axis=1))
         bad = ~moved.complete | ~np.isfinite(slopes).all(axis=(1, 2)) | ~np.isfinite(error)
         values[bad], slopes[bad] = 0.0, 0.0

@@ -117,6 +117,8 @@ def _driven(mechanism: Mechanism, end: float) -> Array | None:
 def planned(task: DesignTask, starts: Starts | None, seconds: float) -> Iterator[tuple[Plan, Mechanism]]:
     """Yield mechanisms to begin with, solutions of classical problems first, each with every plan it fits."""
     for mechanism in (*solutions(task, seconds), *(starts(task) if starts is not None else ())):
+        if task.sense and task.sense * float(mechanism.drivers[0].law(np.zeros(1))[1][0]) < 0.0:
+            continue
         kinds = tuple(joint.kind for joint in mechanism.joints)
         driver = mechanism.drivers[0].pair
         design = Design(mechanism.graph, (driver,), kinds)
@@ -142,7 +144,8 @@ def random_starts(model: Model, count: int, random: np.random.Generator) -> Unkn
     for k, name in enumerate(name for name, of_point in model.task.names.items() if of_point):
         own = design.joints_of(model.carrier(name))
         points[:, k] = places[:, own].mean(axis=1) + random.normal(0.0, 1.0, (count, 2))
-    return Unknowns(*model.tied(places, numbers), points, np.zeros((count, model.stroke_at - model.own_at)), stroke)
+    own = np.zeros((count, model.stroke_at - model.own_at))
+    return model.kept(Unknowns(*model.tied(places, numbers), points, own, stroke))
 
 
 def placed_starts(
@@ -196,7 +199,8 @@ def placed_starts(
 
 def _begins_late(model: Model, aim: TimedAim) -> bool:
     """Whether a candidate may begin anywhere on its turn: then it is moved to where its inputs suit the target."""
-    return aim.inputs is not None and not aim.own_start and model.task.drive == "rotation"
+    free = model.task.crank_start is None or model.task.crank_from == "x"  # a placement turns the crank, too
+    return aim.inputs is not None and not aim.own_start and model.task.drive == "rotation" and free
 
 
 def _posed(model: Model, u: Unknowns, moved: Moved, at: NDArray[np.intp]) -> Unknowns:

@@ -15,6 +15,9 @@ from graphsynth.core.shown import Shown
 from graphsynth.design.task.targets import PathTarget, Point, PosesTarget, SwingTarget, Target
 
 Drive = Literal["rotation", "rocking", "cylinder", "slide"]
+#: How the driven link turns: counter-clockwise is positive.
+Turning = Literal["either", "counter-clockwise", "clockwise"]
+_SENSES = {"either": 0, "counter-clockwise": 1, "clockwise": -1}
 #: Lengths of links unless they are given, in sizes of the task.
 _SHORT, _LONG = 0.1, 6.0
 #: x and y of the lower left, then of the upper right corner.
@@ -22,6 +25,20 @@ Box = tuple[float, float, float, float]
 #: What answers are ranked by, and how much each counts: errors in tolerances, links, size of the task, radians,
 #: the margin of binding (at most 4).
 RANKED = {"error": 1.0, "links": 0.05, "size": 0.02, "transmission": 0.1, "jam": 0.05}
+
+
+def _start(name: str, given: float | str | Sequence[float | str]) -> tuple[float, float]:
+    """Read one direction, or two limits."""
+    limits = (given, given) if isinstance(given, float | int | str) else tuple(given)
+    if len(limits) != 2:
+        raise GeometryError(f"{name} = {given!r} must be one angle, or two: the limits")
+    low, high = (angle(name, value) for value in limits)
+    if not low <= high <= low + math.tau:
+        raise GeometryError(f"{name} = {given!r}: the second limit must not be below the first, nor a turn beyond it")
+    return low, high
+
+
+Start = Kept[float | str | Sequence[float | str] | None, tuple[float, float] | None]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -55,6 +72,16 @@ class DesignTask(Shown):
         the task.
     crank : float, optional
         Given length of the driven link.
+    crank_start : float, str or a pair of them, optional
+        Direction of the driven link at the input 0, from its pivot to its (first) other joint: given, or between two
+        limits, counter-clockwise.
+    crank_from : {"x", "frame"}
+        Whether it is measured from the x axis or from the line to the other pivot on the frame (four links).
+    turning : {"either", "counter-clockwise", "clockwise"}
+        How the driven link turns.
+    symmetric : bool
+        The point draws a curve with an axis of symmetry: four links, the point and the crank pin and the pivot of the
+        follower equally far from the joint of coupler and follower (lambda-type linkages).
     bars : sequence of float
         Lengths of bars that are there and shall be used: each is a distance of two joints on a moving link.
     length_ratio : float
@@ -85,6 +112,10 @@ class DesignTask(Shown):
     box: Box | None = None
     lengths: tuple[float, float] | None = None
     crank: float | None = None
+    crank_start: Start = Kept(optional(_start), None)
+    crank_from: Literal["x", "frame"] = "x"
+    turning: Turning = "either"
+    symmetric: bool = False
     bars: Sequence[float] = ()
     length_ratio: float = 8.0
     transmission: Kept[float | str, float] = Kept(angle, math.radians(25.0))
@@ -124,6 +155,7 @@ class DesignTask(Shown):
             put(self, "lengths", (_SHORT * min(sizes), _LONG * max(sizes)))
         if self.crank is not None:
             positive("crank", self.crank)
+        self._shaped()
         put(self, "bars", tuple(positive(f"bars[{k}]", bar) for k, bar in enumerate(self.bars)))
         for name in ("misalignment", "joint_tilt"):
             if getattr(self, name) is not None:
@@ -151,6 +183,29 @@ class DesignTask(Shown):
                 raise GeometryError(f"a target has an input of {last:.6g}, but the drive ends at {span:.6g}")
             if isinstance(target, SwingTarget) and target.time_ratio is not None and self.drive != "rotation":
                 raise GeometryError("a time ratio needs a drive that turns fully; use drive = 'rotation'")
+
+    def _shaped(self) -> None:
+        """Check the words that speak of the crank and of the shape of a curve."""
+        choice("crank_from", self.crank_from, ("x", "frame"))
+        choice("turning", self.turning, tuple(_SENSES))
+        four = self.links == (4,) and not self.sliders
+        if self.linear and (self.crank_start is not None or self.turning != "either"):
+            raise GeometryError("a linear drive has no crank; leave crank_start and turning out")
+        if self.crank_start is not None and self.crank_from == "frame" and not four:
+            raise GeometryError("a direction from the frame's line needs four links that turn; use links = [4]")
+        points = {target.point for target in self.targets if isinstance(target, PathTarget | PosesTarget)}
+        if self.symmetric and (not four or self.linear or len(points) != 1):
+            raise GeometryError("a symmetric curve is that of one point of four links that turn; use links = [4]")
+
+    @property
+    def sense(self) -> int:
+        """1 if the driven link turns counter-clockwise, -1 clockwise, 0 if either will do."""
+        return _SENSES[self.turning]
+
+    @property
+    def symmetric_point(self) -> str:
+        """Name of the point that draws a symmetric curve."""
+        return next(target.point for target in self.targets if isinstance(target, PathTarget | PosesTarget))
 
     @property
     def linear(self) -> bool:

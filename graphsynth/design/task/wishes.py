@@ -201,8 +201,7 @@ def _logarithms(model: Model, u: Unknowns, pairs: list[tuple[int, int]]) -> tupl
         square = np.maximum((d**2).sum(axis=1), 1e-24)
         found[:, k] = 0.5 * np.log(square)
         for place, sign in ((p, 1.0), (q, -1.0)):
-            at = model.column(place) if place < model.joints else model.points_at + 2 * (place - model.joints)
-            if at >= 0:
+            if (at := model.place_at(place)) >= 0:
                 slope[:, k, at : at + 2] += sign * d / square[:, None]
     return found, slope
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from graphsynth.pipeline.tables import In, require
@@ -220,6 +220,10 @@ class DesignTable:
     box: Box | None = None
     lengths: tuple[float, float] | None = None
     crank: Annotated[float | None, In(above=0)] = None
+    crank_start: Annotated[tuple[float, ...], In("deg")] = ()
+    crank_from: Literal["x", "frame"] = "x"
+    turning: Literal["either", "counter-clockwise", "clockwise"] = "either"
+    symmetric: bool = False
     bars: tuple[float, ...] = ()
     length_ratio: Annotated[float, In(least=1)] = 8.0
     transmission: Annotated[float, In("deg", least=0, below=90)] = 25.0 * DEGREE
@@ -242,7 +246,7 @@ class DesignTable:
         turn = 1.0 if self.drive in ("cylinder", "slide") else DEGREE
         tables: tuple[Any, ...] = (*self.paths, *self.poses, *self.functions, *self.dwells, *self.swings)
         targets: list[Target] = [table.target(turn) for table in tables]
-        own = ("drive", "span", "stroke", "links", "sliders", "pivots", "pivot_region", "box", "lengths", "crank")
-        wishes = ("dyads_only", "bars", "length_ratio", "transmission", "misalignment", "joint_tilt")
-        more: dict[str, Any] = {name: getattr(self, name) for name in (*own, *wishes)}
-        return DesignTask(targets=targets, **more)
+        start = self.crank_start * 2 if len(self.crank_start) == 1 else self.crank_start or None
+        shared = {own.name for own in fields(self)} & {own.name for own in fields(DesignTask)} - {"crank_start"}
+        more: dict[str, Any] = {name: getattr(self, name) for name in shared}
+        return DesignTask(targets=targets, crank_start=start, **more)

@@ -22,6 +22,8 @@ from tests.bench.design.letters import LETTERS, outline
 Complex = NDArray[np.complex128]
 #: Bounds of the literature: none on the transmission angle, and almost none on lengths.
 _FREE: dict[str, Any] = {"transmission": 0.0, "length_ratio": 300.0}
+#: The crank of the literature begins at 30 degrees from the frame and turns counter-clockwise.
+_CRANK: dict[str, Any] = {"crank_start": "30 deg", "crank_from": "frame", "turning": "counter-clockwise"}
 _HERE = Path(__file__).parent
 PUBLISHED: dict[str, list[dict[str, Any]]] = tomllib.loads((_HERE / "published.toml").read_text("utf-8"))
 
@@ -98,12 +100,12 @@ PATHS = [
     _path("vertical", "six points on a vertical line", "[Cabrera et al. 2002]",
           [(20, y) for y in range(20, 50, 5)]),
     _path("five_timed", "five timed points", "[Kunjur & Krishnamurty 1997]", _FIVE, [0, 15, 30, 45, 60],
-          bounds=50.0, pivots=[(0, 0)], pivot_region=(-1e-3, -1e-3, 50.0, 1e-3)),
+          bounds=50.0, pivots=[(0, 0)], pivot_region=(-1e-3, -1e-3, 50.0, 1e-3), **_CRANK),
     _path("eighteen_timed", "18 timed points", "[Kunjur & Krishnamurty 1997]", _EIGHTEEN, 20.0 * np.arange(18),
           bounds=50.0),
     _path("ellipse", "ten points on an ellipse", _MANDAL, _ELLIPSE, bounds=80.0),
     _path("semicircle", "six timed points of a semicircle", _MANDAL, _SEMICIRCLE, [0, 30, 60, 90, 120, 150],
-          bounds=50.0),
+          bounds=50.0, **_CRANK),
 ]  # fmt: skip
 
 

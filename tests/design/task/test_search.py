@@ -52,6 +52,25 @@ TASKS = {
         ),
         4,
     ),
+    "symmetric curve, direction of the crank from the frame": (
+        DesignTask(
+            targets=[PathTarget(points=POINTS, inputs=even(4, 1.5))],
+            links=[4],
+            symmetric=True,
+            crank_start="30 deg",
+            crank_from="frame",
+        ),
+        4,
+    ),
+    "direction of the crank, a given pivot": (
+        DesignTask(
+            targets=[PathTarget(points=POINTS, inputs=even(4, 1.5))],
+            crank_start="40 deg",
+            turning="clockwise",
+            pivots=[(0, 0)],
+        ),
+        6,
+    ),
     "function of a slider": (
         DesignTask(
             targets=[FunctionTarget(inputs=even(5, 2.0), outputs=[0, 0.1, 0.3, 0.4, 0.5], slides=True)], sliders=1

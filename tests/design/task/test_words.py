@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
+import pytest
+
+import graphsynth as gs
+from graphsynth.core.errors import GeometryError
 from graphsynth.core.limits import Clock, here, told
-from graphsynth.design import DesignTask, PathTarget, design
+from graphsynth.design import DesignedMechanism, DesignTask, PathTarget, SwingTarget, design
 from graphsynth.design.task.plans import Plan, plans
 
 
+@pytest.mark.long
 def test_a_limit_of_processor_time_ends_the_search() -> None:
     task = DesignTask(targets=[PathTarget.segment((0, 0), (4, 0), count=12, tolerance=1e-7)], links=[4])
     found = design(task, processor_seconds=1e-3)
@@ -50,3 +58,81 @@ def test_dyads_alone_leave_out_what_cannot_be_assembled_two_links_at_a_time() ->
     every = list(plans(free, 6))
     kept = list(plans(replace(free, dyads_only=True), 6))
     assert kept == [plan for plan in every if two_by_two(plan)] and 0 < len(kept) < len(every)
+
+
+POINTS = [(3, 3), (2.759, 3.363), (2.372, 3.663), (1.89, 3.862), (1.355, 3.943)]
+
+
+def crank_angles(found: DesignedMechanism, from_frame: bool) -> Any:
+    """Directions of the crank over the motion, from the x axis or from the line of the pivots."""
+    mechanism, motion = found.mechanism, found.motion
+    crank = mechanism.drivers[0].link
+    at = {k: motion.point(j.a, j.at_a).position @ [1.0, 1.0j] for k, j in enumerate(mechanism.joints)}
+    pivots = [k for k, j in enumerate(mechanism.joints) if mechanism.frame in j.pair]
+    pivot = next(k for k in pivots if crank in mechanism.joints[k].pair)
+    pin = next(k for k, j in enumerate(mechanism.joints) if crank in j.pair and k != pivot)
+    other = next(k for k in pivots if k != pivot)
+    return np.unwrap(np.angle((at[pin] - at[pivot]) / (at[other] - at[pivot] if from_frame else 1.0)))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("start", "words", "turning", "between"),
+    [
+        ("30 deg", "frame", "counter-clockwise", (30.0, 30.0)),
+        (("-200 deg", "-170 deg"), "frame", "counter-clockwise", (-200.0, -170.0)),
+        ("-100 deg", "x", "clockwise", (-100.0, -100.0)),
+    ],
+)
+def test_the_crank_begins_where_it_shall(start: Any, words: Any, turning: Any, between: Any) -> None:
+    path = PathTarget(points=POINTS, inputs=np.radians([0, 15, 30, 45, 60]).tolist(), tolerance=0.05)
+    task = DesignTask(
+        targets=[path], links=[4], crank_start=start, crank_from=words, turning=turning, transmission="10 deg"
+    )
+    found = design(task, count=1, seconds=300, processor_seconds=60)
+    assert found.accepted, found
+    angles = crank_angles(found[0], words == "frame")
+    low, high = (math.radians(value) for value in between)
+    off = math.remainder(angles[0] - 0.5 * (low + high), math.tau)
+    assert abs(off) <= 0.5 * (high - low) + 1e-9
+    assert np.all(np.diff(angles) * (1 if turning == "counter-clockwise" else -1) > 0.0)
+    at = np.interp(path.inputs, found[0].motion.inputs, np.arange(len(found[0].motion.inputs)))
+    z = found[0].motion.point("P").position[at.round().astype(int)] @ [1.0, 1.0j]
+    assert np.abs(z - path.goal).max() < 0.06 * path.size + 0.02
+
+
+@pytest.mark.long
+def test_a_symmetric_curve_is_its_own_mirror_image() -> None:
+    """By brute force: a fine drawing, reflected about the line that its own second moments give or the normal of it."""
+    task = DesignTask(targets=[PathTarget.segment((0, 0), (4, 0), count=12)], links=[4], symmetric=True)
+    found = design(task, count=1, seconds=300, processor_seconds=60)
+    assert found.accepted, found
+    z = gs.simulate(found[0].mechanism, np.linspace(0.0, math.tau, 4001)).point("P").position[:-1] @ [1.0, 1.0j]
+
+    def mirrored(axis: complex) -> float:
+        middle = z.mean()
+        image = middle + axis**2 * np.conj(z[::40] - middle)
+        return max(float(np.abs(z - p).min()) for p in image)
+
+    spread = z - z.mean()
+    # equal inputs are equally frequent on both sides of the axis, so that moments know it
+    axis = np.exp(0.5j * np.angle((spread**2).mean()))
+    step = np.abs(np.diff(z)).max()
+    assert min(mirrored(axis), mirrored(1j * axis)) < step
+
+
+def test_words_that_do_not_fit_are_refused() -> None:
+    path = PathTarget.segment((0, 0), (4, 0))
+    for more, words in (
+        ({"crank_start": 1.0, "drive": "slide"}, "no crank"),
+        ({"turning": "clockwise", "drive": "cylinder"}, "no crank"),
+        ({"turning": "left"}, "turning"),
+        ({"crank_start": (1.0, 0.5)}, "second limit"),
+        ({"crank_start": (1.0, 2.0, 3.0)}, "one angle, or two"),
+        ({"crank_start": 1.0, "crank_from": "frame", "links": [4, 6]}, "four links"),
+        ({"symmetric": True}, "links = .4."),
+    ):
+        with pytest.raises(GeometryError, match=words):
+            DesignTask(targets=[path], **more)
+    with pytest.raises(GeometryError, match="symmetric curve"):
+        DesignTask(targets=[SwingTarget(least=1.0)], links=[4], symmetric=True)
