@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals import Dual, Interval, Status, image, variables
 from graphsynth.intervals.dual import jacobian_of, values_of
+from graphsynth.jamming.assembly.places import Places
 from graphsynth.jamming.assembly.positions import Array, Mask, Placement, Positions, enclosed_solve, guide, points
 from graphsynth.mechanism.equations import Pair
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
@@ -33,8 +34,7 @@ class Tubes(NamedTuple):
 
     ``proved`` (N,); ``domain`` and ``tight`` (N, size): the box with exactly one assembly, and where that lies;
     ``centre`` (N, size): where it lies at the middle of the input and of the parameters;
-    ``r``, ``e``, ``base`` (N, joints, 2), (N, joints, 2), (N, joints, 2, 2): positions, guide directions, directions of
-    links a and b of the joints asked for.  Certified where proved.  ``reach`` (N, 1 + m): how far the input and each
+    ``r``, ``e``, ``base``, ``rail`` (N, ...): `Places` of the joints asked for.  Certified where proved.  ``reach`` (N, 1 + m): how far the input and each
     parameter lead the unknowns, in units of their weights (estimated): what is worth cutting.  ``dyads`` (N, dyads, 7):
     what `graphsynth.jamming.assembly.dyads.place_dyad` finds, the room first, positive where proved.
     """
@@ -46,8 +46,14 @@ class Tubes(NamedTuple):
     r: Interval
     e: Interval
     base: Interval
+    rail: Interval
     reach: Array
     dyads: Interval
+
+    @property
+    def places(self) -> Places:
+        """Places of the joints."""
+        return Places(self.r, self.e, self.base, self.rail)
 
     def take(self, rows: NDArray[np.intp]) -> Tubes:
         """Return some of the pieces."""
@@ -175,7 +181,7 @@ def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, co
         domain = centre + Interval.from_bounds(-room, room)
     if not joints:
         none, base = Interval.zeros((count, 0, 2)), Interval.zeros((count, 0, 2, 2))
-        return Tubes(proved, domain, tight, centre, none, none, base, reach, dyads)
+        return Tubes(proved, domain, tight, centre, none, none, base, none, reach, dyads)
     return Tubes(proved, domain, tight, centre, *_placed(system.about(dyads), joints, u, tight, p), reach, dyads)
 
 
@@ -228,10 +234,8 @@ def middles(system: Positions, joints: tuple[int, ...], u: Interval, tubes: Tube
     return Tubes(tubes.proved, x, x, x, *_placed(system, joints, u, x, p), np.zeros_like(tubes.reach), tubes.dyads)
 
 
-def _placed(
-    system: Positions, joints: tuple[int, ...], u: Interval, x: Interval, p: Interval
-) -> tuple[Interval, Interval, Interval]:
-    """Enclose ``r``, ``e`` and ``base`` of `Tubes` for unknowns x."""
+def _placed(system: Positions, joints: tuple[int, ...], u: Interval, x: Interval, p: Interval) -> Places:
+    """Enclose the places of joints for unknowns x."""
     own, zero = system.within(columns_of(p)), Interval.zeros((len(u),))
     return places(own, joints, own.place(columns_of(x), own.driven(u)), lambda value: value + zero)
 
@@ -277,22 +281,27 @@ def _at(value: Interval, rows: NDArray[np.intp], count: int) -> Interval:
 
 def places(
     system: Positions, joints: tuple[int, ...], at: Placement, read: Callable[[Any], Interval]
-) -> tuple[Interval, Interval, Interval]:
-    """Stack positions, guide directions and link directions of joints; ``read`` takes what is wanted of each number."""
+) -> Places:
+    """Stack the places of joints; ``read`` takes what is wanted of each number."""
 
     def full(pair: Pair) -> Interval:
         return Interval.stack([read(pair.x), read(pair.y)], axis=-1)
 
     r, e, base = [], [], []
+    rails: dict[int, Interval] = {}
     for k in joints:
         joint = system.mechanism.joints[k]
         A, B = system.ends(k, at)
         # both ends of a revolute joint are the same point: each encloses it
         r.append(full(A).intersect(full(B)) if isinstance(joint, Revolute) else full(B))
-        along = guide(joint, at) if isinstance(joint, Prismatic | PinSlot) else Pair(Interval(1), Interval(0))
+        along = Pair(Interval(1), Interval(0))
+        if isinstance(joint, Prismatic | PinSlot):
+            along, rails[len(e)] = guide(joint, at), full(A)
         e.append(full(along))
         base.append(Interval.stack([full(at.turn[joint.a]), full(at.turn[joint.b])], axis=-2))
-    return Interval.stack(r, axis=-2), Interval.stack(e, axis=-2), Interval.stack(base, axis=-3)
+    positions = Interval.stack(r, axis=-2)
+    rail = Interval.stack([rails.get(k, own) for k, own in enumerate(r)], axis=-2) if rails else positions
+    return Places(positions, Interval.stack(e, axis=-2), Interval.stack(base, axis=-3), rail)
 
 
 def _rates(
@@ -328,8 +337,8 @@ def slopes(
     tubes: Tubes,
     counted: Array,
     parameters: Interval | None = None,
-) -> tuple[Interval, Interval, Interval, Mask]:
-    """Enclose the derivatives of ``r``, ``e``, ``base`` of `Tubes`, and tell where that is proved.
+) -> tuple[Places, Mask]:
+    """Enclose the derivatives of the places of `Tubes`, and tell where that is proved.
 
     Each has one axis more in front: by the input, and by every parameter, over the whole of each piece.
     """
@@ -349,4 +358,4 @@ def slopes(
         return total
 
     moved = places(own, joints, own.place(unknowns[:n], own.driven(unknowns[n])), along)
-    return (*moved, fine)
+    return moved, fine

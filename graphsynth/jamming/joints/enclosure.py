@@ -32,7 +32,7 @@ _STIFF = 1e-3
 class Moving(NamedTuple):
     """The same at the middle of each piece, their derivatives over it, and the input and parameters less their middle.
 
-    ``r_slope``, ``e_slope``, ``d_slope`` (K, N, joints, 2) are by the input and by every parameter, ``steps`` (K, N).
+    ``r_slope``, ``e_slope``, ``d_slope``, ``about_slope`` (K, N, joints, 2) are by the input and by every parameter, ``steps`` (K, N).
     Lets the closure be bounded by the mean value theorem: joints that move together do not count as if each moved
     alone.  ``sound`` (N,) tells where all of it is proved; elsewhere it is not used.
     """
@@ -40,25 +40,27 @@ class Moving(NamedTuple):
     r: Interval
     e: Interval
     d: Interval
+    about: Interval
     r_slope: Interval
     e_slope: Interval
     d_slope: Interval
+    about_slope: Interval
     steps: Interval
     sound: Mask
 
     def take(self, rows: NDArray[np.intp]) -> Moving:
         """Return some of the pieces."""
-        r, e, d, r_slope, e_slope, d_slope, steps, sound = self
-        slopes = r_slope[:, rows], e_slope[:, rows], d_slope[:, rows]
-        return Moving(r[rows], e[rows], d[rows], *slopes, steps[:, rows], sound[rows])
+        here, slopes = (part[rows] for part in self[:4]), (part[:, rows] for part in self[4:9])
+        return Moving(*here, *slopes, self.sound[rows])
 
 
 class Pieces(NamedTuple):
-    """Positions, guide directions and misalignments in intervals, each (N, joints, 2)."""
+    """Positions, guide directions, misalignments and the points these lean about, in intervals, (N, joints, 2) each."""
 
     r: Interval
     e: Interval
     d: Interval
+    about: Interval
     moving: Moving | None = None
 
 
@@ -77,8 +79,9 @@ def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglect
     """
     length = found.units.length
     if exact is not None:
-        at = Pieces(_around(at.r, exact.r), _around(at.e, exact.e), _around(at.d, exact.d))
-    r = (at.r - Interval(found.units.centre)) / length
+        radii = exact.r, exact.e, exact.d, exact.about
+        at = Pieces(*(_around(part, radius) for part, radius in zip(at[:4], radii)))
+    r, about = ((part - Interval(found.units.centre)) / length for part in (at.r, at.about))
     y, fine = _without_forbidden(layout, r, at.e, found.y)
     # sum of the loop wrenches through every joint, (N, joints, 3)
     columns = []
@@ -91,7 +94,7 @@ def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglect
         columns.append(total)
     wrench = Interval.stack(columns, axis=1)
     m = (wrench[:, :, 0] - wrench[:, :, 2] * r[:, :, 1], wrench[:, :, 1] + wrench[:, :, 2] * r[:, :, 0])
-    work = _work(layout, wrench, by_joint(r), by_joint(at.d))
+    work = _work(layout, wrench, by_joint(about), by_joint(at.d))
     if at.moving is not None and exact is None:
         work = _straight_work(layout, wrench, at.moving, found.units, work)
     cost = Interval.zeros((len(found.y),))
@@ -170,25 +173,25 @@ def _start_tilts(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array
     tau, zeta = np.nan_to_num(found.tau), np.nan_to_num(found.zeta)
     tau[:, layout.limit == 0.0], zeta[:, layout.end_float == 0.0] = 0.0, 0.0
     tau[:, layout.block_axis != ROUND, 1] = 0.0
-    length = found.units.length
-    return _fill_free(layout, (at.r.mid - found.units.centre) / length, at, (tau, zeta), length)
+    return _fill_free(layout, found.units, at, (tau, zeta))
 
 
-def _work(layout: Layout, wrench: Interval, r: Columns, d: Columns) -> Any:
-    """Work of the misalignments by the wrenches of the joints, ``sum m_j . d_j``; intervals or duals."""
+def _work(layout: Layout, wrench: Interval, about: Columns, d: Columns) -> Any:
+    """Work of the misalignments by the wrenches of the joints, ``sum (M_j - f_j J(p_j)) . d_j``; intervals or duals."""
     work: Any = Interval.zeros((len(wrench),))
     for place, _, _ in layout.misalignments:
         x, y, force = (wrench[:, place, k] for k in range(3))
-        work = work + (x - force * r[place][1]) * d[place][0] + (y + force * r[place][0]) * d[place][1]
+        p, q = about[place]
+        work = work + (x - force * q) * d[place][0] + (y + force * p) * d[place][1]
     return work
 
 
 def _straight_work(layout: Layout, wrench: Interval, moving: Moving, units: Units, whole: Interval) -> Interval:
     """Narrow the work by the mean value theorem: wrenches are in equilibrium whatever the positions."""
-    middle = _work(layout, wrench, by_joint((moving.r - Interval(units.centre)) / units.length), by_joint(moving.d))
-    r = (moving.r_slope / units.length, moving.r + (moving.r_slope * _spread(moving)).sum(0))
+    middle = _work(layout, wrench, by_joint((moving.about - Interval(units.centre)) / units.length), by_joint(moving.d))
+    p = (moving.about_slope / units.length, moving.about + (moving.about_slope * _spread(moving)).sum(0))
     d = (moving.d_slope, moving.d + (moving.d_slope * _spread(moving)).sum(0))
-    values = (_duals((r[1] - Interval(units.centre)) / units.length, r[0]), _duals(d[1], d[0]))
+    values = (_duals((p[1] - Interval(units.centre)) / units.length, p[0]), _duals(d[1], d[0]))
     found = _work(layout, wrench, *values)
     if not isinstance(found, Dual):
         return whole
@@ -240,20 +243,24 @@ def rule_of(layout: Layout, at: Pieces, found: PoseSolution) -> Rule:
     of the dual program.  All tilts in proportion take that part; what is left needs no more of the joints that bind.
     """
     length, centre = found.units.length, Interval(found.units.centre)
-    r, moving = (at.r - centre) / length, at.moving
+    moving = at.moving
+    r, about = ((part - centre) / length for part in (at.r, at.about))
     tau, zeta = _start_tilts(layout, at, found)
     ways = _directions(layout, r.mid, at.e.mid, (tau, zeta), length)
     start = points(tau), points(zeta)
-    off = Interval.stack(closure_sums(layout, by_joint(r), by_joint(at.e), *start, length, by_joint(at.d)), axis=-1)
+    lean = by_joint(at.d), by_joint(about)
+    off = Interval.stack(closure_sums(layout, by_joint(r), by_joint(at.e), *start, length, lean), axis=-1)
     if moving is None:
         empty = np.zeros((0, *tau.shape)), np.zeros((0, *zeta.shape)), np.zeros((len(tau), 0))
         return Rule(tau, zeta, *empty, *ways, off, off, Interval.zeros((0, *off.shape)))
-    values = _duals(r, moving.r_slope / length), _duals(at.e, moving.e_slope), _duals(at.d, moving.d_slope)
-    sums = closure_sums(layout, *values[:2], *start, length, values[2])
+    values = _duals(r, moving.r_slope / length), _duals(at.e, moving.e_slope)
+    leaning = _duals(at.d, moving.d_slope), _duals(about, moving.about_slope / length)
+    sums = closure_sums(layout, *values, *start, length, leaning)
     zero = Interval.zeros(moving.steps.shape)
     change = Interval.stack([v.grad + zero if isinstance(v, Dual) else zero for v in sums], axis=-1)
-    place = (moving.r - centre) / length
-    sums = closure_sums(layout, by_joint(place), by_joint(moving.e), *start, length, by_joint(moving.d))
+    place, about = ((part - centre) / length for part in (moving.r, moving.about))
+    lean = by_joint(moving.d), by_joint(about)
+    sums = closure_sums(layout, by_joint(place), by_joint(moving.e), *start, length, lean)
     rows = moment_rows(layout, place.mid, moving.e.mid)
     held = np.nan_to_num(np.einsum("nbic,nbi->nc", rows, tau))
     held[:, 2::3] += zeta @ layout.incidence.T / length
@@ -283,7 +290,7 @@ def upper_bounds(
     whole = (at.r - Interval(found.units.centre)) / length
     r, e, rest = whole, at.e, Interval(0)
     if exact is not None:
-        more = _disturbed(layout, whole, at, rule.tau, length, exact)
+        more = _disturbed(layout, found.units, at, rule.tau, exact)
         rest = Interval.from_bounds(-more, more)
         r, e = _around(r, (points(exact.r) / length).hi), _around(e, exact.e)
     off = _remainder(layout, at.moving, length, rule, (r, e)) + rest
@@ -365,22 +372,23 @@ def _largest_ratio(layout: Layout, rule: Rule, moved: tuple[Interval, Interval],
     return worst
 
 
-def _disturbed(layout: Layout, r: Interval, at: Pieces, tau: Array, length: float, exact: Neglected) -> Array:
+def _disturbed(layout: Layout, units: Units, at: Pieces, tau: Array, exact: Neglected) -> Array:
     """Bound what exact tilts add to the closure of given tilts, (N, 3 loops).
 
-    The closure is linear in the tilts and bilinear with the positions: ``(r + dr) x (t + dt) - r x t``.
+    The closure is linear in the tilts and bilinear with the positions: ``(r + dr) x (t + dt) - r x t``, and with
+    misalignments and the points they lean about alike.
     """
-    count = len(tau)
+    count, length = len(tau), units.length
+    r, about = (((part - Interval(units.centre)) / length).mag.sum(axis=-1) for part in (at.r, at.about))
     lean, change = np.zeros((2, count, len(layout.joints)))
     for block, place in enumerate(layout.block_joint.tolist()):
         size = np.abs(tau[:, block]).sum(axis=-1)
         lean[:, place] += size
         if layout.block_axis[block] != ROUND:
             change[:, place] += size * exact.e[:, place]
-    lean += at.d.mag.sum(axis=-1)
+    lift = exact.r / length * (lean + change) + r * change
+    lift += exact.about / length * (at.d.mag.sum(axis=-1) + exact.d) + about * exact.d
     change += exact.d
-    move = exact.r / length
-    lift = move * (lean + change) + r.mag.sum(axis=-1) * change
     through = np.abs(layout.incidence).T
     rest = np.empty((count, 3 * layout.loops))
     rest[:, 0::3] = rest[:, 1::3] = change @ through
@@ -427,19 +435,21 @@ def _directions(layout: Layout, r: Array, e: Array, start: tuple[Array, Array], 
     return tilts @ inverse[:, None], slips @ inverse
 
 
-def _fill_free(layout: Layout, r: Array, at: Pieces, start: tuple[Array, Array], length: float) -> tuple[Array, Array]:
+def _fill_free(layout: Layout, units: Units, at: Pieces, start: tuple[Array, Array]) -> tuple[Array, Array]:
     """Give joints without limit the tilts and slips that close the loops, in floats."""
     tau, zeta = start
     blocks, joints = np.isinf(layout.limit), np.isinf(layout.end_float)
     if not (blocks.any() or joints.any()):
         return tau, zeta
+    length = units.length
+    r, about = ((part.mid - units.centre) / length for part in (at.r, at.about))
     count = len(r)
     rows = moment_rows(layout, r, at.e.mid)[:, blocks].reshape(count, -1, 3 * layout.loops)
     slips = np.zeros((count, int(joints.sum()), 3 * layout.loops))
     slips[:, :, 2::3] = layout.incidence.T[joints]
-    middle = (by_joint(points(value)) for value in (r, at.e.mid, at.d.mid))
-    places, guides, shift = middle
-    off = Interval.stack(closure_sums(layout, places, guides, points(tau), points(zeta), length, shift), axis=-1).mid
+    places, guides, *lean = (by_joint(points(value)) for value in (r, at.e.mid, at.d.mid, about))
+    sums = closure_sums(layout, places, guides, points(tau), points(zeta), length, (lean[0], lean[1]))
+    off = Interval.stack(sums, axis=-1).mid
     both = np.concatenate([rows, slips], axis=1).transpose(0, 2, 1)
     value = -(np.linalg.pinv(both, rcond=1e-12) @ np.nan_to_num(off)[:, :, None])[..., 0]
     n = 2 * int(blocks.sum())

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval, check_rounding
+from graphsynth.jamming.assembly.places import Places
 from graphsynth.jamming.assembly.positions import Positions, points
 from graphsynth.jamming.assembly.tubes import Tubes, columns_of, middles, prove_tubes, slopes, whole_box
-from graphsynth.jamming.joints.closure import Layout, shifts, shifts_enclosed
+from graphsynth.jamming.joints.closure import Layout, leaning_points, leans, shifts_enclosed
 from graphsynth.jamming.joints.enclosure import Moving, Pieces, Rule, factor_range, lower_bounds, rule_of, upper_bounds
 from graphsynth.jamming.joints.exact import Neglected, neglected
 from graphsynth.jamming.joints.limits import Misalignment, bounds
@@ -265,27 +266,33 @@ class Work:
         if layout.loops == 0:
             none = np.zeros(count)
             return none, none, np.full(count, int(self.exact), dtype=np.int8), none, none
-        *rates, fine = slopes(self.system, layout.joints, u, tubes, counted, p)
+        rates, fine = slopes(self.system, layout.joints, u, tubes, counted, p)
         steps = Interval.stack([u, *columns_of(p)], axis=0)
         steps = steps - points(steps.mid)
         sound = middle.proved & fine
-        r, e, base = (
-            _straight(getattr(tubes, name), getattr(middle, name), rate, steps, sound)
-            for name, rate in zip(("r", "e", "base"), rates)
+        wanted = zip(Places._fields, tubes.places, middle.places, rates)
+        narrow = {
+            name: _straight(whole, here, rate, steps, sound)
+            for name, whole, here, rate in wanted
+            if name != "rail" or layout.rails
+        }
+        tubes = tubes._replace(**narrow)
+        about, about_middle, about_slope = (
+            leaning_points(layout, at.r, at.rail) for at in (tubes.places, middle.places, rates)
         )
-        tubes = tubes._replace(r=r, e=e, base=base)
+        flat = rates.base.reshape(-1, *rates.base.shape[2:])
+        middles_of = Places(*(part.mid for part in middle.places))
 
         def pieces(own: Layout) -> Pieces:
             """Positions and misalignments, with what the mean value theorem needs where it is proved."""
-            r_slope, e_slope, base_slope = rates
-            flat = base_slope.reshape(-1, *base_slope.shape[2:])
-            d_slope = shifts_enclosed(own, flat).reshape(*r_slope.shape)
+            d_slope = shifts_enclosed(own, flat).reshape(*rates.r.shape)
             shift = shifts_enclosed(own, middle.base)
-            moving = Moving(middle.r, middle.e, shift, r_slope, e_slope, d_slope, steps, sound)
-            return Pieces(tubes.r, tubes.e, shifts_enclosed(own, tubes.base), moving)
+            at = middle.r, middle.e, shift, about_middle
+            moving = Moving(*at, rates.r, rates.e, d_slope, about_slope, steps, sound)
+            return Pieces(tubes.r, tubes.e, shifts_enclosed(own, tubes.base), about, moving)
 
         def solved(own: Layout) -> PoseSolution:
-            return solve_poses(own, middle.r.mid, middle.e.mid, shifts(own, middle.base.mid), "scale")
+            return solve_poses(own, middles_of.r, middles_of.e, leans(own, middles_of), "scale")
 
         upper, least, most = np.zeros((3, count))
         above = []

@@ -24,11 +24,12 @@ from graphsynth.jamming.bearing.bearing import Bearing, Condition
 from graphsynth.jamming.joints.closure import (
     KINDS,
     Layout,
+    Leans,
     force_rows,
     joint_places,
     lay_out,
+    leans,
     moment_rows,
-    shifts,
     work_row,
 )
 from graphsynth.jamming.joints.cones import ConeSolution, loads, polish, solve_cones
@@ -71,20 +72,22 @@ class PoseSolution(NamedTuple):
     rounds: int
 
 
-def solve_poses(layout: Layout, r: Array, e: Array, d: Array, mode: Mode = "tilt") -> PoseSolution:
+def solve_poses(layout: Layout, r: Array, e: Array, lean: Leans, mode: Mode = "tilt") -> PoseSolution:
     """Solve the program at N poses (theory/joints-that-share-a-tilt 3, 4; loop form); estimated.
 
-    Positions r, guide directions e and misalignments d (radians) are (N, joints, 2).  ``lower == upper == inf`` where
+    Positions r, guide directions e, misalignments and the points they lean about are (N, joints, 2).  ``lower == upper == inf`` where
     no factor is enough.  Raises `GeometryError` if a position is not finite.
     """
-    if not (np.isfinite(r).all() and np.isfinite(e).all() and np.isfinite(d).all()):
+    d, about = lean
+    if not all(np.isfinite(part).all() for part in (r, e, d, about)):
         raise GeometryError("a joint position is not finite; give assembled poses only")
-    units, flat = Units(np.zeros(2), 1.0, 1.0), r.reshape(-1, 2)
+    units, flat = Units(np.zeros(2), 1.0, 1.0), np.concatenate([r, about], axis=1).reshape(-1, 2)
     if flat.size:  # every number of the program is then of the order of 1
         centre = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
         length = float(np.abs(flat - centre).max()) or 1.0
         units = Units(centre, length, float(np.sqrt((d**2).sum(-1)).max(initial=0.0)) or 1.0)
-    rows = _Rows(layout, (r - units.centre) / units.length, e, d / units.tilt, units)
+    places, about = ((part - units.centre) / units.length for part in (r, about))
+    rows = _Rows(layout, places, e, Leans(d / units.tilt, about), units)
     blocks, joints = len(layout.limit), len(layout.joints)
     shapes = (), (), (3 * layout.loops,), (blocks, 2), (joints,), (blocks,), (joints,)
     out = PoseSolution._make([*(np.zeros((len(r), *shape)) for shape in shapes), units, 0])
@@ -99,11 +102,11 @@ def solve_poses(layout: Layout, r: Array, e: Array, d: Array, mode: Mode = "tilt
 class _Rows:
     """Rows of moments, forces and work, in units; limits in units of the largest."""
 
-    def __init__(self, layout: Layout, r: Array, e: Array, d: Array, units: Units) -> None:
+    def __init__(self, layout: Layout, r: Array, e: Array, lean: Leans, units: Units) -> None:
         self.layout = layout
         self.M = moment_rows(layout, r, e)
         self.F = force_rows(layout)
-        self.W = work_row(layout, r, d)
+        self.W = work_row(layout, lean)
         limit, play = layout.limit, layout.end_float
         finite = limit[np.isfinite(limit)]
         self.unit = float(finite.max(initial=0.0)) or 1.0
@@ -289,8 +292,8 @@ class JointProblem:
 
     def solve(self, poses: Array, mode: Mode = "tilt", turned: float = 0.0) -> PoseSolution:
         """Solve at poses (N, links, 3); all misalignments turned by ``turned`` radians."""
-        r, e, base = joint_places(self.mechanism, self.layout.joints, poses)
-        return solve_poses(self.layout, r, e, shifts(self.layout, base, turned), mode)
+        at = joint_places(self.mechanism, self.layout.joints, poses)
+        return solve_poses(self.layout, at.r, at.e, leans(self.layout, at, turned), mode)
 
 
 def check_motion(motion: Any) -> None:
