@@ -34,9 +34,10 @@ class Tubes(NamedTuple):
 
     ``proved`` (N,); ``domain`` and ``tight`` (N, size): the box with exactly one assembly, and where that lies;
     ``centre`` (N, size): where it lies at the middle of the input and of the parameters;
-    ``r``, ``e``, ``base``, ``rail`` (N, ...): `Places` of the joints asked for.  Certified where proved.  ``reach`` (N, 1 + m): how far the input and each
-    parameter lead the unknowns, in units of their weights (estimated): what is worth cutting.  ``dyads`` (N, dyads, 7):
-    what `graphsynth.jamming.assembly.dyads.place_dyad` finds, the room first, positive where proved.
+    ``r``, ``e``, ``base``, ``rail`` (N, ...): `Places` of the joints asked for.  Certified where proved.  ``reach``
+    (N, 1 + m): how far the input and each parameter lead the unknowns, in units of their weights (estimated): what is
+    worth cutting.  ``dyads`` (N, dyads, 7): what `graphsynth.jamming.assembly.dyads.place_dyad` finds, the room first,
+    positive where proved.
     """
 
     proved: Mask
@@ -279,9 +280,7 @@ def _at(value: Interval, rows: NDArray[np.intp], count: int) -> Interval:
     return value[rows] if value.shape == (count,) else value
 
 
-def places(
-    system: Positions, joints: tuple[int, ...], at: Placement, read: Callable[[Any], Interval]
-) -> Places:
+def places(system: Positions, joints: tuple[int, ...], at: Placement, read: Callable[[Any], Interval]) -> Places:
     """Stack the places of joints; ``read`` takes what is wanted of each number."""
 
     def full(pair: Pair) -> Interval:

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.jamming.assembly.places import Places
 from graphsynth.jamming.binding.parts import JointStiffness, LinkSection
-from graphsynth.jamming.joints.closure import ROLL, ROUND, carried, joint_places, moment_rows, shifts, work_row
+from graphsynth.jamming.joints.closure import ROLL, ROUND, carried, joint_places, leans, moment_rows, work_row
 from graphsynth.mechanism.joints import PinSlot, Prismatic
 
 if TYPE_CHECKING:
@@ -43,14 +44,6 @@ class Rows(NamedTuple):
     K_rate: Array
 
 
-class Places(NamedTuple):
-    """Joints r and directions e of guides (N, joints, 2), base directions (N, joints, 2, 2)."""
-
-    r: Array
-    e: Array
-    base: Array
-
-
 def rows_of(
     given: JointProblem,
     springs: Sequence[JointStiffness],
@@ -65,19 +58,19 @@ def rows_of(
         k = 3 * layout.loops
         shapes = ((0, len(layout.limit), 2, k), (0, k), (0, k, k)) * 2
         return Rows(*(np.zeros(shape) for shape in shapes))
-    at = Places(*joint_places(mechanism, layout.joints, poses))
+    at = joint_places(mechanism, layout.joints, poses)
     spin = 1j * rates[..., 2] * np.exp(1j * poses[..., 2])
-    by = Places(*carried(mechanism, layout.joints, rates[..., 0] + 1j * rates[..., 1], spin, 0.0))
-    at, by = at._replace(r=unit * at.r), by._replace(r=unit * by.r)
+    by = carried(mechanism, layout.joints, rates[..., 0] + 1j * rates[..., 1], spin, 0.0)
+    at, by = (own._replace(r=unit * own.r, rail=unit * own.rail) for own in (at, by))
 
-    def moments(r: Array, e: Array, base: Array) -> Array:
-        return moment_rows(layout, r, e)
+    def moments(at: Places) -> Array:
+        return moment_rows(layout, at.r, at.e)
 
-    def work(r: Array, e: Array, base: Array) -> Array:
-        return work_row(layout, r, shifts(layout, base))
+    def work(at: Places) -> Array:
+        return work_row(layout, leans(layout, at))
 
     K = _compliance(given, springs, beams, at.r + 1j * _STEP * by.r, at.e + 1j * _STEP * by.e)
-    M, W = moments(*at), work(*at)
+    M, W = moments(at), work(at)
     return Rows(M, W, K.real.copy(), _bilinear(moments, at, by), _bilinear(work, at, by), K.imag / _STEP)
 
 
@@ -86,7 +79,7 @@ def _bilinear(function: Callable[..., Array], at: Places, by: Places) -> Array:
     size = max(float(np.abs(part).max(initial=0.0)) for part in by)
     step = 1.0 / size if size > 0.0 else 1.0
     ahead, behind = (Places(*(p + sign * step * q for p, q in zip(at, by))) for sign in (1.0, -1.0))
-    return np.asarray((function(*ahead) - function(*behind)) / (2.0 * step))
+    return np.asarray((function(ahead) - function(behind)) / (2.0 * step))
 
 
 def _compliance(

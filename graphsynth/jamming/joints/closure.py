@@ -2,8 +2,8 @@
 
 Body i has the tilt vector ``omega_i`` and the axial displacement ``w_i``: ``z_i(r) = w_i + cross(omega_i, r)``.  At
 joint j between bodies a and b, ``tau_j = omega_b - omega_a - d_j`` (d_j the misalignment of its axis) and
-``zeta_j = z_b(r_j) - z_a(r_j) - cross(d_j, r_j - p_j)``, both of b against a.  A misaligned seat leans about its own point
-p_j; only that of a rail differs from r_j, where its slider is.
+``zeta_j = z_b(r_j) - z_a(r_j) - cross(d_j, r_j - p_j)``, both of b against a.  A misaligned seat leans about its own
+point p_j; only that of a rail differs from r_j, where its slider is.
 
 A set of moments and axial forces in equilibrium on every moving body is a combination of loops: the loop l carries the
 wrench ``(M_l, f_l)`` about the origin, and joint j the sum ``(M, f)_j`` of the loops through it, with sign, so that its
@@ -50,8 +50,8 @@ class Layout:
     b, -1 from b to a.  ``block_joint``, ``block_axis`` (blocks,): of every limit on tilt its joint (position in
     ``joints``) and its place in `KINDS`.  ``limit`` (blocks,), ``end_float`` (joints,): nominal
     limits; 0 is rigid, infinite is none; their ``_range`` (2, ...) are tolerance boxes.  ``misalignments``: position in
-    ``joints``, sign that makes it one of b against a, and the misalignment.  ``rails``: positions in ``joints`` of those
-    that are rails, which lean about their own points on link a and not where the joint is.
+    ``joints``, sign that makes it one of b against a, and the misalignment.  ``rails``: positions in ``joints`` of
+    those that are rails, which lean about their own points on link a and not where the joint is.
     """
 
     joints: tuple[int, ...]

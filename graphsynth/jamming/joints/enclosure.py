@@ -32,9 +32,9 @@ _STIFF = 1e-3
 class Moving(NamedTuple):
     """The same at the middle of each piece, their derivatives over it, and the input and parameters less their middle.
 
-    ``r_slope``, ``e_slope``, ``d_slope``, ``about_slope`` (K, N, joints, 2) are by the input and by every parameter, ``steps`` (K, N).
-    Lets the closure be bounded by the mean value theorem: joints that move together do not count as if each moved
-    alone.  ``sound`` (N,) tells where all of it is proved; elsewhere it is not used.
+    ``r_slope``, ``e_slope``, ``d_slope``, ``about_slope`` (K, N, joints, 2) are by the input and by every parameter,
+    ``steps`` (K, N).  Lets the closure be bounded by the mean value theorem: joints that move together do not count as
+    if each moved alone.  ``sound`` (N,) tells where all of it is proved; elsewhere it is not used.
     """
 
     r: Interval

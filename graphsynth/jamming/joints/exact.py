@@ -9,8 +9,10 @@ normal and v the plane vector between two joints of a link, exactly
     horizontal step = v - h (h . v) / (1 + cos),      vertical step = - h . v
 
 so the vertical closure is that of the small-tilt model at slightly moved positions, and the plane closure is disturbed
-by terms of second order.  Those are bounded here from the largest angles that the limits allow; how far they move the
-joints follows from the loop equations, over the box in which the plane assembly is the only one.
+by terms of second order.  A rail that leans about its own point by the angle alpha about n lifts its slider off the
+plane of its link by ``s sin(alpha) cross(n, e)``, s the travel and e its direction, and takes at most ``s (1 -
+cos(alpha))`` off the way in that plane.  All this is bounded here from the largest angles that the limits allow; how
+far it moves the joints follows from the loop equations, over the box in which the plane assembly is the only one.
 Derivation: ``docs/explanation/coupled-jamming.md``.
 """
 
@@ -27,6 +29,7 @@ from graphsynth.intervals.dual import jacobian_of
 from graphsynth.jamming.assembly.positions import PLANE, Moved, Positions, enclosed_solve
 from graphsynth.jamming.joints.closure import ROUND, Layout
 from graphsynth.jamming.joints.limits import bounds
+from graphsynth.mechanism.constraints import characteristic_length
 from graphsynth.mechanism.equations import Pair
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 
@@ -41,6 +44,8 @@ Mask = NDArray[np.bool_]
 LARGEST = 0.5
 #: Size of the box in which the disturbed assembly is proved the only one, over the movement expected.
 _ROOM = 2.0
+#: Allowance for what exact tilts add to the travel of a guide: a share of it, and of the size of the mechanism.
+_STRETCH, _TRAVEL = 1.1, 0.1
 #: Allowance for the rounding of the sums below, all of them of a few dozen nonnegative terms.
 _ROUNDING = 1.0 + 1e-12
 
@@ -48,15 +53,16 @@ _ROUNDING = 1.0 + 1e-12
 class Neglected(NamedTuple):
     """Bounds of what exact tilts change, per piece; lengths and radians.
 
-    ``r``, ``e``, ``d`` (N, joints): movement of a joint, turn of a guide, change of a misalignment.  ``lift`` (N,
-    loops): rest of the vertical closure.  ``wide`` and ``narrow`` (N, blocks): limits on linear tilts that every exact
-    tilt within its limit obeys, and that leave every exact tilt within its limit; ``end_float`` (N, joints) the
-    latter for slips.  ``sound`` (N,): whether all of it is proved.
+    ``r``, ``e``, ``d``, ``about`` (N, joints): movement of a joint, turn of a guide, change of a misalignment, movement
+    of the point it leans about.  ``lift`` (N, loops): rest of the vertical closure.  ``wide`` and ``narrow`` (N,
+    blocks): limits on linear tilts that every exact tilt within its limit obeys, and that leave every exact tilt within
+    its limit; ``end_float`` (N, joints) the latter for slips.  ``sound`` (N,): whether all of it is proved.
     """
 
     r: Array
     e: Array
     d: Array
+    about: Array
     lift: Array
     wide: Array
     narrow: Array
@@ -76,6 +82,23 @@ class _Angles(NamedTuple):
     base: NDArray[np.intp]
 
 
+class _Sizes(NamedTuple):
+    """Largest distance between two joints of every link (N, links), the way of a guide added on the link of its rail.
+
+    ``way`` (N, joints of the mechanism): largest travel of every guide from its point on that link.  ``sine`` (joints,)
+    of the largest misalignment of every rail, 0 elsewhere.
+    """
+
+    link: Array
+    way: Array
+    sine: Array
+
+    @property
+    def raised(self) -> Array:
+        """Largest lift of every slider by its rail."""
+        return np.asarray(self.way * self.sine)
+
+
 def neglected(
     system: Positions, layout: Layout, tubes: Tubes, u: Interval, counted: Array, assumed: Array
 ) -> Neglected:
@@ -92,32 +115,53 @@ def neglected(
     a, b = zip(*((joint.a, joint.b) for joint in system.mechanism.joints))
     # of the largest angle of either axis of every joint against the normal
     lean = np.sin(np.maximum(angles.link[:, a], angles.link[:, b]) + angles.seat)
-    lengths = _lengths(system, tubes, u)
-    slips, reached = _slips(system, layout, angles, lengths)
+    sizes = _sizes(system, layout, tubes, u, angles)
+    slips, reached = _slips(system, layout, angles, sizes)
     small &= reached
     slips = np.where(small[:, None], slips, 0.0)
-    offset, twist = _disturbances(system, angles, lengths, slips * lean)
-    moved_r, turned, sound = _movements(system, layout, tubes, u, counted, offset, twist)
+    offset, twist = _disturbances(system, angles, sizes, slips * lean)
+    moved, way, turned, sound = _movements(system, layout, tubes, u, counted, offset, twist)
+    way = np.where(sizes.way > 0.0, (way + offset) / np.cos(angles.link[:, a] + angles.seat), 0.0)
+    sound &= (way <= sizes.way).all(axis=1)
     kept, pairs = list(layout.joints), layout.pairs
-    moved_r = moved_r + offset[:, kept]
+    moved_r, moved_about = (part + offset[:, kept] for part in moved)
     along = turned[:, pairs[:, 0]]
-    # change of every misalignment: a sine for the angle, the tilt of its base, and the turn of its base
     shift = np.zeros((count, len(kept)))
     for place, _, _ in layout.misalignments:
         k = kept[place]
-        alpha, base = float(angles.seat[k]), int(angles.base[k])
-        own = angles.link[:, base]
-        shift[:, place] = alpha**3 / 6.0 + alpha * turned[:, base]
-        shift[:, place] += alpha * (own**2 + own * alpha) / (1.0 + np.cos(own)) + 0.5 * own * alpha**2
+        shift[:, place] = _shift(angles, k) + float(angles.seat[k]) * turned[:, angles.base[k]]
     wide, narrow = _limits(system, layout, angles, blocks)
     lean = lean[:, kept]
     play = layout.end_float_range[0] * (1.0 - 0.5 * lean**2) / _ROUNDING
     # what is left of the vertical closure of every loop: h^2 (h . v) / (1 + cos) of its links, and slips
-    body = np.sin(angles.link) * lengths * (1.0 - np.cos(angles.link))
+    body = np.sin(angles.link) * sizes.link * (1.0 - np.cos(angles.link))
     rest = 0.5 * (body[:, pairs[:, 0]] + body[:, pairs[:, 1]]) + slips[:, kept] * lean**2
+    for place in layout.rails:
+        rest[:, place] += sizes.way[:, kept[place]] * _rise(angles, kept[place])
     lift = rest @ np.abs(layout.incidence).T
-    moved_r, along, shift, lift, wide = (value * _ROUNDING for value in (moved_r, along, shift, lift, wide))
-    return Neglected(moved_r, along, shift, lift, wide, narrow, play, np.asarray(sound & small))
+    changes = (value * _ROUNDING for value in (moved_r, along, shift, moved_about, lift, wide))
+    return Neglected(*changes, narrow, play, np.asarray(sound & small))
+
+
+def _shift(angles: _Angles, k: int) -> Array:
+    """Change of a misalignment but for the turn of its base: a sine for the angle, and the tilt of its base."""
+    alpha, own = float(angles.seat[k]), angles.link[:, angles.base[k]]
+    return np.asarray(alpha**3 / 6.0 + alpha * (own**2 + own * alpha) / (1.0 + np.cos(own)) + 0.5 * own * alpha**2)
+
+
+def _rise(angles: _Angles, k: int) -> Array:
+    """Bound how the lift of a slider differs from the misalignment times its travel, in parts of the travel.
+
+    The lift is ``k = sin(alpha) c``, c the sine between axis and rail, and works as ``k (sin^2 + cos)`` of the angle of
+    the link; the changed misalignment times the horizontal travel ``w - h (h . w) / (1 + cos) + k h`` is compared with
+    it, where w is the travel in the plane of the link and h the horizontal part of its normal.
+    """
+    alpha, own, change = float(angles.seat[k]), angles.link[:, angles.base[k]], _shift(angles, k)
+    less = 1.0 - np.cos(own)
+    return np.asarray(
+        change + alpha**3 * (1.0 / 2.0 + 1.0 / 6.0)
+        + (alpha + change) * (less + np.sin(alpha) * np.sin(own)) + np.sin(alpha) * less
+    )  # fmt: skip
 
 
 def _angles(system: Positions, layout: Layout, blocks: Array) -> _Angles:
@@ -143,54 +187,62 @@ def _angles(system: Positions, layout: Layout, blocks: Array) -> _Angles:
     return _Angles(link, np.minimum(tilt, link[:, a] + link[:, b] + seat), seat, base)
 
 
-def _lengths(system: Positions, tubes: Tubes, u: Interval) -> Array:
-    """Largest distance between two joints of a link, (N, links); the link that carries a guide has its way added."""
+def _sizes(system: Positions, layout: Layout, tubes: Tubes, u: Interval, angles: _Angles) -> _Sizes:
+    """Sizes of links and ways of guides; that the ways suffice is proved with the movements."""
     mechanism, count = system.mechanism, len(tubes.r)
     found = np.zeros((count, mechanism.graph.links))
     for link in range(mechanism.graph.links):
         ends = [both[j.a != link] for j, both in zip(mechanism.joints, system.local) if link in j.pair]
         for p, q in combinations(ends, 2):
             found[:, link] = np.maximum(found[:, link], PLANE.length(p - q).hi)
+    way, sine = np.zeros((count, len(mechanism.joints))), np.zeros(len(mechanism.joints))
+    sine[[layout.joints[place] for place in layout.rails]] = 1.0
+    sine = np.sin(sine * angles.seat)
+    room = _TRAVEL * characteristic_length(mechanism)
     at = system.place([tubes.tight[:, k] for k in range(system.size)], system.driven(u))
     for k, joint in enumerate(mechanism.joints):
         if isinstance(joint, Prismatic | PinSlot):
-            found[:, joint.a] += PLANE.length(system.seen(k, at).d).hi / np.cos(LARGEST)
-    return found * _ROUNDING
+            far = _STRETCH * PLANE.length(system.seen(k, at).d).hi + room
+            way[:, k] = far / np.cos(angles.link[:, joint.a] + angles.seat[k])
+            found[:, joint.a] += way[:, k]
+    return _Sizes(found * _ROUNDING, way * _ROUNDING, sine)
 
 
-def _slips(system: Positions, layout: Layout, angles: _Angles, lengths: Array) -> tuple[Array, Mask]:
+def _slips(system: Positions, layout: Layout, angles: _Angles, sizes: _Sizes) -> tuple[Array, Mask]:
     """Largest slip of every joint: its axial clearance, or what the heights of both links leave where there is none."""
     mechanism = system.mechanism
     play = np.full(len(mechanism.joints), np.inf)
     play[list(layout.joints)] = layout.end_float_range[1]
-    rise = lengths * np.sin(angles.link)
+    rise, raised = sizes.link * np.sin(angles.link), sizes.raised
     height = np.full_like(angles.link, np.inf)
     height[:, mechanism.frame] = 0.0
     for _ in range(mechanism.graph.links):
         for k, joint in enumerate(mechanism.joints):
             for here, there in ((joint.a, joint.b), (joint.b, joint.a)):
-                own = height[:, here] + rise[:, here] + play[k]
+                own = height[:, here] + rise[:, here] + raised[:, k] + play[k]
                 height[:, there] = np.minimum(height[:, there], own)
     top = height + rise
     a, b = zip(*((joint.a, joint.b) for joint in mechanism.joints))
-    found = np.minimum(play, (top[:, a] + top[:, b]) / np.cos(LARGEST)) * _ROUNDING
+    found = np.minimum(play, (top[:, a] + top[:, b] + raised) / np.cos(LARGEST + angles.seat)) * _ROUNDING
     return found, np.asarray(np.isfinite(found).all(axis=1))
 
 
-def _disturbances(system: Positions, angles: _Angles, lengths: Array, offset: Array) -> tuple[Array, Array]:
+def _disturbances(system: Positions, angles: _Angles, sizes: _Sizes, offset: Array) -> tuple[Array, Array]:
     """Bounds of the offset of the plane closure at every joint, and of the twist that a joint prescribes amiss.
 
     ``offset`` is that of the slips along leaning axes.  Two rotations of tilts x and y make one of a tilt and a twist,
     at most half of ``x y (1 + small)``: the area of a spherical triangle.
     """
     mechanism = system.mechanism
-    short = lengths * (1.0 - np.cos(angles.link))
+    short = sizes.link * (1.0 - np.cos(angles.link))
     driven = {driver.pair for driver in mechanism.drivers}
     parents = {edge.joint: edge.parent for edge in system.edges}
     twist = np.zeros_like(offset)
     for k, joint in enumerate(mechanism.joints):
         first, second = angles.link[:, joint.a], angles.link[:, joint.b]
         before = parents.get(k)
+        if sizes.sine[k] > 0.0:  # the rail is shorter in the plane of its link, and what it lifts leans with that
+            offset[:, k] += sizes.way[:, k] * (1.0 - np.cos(angles.seat[k]) + sizes.sine[k] * np.sin(first))
         offset[:, k] += short[:, joint.a] + short[:, joint.b] if before is None else short[:, before]
         if isinstance(joint, Gear):
             twist[:, k] = (first + second) ** 2
@@ -203,9 +255,10 @@ def _disturbances(system: Positions, angles: _Angles, lengths: Array, offset: Ar
 
 def _movements(
     system: Positions, layout: Layout, tubes: Tubes, u: Interval, counted: Array, offset: Array, twist: Array
-) -> tuple[Array, Array, Mask]:
-    """Bound how far joints move (N, joints) and links turn (N, links) in the plane; whether one assembly is proved.
+) -> tuple[tuple[Array, Array], Array, Array, Mask]:
+    """Bound how far joints, and the points they lean about, move (N, joints), and links turn (N, links), in the plane.
 
+    And how far guides then travel (N, joints of the mechanism), and whether one assembly is proved.
     For every disturbance p the box has exactly one assembly: as the disturbance grows from 0, ``F_x x' = - F_p p``,
     and ``x'`` over the box is too small to lead out of it.
     """
@@ -245,15 +298,23 @@ def _movements(
             return np.asarray(total.mag)
 
         turned = np.stack([size(angle) for angle in at.angle], axis=1)
-        moves = []
-        for k in layout.joints:
-            A, B = system.ends(k, at)
-            ends = (A, B) if isinstance(system.mechanism.joints[k], Revolute) else (B,)
-            moves.append(np.max([np.hypot(size(p.x), size(p.y)) for p in ends], axis=0))
-    r = np.stack(moves, axis=1) if moves else np.zeros((count, 0))
-    sound &= np.isfinite(r).all(axis=1) & np.isfinite(turned).all(axis=1)
-    r, turned = (np.where(np.isfinite(value), value * _ROUNDING, 0.0) for value in (r, turned))
-    return r, turned, sound
+        moves, own, way = [], [], np.zeros((count, len(system.mechanism.joints)))
+        for place, k in enumerate(layout.joints):
+            A, B = (np.hypot(size(p.x), size(p.y)) for p in system.ends(k, at))
+            moves.append(np.maximum(A, B) if isinstance(system.mechanism.joints[k], Revolute) else B)
+            own.append(A if place in layout.rails else moves[-1])
+        for k, joint in enumerate(system.mechanism.joints):
+            if isinstance(joint, Prismatic | PinSlot):
+                d = system.seen(k, at).d
+                way[:, k] = np.hypot(_value(d.x).mag, _value(d.y).mag)
+    moved = np.array([moves, own]).reshape(2, len(moves), count).swapaxes(1, 2)
+    sound &= np.isfinite(moved).all(axis=(0, 2)) & np.isfinite(turned).all(axis=1) & np.isfinite(way).all(axis=1)
+    r, about, way, turned = (np.where(np.isfinite(v), v * _ROUNDING, 0.0) for v in (*moved, way, turned))
+    return (r, about), way, turned, sound
+
+
+def _value(number: Any) -> Interval:
+    return number.value if isinstance(number, Dual) else number
 
 
 def _beside(first: Interval, second: Interval) -> Interval:

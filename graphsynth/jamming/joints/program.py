@@ -75,8 +75,8 @@ class PoseSolution(NamedTuple):
 def solve_poses(layout: Layout, r: Array, e: Array, lean: Leans, mode: Mode = "tilt") -> PoseSolution:
     """Solve the program at N poses (theory/joints-that-share-a-tilt 3, 4; loop form); estimated.
 
-    Positions r, guide directions e, misalignments and the points they lean about are (N, joints, 2).  ``lower == upper == inf`` where
-    no factor is enough.  Raises `GeometryError` if a position is not finite.
+    Positions r, guide directions e, misalignments and the points they lean about are (N, joints, 2).  ``lower ==
+    upper == inf`` where no factor is enough.  Raises `GeometryError` if a position is not finite.
     """
     d, about = lean
     if not all(np.isfinite(part).all() for part in (r, e, d, about)):

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals import Dual, Interval
 from graphsynth.jamming.assembly.positions import enclosed_solve, points
-from graphsynth.jamming.joints.closure import PITCH, ROLL, ROUND, Columns, Layout
+from graphsynth.jamming.joints.closure import PITCH, ROLL, ROUND, Columns, Layout, Leans, leaning_points
 from graphsynth.jamming.joints.enclosure import _without_forbidden
 from graphsynth.jamming.margins.program import Items, Sharing, closure, share, ways
 from graphsynth.jamming.margins.quantities import Quantities, Values
-from graphsynth.jamming.margins.stations import Places
+from graphsynth.jamming.margins.stations import Placed
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -89,21 +89,31 @@ def _slope(own: Any, count: int, n: int) -> Interval:
 class Pairs(NamedTuple):
     """Positions and misalignments of P pairs: at both middles, and derivatives by the input and the n sources.
 
-    ``r``, ``e``, ``d`` (P, joints, 2); ``_by`` (1 + n, P, joints, 2) over the whole of both; ``steps`` (1 + n, P).
+    ``r``, ``e``, ``d`` and the points ``about`` which misalignments lean, (P, joints, 2); ``_by`` (1 + n, P, joints, 2)
+    over the whole of both; ``steps`` (1 + n, P).
     """
 
     r: Interval
     e: Interval
     d: Interval
+    about: Interval
     r_by: Interval
     e_by: Interval
     d_by: Interval
+    about_by: Interval
     steps: Interval
 
     def take(self, rows: Rows) -> Pairs:
         """Return some of the pairs."""
-        several = "r_by", "e_by", "d_by", "steps"
-        return Pairs(*(own[:, rows] if name in several else own[rows] for name, own in self._asdict().items()))
+        return Pairs(*(own[rows] for own in self[:4]), *(own[:, rows] for own in self[4:]))
+
+    def columns(self) -> list[Columns]:
+        """Return the vectors of the joints one by one: r, e, d, about."""
+        return [[(own[:, k, 0], own[:, k, 1]) for k in range(own.shape[1])] for own in self[:4]]
+
+    def duals(self, steps: Interval) -> list[Columns]:
+        """Return the same as duals over the steps."""
+        return [duals(*own, steps) for own in zip(self[:4], self[4:8])]
 
     def at_input(self) -> Interval:
         """Return the steps with the input kept at its middle."""
@@ -112,7 +122,7 @@ class Pairs(NamedTuple):
         return self.steps * points(zero)
 
 
-def pairs_of(layout: Layout, items: Items, boxes: Boxes, at: Places, centre: Interval, half: Array) -> Pairs:
+def pairs_of(layout: Layout, items: Items, boxes: Boxes, placed: Placed, centre: Interval, half: Array) -> Pairs:
     """Bring boxes and stations together, row by row; ``centre`` are the lengths at which the stations were placed."""
     off = boxes.p - centre
     n = len(boxes.p_by)
@@ -131,13 +141,17 @@ def pairs_of(layout: Layout, items: Items, boxes: Boxes, at: Places, centre: Int
             here = here + by[:, 1 + m] * off[:, m].reshape(*shape)
         return here, Interval.stack(slopes, axis=0)
 
-    r, r_by = moved((at.r - Interval(items.centre)) / items.length, at.r_by / items.length)
-    e, e_by = moved(at.e, at.e_by)
-    base, base_by = moved(at.base, at.base_by)
+    at, by = placed
+    r, r_by = about, about_by = moved((at.r - Interval(items.centre)) / items.length, by.r / items.length)
+    if layout.rails:
+        here, rates = (leaning_points(layout, own.r, own.rail) for own in placed)
+        about, about_by = moved((here - Interval(items.centre)) / items.length, rates / items.length)
+    e, e_by = moved(at.e, by.e)
+    base, base_by = moved(at.base, by.base)
     ends = np.concatenate([half[:, None], boxes.half], axis=1).T
     steps = Interval.from_bounds(-ends, ends)
     d, d_by = _misaligned(layout, boxes, (base, base_by), steps)
-    return Pairs(r, e, d, r_by, e_by, d_by, steps)
+    return Pairs(r, e, d, about, r_by, e_by, d_by, about_by, steps)
 
 
 def _misaligned(
@@ -170,11 +184,6 @@ def duals(value: Interval, by: Interval, steps: Interval) -> Columns:
     return [tuple(Dual(over[:, k, i], by[:, :, k, i]) for i in (0, 1)) for k in range(over.shape[1])]  # type: ignore[misc]
 
 
-def columns(value: Interval) -> Columns:
-    """Vectors (P, k, 2) one by one."""
-    return [(value[:, k, 0], value[:, k, 1]) for k in range(value.shape[1])]
-
-
 class Certificate(NamedTuple):
     """``start + sum of by_k step_k`` is negative only where P pairs bind: (P,), and (1 + n, P) derivatives."""
 
@@ -202,31 +211,28 @@ def certificates(layout: Layout, items: Items, boxes: Boxes, pairs: Pairs, y: Ar
 
     found = []
     for dual in (False, True):
-        if dual:
-            r, e, d = (
-                duals(*own, steps) for own in ((pairs.r, pairs.r_by), (pairs.e, pairs.e_by), (pairs.d, pairs.d_by))
-            )
-        else:
-            r, e, d = columns(pairs.r), columns(pairs.e), columns(pairs.d)
-        found.append(_left_over(layout, items, (r, e, d), wrenches, lambda k, dual=dual: limit(k, dual)))
+        at = pairs.duals(steps) if dual else pairs.columns()
+        found.append(_left_over(layout, items, at, wrenches, lambda k, dual=dual: limit(k, dual)))
     start, whole = found
     by = whole.grad + Interval.zeros(steps.shape) if isinstance(whole, Dual) else Interval.zeros(steps.shape)
     sound = fine & start.is_bounded & by.is_bounded.all(axis=0)
     return Certificate(start, by, np.asarray(sound))
 
 
-def _left_over(layout: Layout, items: Items, at: tuple[Columns, Columns, Columns], y: Interval, limit: Any) -> Any:
+def _left_over(layout: Layout, items: Items, at: list[Columns], y: Interval, limit: Any) -> Any:
     """Sum of limits times loads, less the work; negative proves that the loops cannot be closed."""
-    r, e, d = at
+    r, e, d, about = at
     total: Any = Interval.zeros((len(y),))
-    wrench = []
+    wrench, leaning = [], []
     for place in range(len(layout.joints)):
         own: list[Any] = [Interval.zeros((len(y),))] * 3
         for loop, sign in enumerate(layout.incidence[:, place].tolist()):
             if sign:
                 own = [a + y[:, 3 * loop + i] * sign for i, a in enumerate(own)]
-        x, across = r[place]
+        (x, across), (p, q) = r[place], about[place]
         wrench.append((own[0] - across * own[2], own[1] + x * own[2], own[2]))
+        rail = place in layout.rails
+        leaning.append((own[0] - q * own[2], own[1] + p * own[2]) if rail else wrench[-1][:2])
     for item in np.flatnonzero(items.costly).tolist():
         blocks = len(layout.limit)
         if item >= blocks:
@@ -243,7 +249,7 @@ def _left_over(layout: Layout, items: Items, at: tuple[Columns, Columns, Columns
             size = abs(my * e[place][0] - mx * e[place][1])
         total = total + size * limit(item)
     for place, _, _ in layout.misalignments:
-        mx, my, _ = wrench[place]
+        mx, my = leaning[place]
         total = total - (mx * d[place][0] + my * d[place][1])
     return total
 
@@ -289,12 +295,16 @@ def slacks(layout: Layout, items: Items, boxes: Boxes, pairs: Pairs, found: Shar
     way = ways(items, t.mid, found, loose) / over[..., None, None]
     share = found.tau / over[..., None]
     turned = [place for place, _, _ in layout.misalignments]
-    here = columns(pairs.r), columns(pairs.e), {place: columns(pairs.d)[place] for place in turned}
+    here, moving = pairs.columns(), pairs.duals(steps)
+
+    def leaning(at: list[Columns]) -> dict[int, tuple[Any, Any]]:
+        """Misalignments with the points they lean about."""
+        return {place: (at[2][place], at[3][place]) for place in turned}
 
     def open_(share: Array) -> Interval:
         """Closure at the middles."""
         own = [(t[:, k] * share[:, k, 0], t[:, k] * share[:, k, 1]) for k in range(share.shape[1])]
-        return _stacked(closure(layout, here[0], here[1], own, here[2]), len(share))
+        return _stacked(closure(layout, here[0], here[1], own, leaning(here)), len(share))
 
     def closed(share: Array) -> Array:
         for _ in range(2):
@@ -308,10 +318,9 @@ def slacks(layout: Layout, items: Items, boxes: Boxes, pairs: Pairs, found: Shar
     cost = np.where(items.costly, t.mid * np.hypot(load[..., 0], load[..., 1]), 0.0)
     loaded = cost > _LOADED
     rule = np.where(loaded[..., None], (caps.mid - a[..., None])[..., None] * unit, 0.0)
-    moving = [duals(*own, steps) for own in ((pairs.r, pairs.r_by), (pairs.e, pairs.e_by), (pairs.d, pairs.d_by))]
     for last in (False, True):
         own = [(limit * x, limit * y) for limit, (x, y) in zip(t_dual, _following(share, rule, steps))]
-        sums = closure(layout, moving[0], moving[1], own, {place: moving[2][place] for place in turned})
+        sums = closure(layout, moving[0], moving[1], own, leaning(moving))
         change = Interval.stack([_slopes(own, steps) for own in sums], axis=-1)
         if not last:
             rule = rule - np.einsum("pijc,kpc->kpij", way, np.nan_to_num(change.mid))
@@ -460,15 +469,15 @@ def _lifted(need: Array, by: Array, a: Array, half: Array) -> tuple[Array, Array
 def solved(layout: Layout, items: Items, boxes: Boxes, pairs: Pairs) -> Sharing:
     """Share the misalignments at the middles; wrenches scaled so that all items can give back 1."""
     t = np.where(items.costly, np.maximum(boxes.t.mid, 0.0), 0.0)
-    found = share(layout, items, t, pairs.r.mid, pairs.e.mid, pairs.d.mid)
+    found = share(layout, items, t, pairs.r.mid, pairs.e.mid, Leans(pairs.d.mid, pairs.about.mid))
     load = np.einsum("pick,pk->pic", found.rows, found.y)
     cost = (t * np.hypot(load[..., 0], load[..., 1])).sum(axis=1)
-    lift = np.einsum("pjc,pjc->p", pairs.d.mid, _moments(layout, pairs.r.mid, found.y))
+    lift = np.einsum("pjc,pjc->p", pairs.d.mid, _moments(layout, pairs.about.mid, found.y))
     scale = np.where(lift < 0.0, -1.0, 1.0) / np.where(cost > 1e-300, cost, 1.0)
     return found._replace(y=found.y * scale[:, None])
 
 
 def _moments(layout: Layout, r: Array, y: Array) -> Array:
-    """Moments of the joints (P, joints, 2) by loop wrenches."""
+    """Moments of the joints (P, joints, 2) about points r by loop wrenches."""
     wrench = np.einsum("lj,plc->pjc", layout.incidence, y.reshape(len(y), -1, 3))
     return np.stack([wrench[..., 0] - wrench[..., 2] * r[..., 1], wrench[..., 1] + wrench[..., 2] * r[..., 0]], axis=-1)

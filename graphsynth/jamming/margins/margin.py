@@ -107,7 +107,7 @@ class JointsMargin(Shown):
         self.stations = Stations(quantities.given, motion, quantities.box)
         whole = quantities.values([Interval(float(own.lower), float(own.upper)) for own in quantities.ranges.values()])
         most = np.array([0.0 if own is None else float(own.hi) for own in (*whole.limits, *whole.plays)])
-        items = Items.of(layout, self.stations.places.r.mid)
+        items = Items.of(layout, self.stations.placed.at.r.mid)
         self.items = items._replace(costly=~items.free & (most > 0.0))  # a limit may be zero in the middle of its range
         if not self.items.costly.any():
             raise GeometryError("no joint has a limit above zero to be used up; give one at least a clearance")
@@ -239,7 +239,7 @@ class JointsMargin(Shown):
     def _evaluated(self, boxes: Boxes, box: Rows, station: Rows) -> _Pairs:
         layout, items, stations = self.quantities.layout, self.items, self.stations
         own = boxes.take(box)
-        pairs = pairs_of(layout, items, own, stations.places.take(station), stations.middle, stations.half[station])
+        pairs = pairs_of(layout, items, own, stations.placed.take(station), stations.middle, stations.half[station])
         found = solved(layout, items, own, pairs)
         line = certificates(layout, items, own, pairs, found.y)
         a = np.where(line.sound, line.by.mid, 0.0)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals import Interval
-from graphsynth.jamming.joints.closure import PITCH, ROUND, Columns, Layout, moment_rows, work_row
+from graphsynth.jamming.joints.closure import PITCH, ROUND, Columns, Layout, Leans, moment_rows, work_row
 from graphsynth.jamming.joints.cones import solve_cones
 
 Array = NDArray[np.float64]
@@ -59,9 +59,9 @@ def item_rows(layout: Layout, r: Array, e: Array) -> Array:
     return np.concatenate([moments, forces], axis=1)
 
 
-def share(layout: Layout, items: Items, t: Array, r: Array, e: Array, d: Array) -> Sharing:
-    """Share the misalignments d (P, joints, 2) among items with limits t (P, items), in floating point."""
-    rows, W = item_rows(layout, r, e), work_row(layout, r, d)
+def share(layout: Layout, items: Items, t: Array, r: Array, e: Array, lean: Leans) -> Sharing:
+    """Share the misalignments (P, joints, 2) among items with limits t (P, items), in floating point."""
+    rows, W = item_rows(layout, r, e), work_row(layout, lean)
     count, k = W.shape
     size = np.sqrt((W**2).sum(axis=1))
     unit = np.where(size > 0.0, size, 1.0)
@@ -118,9 +118,16 @@ def ways(items: Items, t: Array, found: Sharing, loose: Array) -> Array:
 
 
 def closure(
-    layout: Layout, r: Columns, e: Columns, tau: list[tuple[Any, Any]], d: dict[int, tuple[Any, Any]]
+    layout: Layout,
+    r: Columns,
+    e: Columns,
+    tau: list[tuple[Any, Any]],
+    lean: dict[int, tuple[tuple[Any, Any], tuple[Any, Any]]],
 ) -> list[Any]:
-    """Sum up every loop (3 for each) for items tau; intervals or duals, positions in units."""
+    """Sum up every loop (3 for each) for items tau; intervals or duals, positions in units.
+
+    ``lean``: misalignments by joint, each with the point about which it leans.
+    """
     zero = Interval(0)
     joints, blocks = len(layout.joints), len(layout.limit)
     x: list[Any] = [zero] * joints
@@ -133,9 +140,13 @@ def closure(
                 a, b = -b, a
             first, second = a * first, b * first
         x[place], y[place] = x[place] + first, y[place] + second
-    for place, (first, second) in d.items():
+    more: dict[int, Any] = {}
+    for place, ((first, second), (p, q)) in lean.items():
+        if place in layout.rails:
+            more[place] = r[place][0] * y[place] - r[place][1] * x[place] + (p * second - q * first)
         x[place], y[place] = x[place] + first, y[place] + second
-    lifts = [r[k][0] * y[k] - r[k][1] * x[k] + tau[blocks + k][0] for k in range(joints)]
+    lifts = [r[k][0] * y[k] - r[k][1] * x[k] if k not in more else more[k] for k in range(joints)]
+    lifts = [own + tau[blocks + k][0] for k, own in enumerate(lifts)]
     sums: list[Any] = []
     for signs in layout.incidence.tolist():
         parts: list[Any] = [zero] * 3

@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals import Interval
+from graphsynth.jamming.assembly.places import Places
 from graphsynth.jamming.assembly.positions import points
 from graphsynth.jamming.assembly.tubes import prove_tubes, slopes
+from graphsynth.jamming.joints.closure import Leans, leaning_points
 from graphsynth.jamming.margins.program import item_rows, share
 
 if TYPE_CHECKING:
@@ -55,10 +57,11 @@ class Sampler:
         x, counted = work.system.coordinates(poses, velocities)[0], work.system.count(poses)
         none = points(np.zeros((len(u), work.box.size)))
         at = prove_tubes(work.system, self.layout.joints, points(u), x, counted, none)
-        *by, _ = slopes(work.system, self.layout.joints, points(u), at, counted, none)
+        by, _ = slopes(work.system, self.layout.joints, points(u), at, counted, none)
+        here, rates = Places(*(own.mid for own in at.places)), Places(*(own.mid[1:] for own in by))
         centre, unit = self.items.centre, self.items.length
-        self.r, self.e, self.base = (at.r.mid - centre) / unit, at.e.mid, at.base.mid
-        self.r_by, self.e_by, self.base_by = by[0].mid[1:] / unit, by[1].mid[1:], by[2].mid[1:]
+        self.at = here._replace(r=(here.r - centre) / unit, rail=(here.rail - centre) / unit)
+        self.by = rates._replace(r=rates.r / unit, rail=rates.rail / unit)
         self.place, self.y = np.zeros(0, dtype=np.intp), np.zeros((0, 3 * self.layout.loops))
         self.count = len(u)
 
@@ -76,49 +79,49 @@ class Sampler:
         v = [np.stack([mid(a), mid(b)], axis=-1) for a, b in values.vectors]
         return Members(np.stack(t, axis=-1), np.stack(v, axis=-2), x[:, : quantities.box.size])
 
-    def _geometry(self, place: Rows, p: Array) -> tuple[Array, Array, Array]:
-        """Positions, guides and directions at places of the grid, to first order in the lengths."""
+    def _geometry(self, place: Rows, p: Array) -> Places:
+        """Where the joints are at places of the grid, to first order in the lengths."""
         found = []
-        for here, by in ((self.r, self.r_by), (self.e, self.e_by), (self.base, self.base_by)):
+        for here, by in zip(self.at, self.by):
             own = here[place]
             for k in range(p.shape[1]):
                 own = own + by[k][place] * p[:, k].reshape(-1, *(1,) * (own.ndim - 1))
             found.append(own)
-        return found[0], found[1], found[2]
+        return Places(*found)
 
-    def _shifts(self, base: Array, v: Array) -> Array:
+    def _leans(self, at: Places, v: Array) -> Leans:
+        base = at.base
         d = np.zeros((*base.shape[:2], 2))
         for k, (place, sign, _) in enumerate(self.layout.misalignments):
             x, y = np.moveaxis(base[:, place, 0 if sign > 0 else 1], -1, 0)
             d[:, place, 0] = sign * (x * v[:, k, 0] - y * v[:, k, 1])
             d[:, place, 1] = sign * (x * v[:, k, 1] + y * v[:, k, 0])
-        return d
+        return Leans(d, leaning_points(self.layout, at.r, at.rail))
 
     def _loads(self, place: Rows, y: Array, p: Array) -> tuple[Array, Array]:
         """Return loads of the items (P, items) and rates of the work by the misalignments (P, axes, 2)."""
-        r, e, base = self._geometry(place, p)
-        rows = item_rows(self.layout, r, e)
+        at = self._geometry(place, p)
+        rows = item_rows(self.layout, at.r, at.e)
         if self.items.free.any() and p.shape[1]:  # joints without limit carry nothing, whatever the lengths
             none = rows[:, self.items.free].reshape(len(y), -1, y.shape[1])
             y = y - (np.linalg.pinv(none, rcond=1e-11) @ (none @ y[:, :, None]))[..., 0]
         load = np.einsum("pick,pk->pic", rows, y)
         size = np.where(self.items.costly, np.hypot(load[..., 0], load[..., 1]), 0.0)
         wrench = np.einsum("lj,plc->pjc", self.layout.incidence, y.reshape(len(y), -1, 3))
-        moment = np.stack(
-            [wrench[..., 0] - wrench[..., 2] * r[..., 1], wrench[..., 1] + wrench[..., 2] * r[..., 0]], axis=-1
-        )
+        x, y = np.moveaxis(leaning_points(self.layout, at.r, at.rail), -1, 0)
+        moment = np.stack([wrench[..., 0] - wrench[..., 2] * y, wrench[..., 1] + wrench[..., 2] * x], axis=-1)
         rates = []
         for own, sign, _ in self.layout.misalignments:
-            turn = base[:, own, 0 if sign > 0 else 1]
+            turn = at.base[:, own, 0 if sign > 0 else 1]
             mx, my = moment[:, own, 0], moment[:, own, 1]
             rates.append(sign * np.stack([mx * turn[:, 0] + my * turn[:, 1], my * turn[:, 0] - mx * turn[:, 1]], -1))
         return size, np.stack(rates, axis=1)
 
     def solve(self, members: Members, place: Rows) -> Array:
         """Wrenches of members at places, with cost 1 and the sign that binds."""
-        r, e, base = self._geometry(place, members.p)
+        at = self._geometry(place, members.p)
         t = np.where(self.items.costly, np.maximum(members.t, 0.0), 0.0)
-        found = share(self.layout, self.items, t, r, e, self._shifts(base, members.v))
+        found = share(self.layout, self.items, t, at.r, at.e, self._leans(at, members.v))
         size, rates = self._loads(place, found.y, members.p)
         cost, work = (t * size).sum(axis=1), (rates * members.v).sum(axis=(1, 2))
         y: Array = found.y * (np.where(work < 0.0, -1.0, 1.0) / np.where(cost > 1e-300, cost, 1.0))[:, None]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval
+from graphsynth.jamming.assembly.places import Places
 from graphsynth.jamming.assembly.positions import Unsupported, points
 from graphsynth.jamming.assembly.tubes import Tubes, joined, prove_tubes, settled, slopes
 from graphsynth.jamming.joints.branch import of_the_motion
@@ -31,22 +32,15 @@ _FIRST_CUTS, _DEEPEST = 6, 12
 _FEW = 32
 
 
-class Places(NamedTuple):
-    """Positions, guide directions and directions of links at joints: at the middle, and derivatives over the piece.
+class Placed(NamedTuple):
+    """Places of the joints at the middles of pieces (N, ...); derivatives over them, (N, 1 + lengths, ...)."""
 
-    ``r``, ``e`` (N, joints, 2), ``base`` (N, joints, 2, 2); with ``_by`` (N, 1 + lengths, ...) by input and lengths.
-    """
+    at: Places
+    by: Places
 
-    r: Interval
-    e: Interval
-    base: Interval
-    r_by: Interval
-    e_by: Interval
-    base_by: Interval
-
-    def take(self, rows: Rows) -> Places:
+    def take(self, rows: Rows) -> Placed:
         """Return some of the pieces."""
-        return Places(*(part[rows] for part in self))
+        return Placed(*(Places(*(part[rows] for part in own)) for own in self))
 
 
 class Stations:
@@ -112,25 +106,26 @@ class Stations:
         here, middle = points(u.mid), points(p.mid)
         x = tubes.tight.mid if self.system.size else tubes.tight.lo
         at = prove_tubes(self.system, self.joints, here, x, counted, middle)
-        *by, fine = slopes(self.system, self.joints, u, tubes, counted, p)
+        by, fine = slopes(self.system, self.joints, u, tubes, counted, p)
         if not (at.proved & fine).all():
             k = int(np.flatnonzero(~(at.proved & fine))[0])
             raise GeometryError(f"the rates of the joints are not enclosed near the input {lo[k]:.6g} (a singularity)")
         by = self._at_middle(by, here, tubes, x, counted)
-        rates = [Interval.from_bounds(np.moveaxis(b.lo, 0, 1), np.moveaxis(b.hi, 0, 1)) for b in by]
-        places = Places(at.r, at.e, at.base, *rates)
+        rates = Places(*(Interval.from_bounds(np.moveaxis(b.lo, 0, 1), np.moveaxis(b.hi, 0, 1)) for b in by))
+        placed = Placed(at.places, rates)
         start = len(self.lo)
         if start == 0:
-            self.places, self.tubes, self.counted = places, tubes, counted
+            self.placed, self.tubes, self.counted = placed, tubes, counted
         else:
-            self.places = Places(*(joined([a, b]) for a, b in zip(self.places, places)))
+            both = (map(list, zip(*own)) for own in zip(self.placed, placed))
+            self.placed = Placed(*(Places(*map(joined, own)) for own in both))
             self.tubes = Tubes(*(joined([a, b]) for a, b in zip(self.tubes, tubes)))
             self.counted = np.concatenate([self.counted, counted])
         self.lo, self.hi = np.concatenate([self.lo, lo]), np.concatenate([self.hi, hi])
         self.depth = np.concatenate([self.depth, np.full(len(lo), depth, dtype=np.intp)])
         return np.arange(start, start + len(lo))
 
-    def _at_middle(self, by: list[Interval], u: Interval, tubes: Tubes, x: Array, counted: Array) -> list[Interval]:
+    def _at_middle(self, by: Places, u: Interval, tubes: Tubes, x: Array, counted: Array) -> Places:
         """Return the derivatives with those by the lengths at the middle of the input alone, where that is proved.
 
         Enough for the mean value theorem, which moves the lengths first and the input last.
@@ -140,7 +135,7 @@ class Stations:
         p = self.work.whole(len(x))
         at = prove_tubes(self.system, self.joints, u, x, counted, p)
         inside = ((at.tight.lo >= tubes.domain.lo) & (at.tight.hi <= tubes.domain.hi)).all(axis=1)
-        *own, fine = slopes(self.system, self.joints, u, at, counted, p)
+        own, fine = slopes(self.system, self.joints, u, at, counted, p)
         use = at.proved & inside & fine
         found = []
         for whole, here in zip(by, own):
@@ -150,7 +145,7 @@ class Stations:
                 for a, b in ((whole.lo, here.lo), (whole.hi, here.hi))
             ]
             found.append(Interval.from_bounds(*ends))
-        return found
+        return Places(*found)
 
     def cut(self, rows: Rows) -> None:
         """Cut pieces in equal parts, so that ``children`` has them; not below a smallest width."""
