@@ -17,7 +17,7 @@ from scipy.sparse import csc_matrix
 from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, enumerate_chains, simulate
 from graphsynth.jamming import Bearing
 from graphsynth.jamming.joints import JointLimits, Misalignment, certify_coupled, compare_sensitivities, largest_scale
-from graphsynth.jamming.joints.closure import force_rows, joint_places, moment_rows, shifts, work_row
+from graphsynth.jamming.joints.closure import force_rows, joint_places, leans, moment_rows, work_row
 from graphsynth.jamming.joints.program import problem
 from graphsynth.kinematics.dimensional import embody
 
@@ -64,8 +64,8 @@ def test_eight_links_by_linear_programs(benchmark, eight):
     poses = simulate(mechanism, np.linspace(0.0, 6.28, 36 if benchmark.enabled else 2)).poses
     given = problem(mechanism, JointLimits(0.006), tilt)
     layout = given.layout
-    r, e, base = joint_places(mechanism, layout.joints, poses)
-    M, W = moment_rows(layout, r, e), work_row(layout, r, shifts(layout, base))
+    at = joint_places(mechanism, layout.joints, poses)
+    M, W = moment_rows(layout, at.r, at.e), work_row(layout, leans(layout, at))
     assert force_rows(layout).shape[0] == len(layout.joints)
     costly = np.flatnonzero(layout.limit > 0.0)
     angle = 2.0 * math.pi * np.arange(64) / 64
@@ -133,8 +133,8 @@ def test_the_cone_program_of_many_poses(benchmark, eight, method):
         assert ((found.upper - found.lower) <= 1e-9 * found.upper).all()
         return
     clarabel = pytest.importorskip("clarabel")
-    r, e, base = joint_places(mechanism, layout.joints, poses)
-    rows, work = moment_rows(layout, r, e), work_row(layout, r, shifts(layout, base))
+    at = joint_places(mechanism, layout.joints, poses)
+    rows, work = moment_rows(layout, at.r, at.e), work_row(layout, leans(layout, at))
     costly = np.flatnonzero(layout.limit > 0.0)
     settings = clarabel.DefaultSettings()
     settings.verbose = False

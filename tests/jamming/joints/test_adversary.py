@@ -14,7 +14,7 @@ from graphsynth import Mechanism, Revolute, enumerate_chains, simulate
 from graphsynth.intervals import Interval
 from graphsynth.jamming import Bearing
 from graphsynth.jamming.joints import RIGID, SPHERICAL, JointLimits, Misalignment, SlideLimits
-from graphsynth.jamming.joints.closure import joint_places, lay_out, shifts
+from graphsynth.jamming.joints.closure import Leans, joint_places, lay_out, leans
 from graphsynth.jamming.joints.enclosure import Pieces
 from graphsynth.jamming.joints.program import problem, solve_poses
 
@@ -71,13 +71,13 @@ def attack(make, links, rng, count):
     d = np.zeros_like(r)
     for place, _, _ in layout.misalignments:
         d[:, place] = rng.normal(size=(count, 2))
-    found = solve_poses(layout, r, e, d, "scale")
+    found = solve_poses(layout, r, e, Leans(d, r), "scale")
     side, margin = rng.choice([-1.0, 1.0], count), rng.choice(MARGINS, count)
     assert (found.lower > 0.0).all() and np.isfinite(found.lower).all()
     k = (1.0 + side * margin) / found.lower
     moved = d * k[:, None, None]
-    at = Pieces(*(Interval.from_bounds(v, v) for v in (r, e, moved)))
-    lower, upper = factor_bounds(layout, at, solve_poses(layout, r, e, moved, "scale"))
+    at = Pieces(*(Interval.from_bounds(v, v) for v in (r, e, moved, r)))
+    lower, upper = factor_bounds(layout, at, solve_poses(layout, r, e, Leans(moved, r), "scale"))
     outcome = Counter(positions=count)
     tilt = tuple(own.tilt if isinstance(own, JointLimits) else (own.roll, own.pitch) for own in limits)
     pairs, play = tuple(map(tuple, layout.pairs.tolist())), tuple(own.axial_clearance for own in limits)
@@ -142,10 +142,11 @@ def test_closed_form_of_one_bearing_at_every_position():
         given = problem(mechanism, bearings, Misalignment(0, 1, 0.1, turned))
         critical = Bearing().critical_tilt("A").angle
         k = critical / lift * (1.0 + side * margin) / 0.1
-        r, e, base = joint_places(mechanism, given.layout.joints, motion.poses)
-        d = shifts(given.layout, base) * k[:, None, None]
-        at = Pieces(*(Interval.from_bounds(v, v) for v in (r, e, d)))
-        lower, upper = factor_bounds(given.layout, at, solve_poses(given.layout, r, e, d, "scale"))
+        places = joint_places(mechanism, given.layout.joints, motion.poses)
+        (r, e), (d, about) = places[:2], leans(given.layout, places)
+        d = d * k[:, None, None]
+        at = Pieces(*(Interval.from_bounds(v, v) for v in (r, e, d, about)))
+        lower, upper = factor_bounds(given.layout, at, solve_poses(given.layout, r, e, Leans(d, about), "scale"))
         assert (lower <= (1.0 + side * margin) * (1 + 1e-11)).all()
         assert (upper >= (1.0 + side * margin) * (1 - 1e-11)).all()
         assert not ((lower > 1.0) & (side < 0)).any() and not ((upper < 1.0) & (side > 0)).any()
@@ -164,8 +165,8 @@ def test_random_tilts_and_wrenches_stay_outside(links):
     e, d = np.zeros_like(r), np.zeros_like(r)
     e[..., 0] = 1.0
     d[:, 0] = rng.normal(size=2)
-    found = solve_poses(layout, r, e, d, "scale")
-    at = Pieces(*(Interval.from_bounds(v, v) for v in (r, e, d)))
+    found = solve_poses(layout, r, e, Leans(d, r), "scale")
+    at = Pieces(*(Interval.from_bounds(v, v) for v in (r, e, d, r)))
     lower, upper = factor_bounds(layout, at, found)
     assert upper[0] - lower[0] <= 1e-11 * upper[0]
     pairs = tuple(map(tuple, layout.pairs.tolist()))

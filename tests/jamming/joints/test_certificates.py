@@ -27,7 +27,7 @@ from graphsynth.jamming.joints import (
     largest_scale,
 )
 from graphsynth.jamming.joints.branch import of_the_motion
-from graphsynth.jamming.joints.closure import joint_places, shifts
+from graphsynth.jamming.joints.closure import joint_places, leans
 from graphsynth.jamming.joints.enclosure import Pieces
 from graphsynth.jamming.joints.pieces import FEWEST, PARTS, Work
 from graphsynth.jamming.joints.program import problem
@@ -39,8 +39,8 @@ TURN = np.linspace(0.0, 2.0 * math.pi, 25)
 
 def at_points(given, poses):
     """Pieces without width at float positions."""
-    r, e, base = joint_places(given.mechanism, given.layout.joints, poses)
-    return Pieces(*(Interval.from_bounds(v, v) for v in (r, e, shifts(given.layout, base))))
+    at = joint_places(given.mechanism, given.layout.joints, poses)
+    return Pieces(*(Interval.from_bounds(v, v) for v in (at.r, at.e, *leans(given.layout, at))))
 
 
 def varied_limits(mechanism, rng):
@@ -105,8 +105,8 @@ def exact_lower(given, poses, y, units):
     See theory/joints-that-share-a-tilt 4.
     """
     layout = given.layout
-    r, _, base = joint_places(given.mechanism, layout.joints, poses[None])
-    d = shifts(layout, base)[0]
+    at = joint_places(given.mechanism, layout.joints, poses[None])
+    r, d = at.r, leans(layout, at).d[0]
     wrench = layout.incidence.T @ y.reshape(-1, 3)
     work, cost = Fraction(0), 0.0
     for place in range(len(layout.joints)):
@@ -409,7 +409,7 @@ def test_tubes_contain_perturbed_motions(make, low, high):
     pieces = Interval.from_bounds(edges[:-1], edges[1:])
     tubes = prove_tubes(system, joints, pieces, x, system.count(motion.poses))
     assert tubes.proved.mean() > 0.95
-    *rates, fine = slopes(system, joints, pieces, tubes, system.count(motion.poses))
+    rates, fine = slopes(system, joints, pieces, tubes, system.count(motion.poses))
     assert (fine | ~tubes.proved).all()
     guided = [k for k in joints if not isinstance(mechanism.joints[k], Gear)]
     for _ in range(2):
@@ -423,7 +423,7 @@ def test_tubes_contain_perturbed_motions(make, low, high):
         inputs = edges[:-1] + rng.uniform(0, 1, 120) * np.diff(edges)
         sample = simulate(other, np.concatenate([middle[:1] * 0 + min(middle[0], inputs[0]) - 1e-9, inputs]),
                           start=motion.poses[0])  # fmt: skip
-        r, e, _ = joint_places(other, joints, sample.poses[1:])
+        r, e, _, rail = joint_places(other, joints, sample.poses[1:])
         keep = tubes.proved & sample.assembled[1:]
         h = 1e-5
         near = [
@@ -434,7 +434,7 @@ def test_tubes_contain_perturbed_motions(make, low, high):
             slope, size = (after - before) / (2 * h), 1e-8 + 1e-3 * h
             assert ((slope >= rate.lo - size) & (slope <= rate.hi + size))[keep][:, guided].all()
         pad = 1e-12
-        for value, tube in ((r, tubes.r), (e, tubes.e)):
+        for value, tube in ((r, tubes.r), (e, tubes.e), (rail, tubes.rail)):
             inside = (value >= tube.lo - pad) & (value <= tube.hi + pad)
             assert inside[keep][:, guided].all()
 

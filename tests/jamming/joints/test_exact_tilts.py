@@ -22,7 +22,7 @@ from graphsynth.jamming.joints import (
     certify_coupled,
     largest_scale,
 )
-from graphsynth.jamming.joints.closure import joint_places, shifts
+from graphsynth.jamming.joints.closure import Leans, joint_places, leans
 from graphsynth.jamming.joints.enclosure import Pieces, lower_bounds, upper_bounds
 from graphsynth.jamming.joints.exact import Neglected, _movements, neglected
 from graphsynth.jamming.joints.pieces import Work
@@ -215,19 +215,20 @@ def test_guides_and_more_loops_are_decided_too():
 
 def disturbed_bounds(given, poses, **changes):
     """Bounds of the factor with chosen disturbances of everything, at float positions."""
-    r, e, base = joint_places(given.mechanism, given.layout.joints, poses)
-    at = Pieces(*(Interval.from_bounds(v, v) for v in (r, e, shifts(given.layout, base))))
+    places = joint_places(given.mechanism, given.layout.joints, poses)
+    here = places.r, places.e, *leans(given.layout, places)
+    at = Pieces(*(Interval.from_bounds(v, v) for v in here))
     layout, count = given.layout, len(poses)
     joints = len(layout.joints)
     none = np.zeros((count, joints))
     values = {
-        "r": none, "e": none, "d": none, "lift": np.zeros((count, layout.loops)),
+        "r": none, "e": none, "d": none, "about": none, "lift": np.zeros((count, layout.loops)),
         "wide": np.tile(layout.limit, (count, 1)), "narrow": np.tile(layout.limit, (count, 1)),
         "end_float": np.tile(layout.end_float, (count, 1)), "sound": np.ones(count, dtype=bool), **changes,
     }  # fmt: skip
     found = given.solve(poses, "scale")
     exact = Neglected(**values)
-    return lower_bounds(layout, at, found, exact), upper_bounds(layout, at, found, exact), found, (r, e, at.d.mid)
+    return lower_bounds(layout, at, found, exact), upper_bounds(layout, at, found, exact), found, here
 
 
 def slider_and_four_bar():
@@ -238,28 +239,35 @@ def slider_and_four_bar():
     yield Mechanism(graph, joints, [Driver(0, 1)]), pins, Misalignment(0, 1, 0.03, 0.8)
     bearings = {(1, 2): JointLimits(0.02, 0.01), (2, 3): JointLimits(0.01), (0, 3): JointLimits(0.015, 0.02)}
     yield four_bar(), bearings, Misalignment(0, 1, 0.03, 0.3)
+    yield Mechanism(graph, joints, [Driver(0, 1)]), pins, Misalignment(0, 3, 0.02, 1.8, rigid=False)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("part", ["r", "e", "d"])
+@pytest.mark.parametrize("part", ["r", "e", "d", "about"])
 def test_bounds_hold_for_every_disturbance_within(part):
     """Positions, guides and misalignments moved by what is allowed: the factor of none lies beyond the bounds."""
     rng = np.random.default_rng(3)
-    size, reached = {"r": 0.05, "e": 0.04, "d": 0.002}[part], False
+    size, reached = {"r": 0.05, "e": 0.04, "d": 0.002, "about": 0.05}[part], False
     for mechanism, limits, tilt in slider_and_four_bar():
         given = problem(mechanism, limits, tilt)
         poses = simulate(mechanism, [0.7, 1.9]).poses
+        rails = np.isin(np.arange(len(given.layout.joints)), given.layout.rails)
+        if part == "about" and not rails.any():
+            continue
         amount = {part: np.full((2, len(given.layout.joints)), size)}
+        if part == "r":  # other joints than rails lean where they are
+            amount["about"] = np.where(rails, 0.0, amount["r"])
         lower, upper, found, places = disturbed_bounds(given, poses, **amount)
         assert (lower <= found.lower).all() and (upper >= found.upper).all()
         least, most = found.upper.copy(), found.lower.copy()
         for _ in range(24):
-            r, e, d = (v.copy() for v in places)
-            turned = {"r": r, "e": e, "d": d}[part]
+            r, e, d, about = (v.copy() for v in places)
+            turned = {"r": r, "e": e, "d": d, "about": about}[part]
             angle = rng.uniform(0.0, 2.0 * np.pi, turned.shape[:2])
             step = np.stack([np.cos(angle), np.sin(angle)], axis=-1) * size
             turned += step if part != "d" else step * (np.abs(d).sum(axis=-1, keepdims=True) > 0.0)
-            other = solve_poses(given.layout, r, e, d, "scale")
+            about = np.where(rails[:, None], about, r)
+            other = solve_poses(given.layout, r, e, Leans(d, about), "scale")
             least, most = np.minimum(least, other.upper), np.maximum(most, other.lower)
         assert (lower <= least * (1 + 1e-9)).all() and (upper >= most * (1 - 1e-9)).all()
         reached |= bool(((least < found.lower - 0.1 * (found.lower - lower)) & (most > found.upper)).any())
@@ -350,7 +358,7 @@ def test_movements_that_lead_out_of_the_box_are_not_sound(monkeypatch, lengths, 
 
     def moved(size):
         offset = np.full((1, 4), size)
-        r, _, sound = _movements(work.system, given.layout, tubes, at, counted, offset, 0.0 * offset)
+        (r, _), _, _, sound = _movements(work.system, given.layout, tubes, at, counted, offset, 0.0 * offset)
         return r.max() / size, bool(sound[0])
 
     first, sound = moved(1e-6)

@@ -24,7 +24,7 @@ from graphsynth.jamming.joints import (
     bearing_limits,
     direction_map,
 )
-from graphsynth.jamming.joints.closure import joint_places, shifts
+from graphsynth.jamming.joints.closure import joint_places, leans
 from graphsynth.jamming.joints.program import problem
 
 
@@ -64,9 +64,9 @@ def test_against_a_general_optimiser():
     motion = simulate(mechanism, [0.5, 2.0])
     given_ = problem(mechanism, JointLimits(1.0), Misalignment(base, link, 0.5, 0.4))
     found = given_.solve(motion.poses)
-    r, e, own = joint_places(mechanism, given_.layout.joints, motion.poses)
-    tilts, slips = body_rows(given_, r, e)
-    d = shifts(given_.layout, own)
+    at = joint_places(mechanism, given_.layout.joints, motion.poses)
+    tilts, slips = body_rows(given_, at.r, at.e)
+    d = leans(given_.layout, at).d
     free = given_.layout.limit > 0.0
     for k in range(2):
         A = tilts[k][free]
@@ -115,9 +115,9 @@ def test_loop_and_body_form_agree(links, number):
     given_ = problem(mechanism, random_limits(mechanism, 5), Misalignment(base, link, 0.02, 2.0))
     motion = simulate(mechanism, np.linspace(0.0, 6.0, 25))
     found = given_.solve(motion.poses)
-    r, e, own = joint_places(mechanism, given_.layout.joints, motion.poses)
-    tilts, slips = body_rows(given_, r, e)
-    d = shifts(given_.layout, own)[:, given_.layout.block_joint]
+    at = joint_places(mechanism, given_.layout.joints, motion.poses)
+    tilts, slips = body_rows(given_, at.r, at.e)
+    d = leans(given_.layout, at).d[:, given_.layout.block_joint]
     rows = np.concatenate([tilts.reshape(25, -1, tilts.shape[-1]), slips], axis=1)
     values = np.concatenate([(found.tau + d).reshape(25, -1), found.zeta], axis=1)
     for k in range(25):
