@@ -293,13 +293,14 @@ def test_what_cannot_give_way_blocks() -> None:
     assert "neither clearance nor compliance" in report.statement
 
 
-@pytest.mark.parametrize("kind", ["four-bar", "slider", "six-bar"])
+@pytest.mark.parametrize("kind", ["four-bar", "slider", "six-bar", "rail"])
 def test_exact_closure_differs_by_alpha_squared(kind: str) -> None:
     """Energy and torque with finite tilts; the difference falls with the square of the tilt."""
     mechanism = {
         "four-bar": gs.Mechanism.four_bar(0.3, 0.1, 0.32, 0.25),
         "slider": gs.Mechanism.slider_crank(0.1, 0.3),
         "six-bar": gs.gallery.watt_six_bar(),
+        "rail": gs.Mechanism.slider_crank(0.1, 0.3),
     }[kind]
     motion = mechanism.simulate(np.array([0.4, 1.4, 2.4]))
     far = []
@@ -310,7 +311,9 @@ def test_exact_closure_differs_by_alpha_squared(kind: str) -> None:
             else JointLimits(0.1 * alpha)
             for joint in mechanism.joints
         }
-        report = motion.binding(tilt=alpha, joints=joints, stiffness=JointStiffness(900.0, 1e6))
+        guide = next((joint for joint in mechanism.joints if joint.kind == "P"), mechanism.joints[0])
+        tilt = Misalignment(guide.a, guide.b, alpha, 1.2, rigid=False) if kind == "rail" else alpha
+        report = motion.binding(tilt=tilt, joints=joints, stiffness=JointStiffness(900.0, 1e6))
         exact = report.exact()
         assert exact.missed < 1e-9
         np.testing.assert_allclose(exact.energy, report.energy, rtol=3.0 * alpha**2)

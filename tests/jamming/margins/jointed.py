@@ -38,6 +38,17 @@ def crank_slider() -> JointsMargin:
     return joints_margin(motion, limits, Misalignment(driver.base, driver.link, 0.01, 1.0, alpha_range=(0.006, 0.014)))
 
 
+def leaning_rail() -> JointsMargin:
+    """A rail that leans about its own point, from which the slider is far away; its place and lean are toleranced."""
+    motion = gs.Mechanism.slider_crank(1.0, 3.0).simulate("10..120 deg")
+    guide = next(joint for joint in motion.mechanism.joints if joint.kind == "P")
+    pins = [joint.pair for joint in motion.mechanism.joints if joint.kind == "R"]
+    limits = {pair: JointLimits(0.004, 0.003, tilt_range=(0.003, 0.005)) for pair in pins}
+    limits[guide.pair] = SlideLimits(0.003, 0.004, 0.01)
+    tilt = Misalignment(guide.a, guide.b, 0.008, 1.2, rigid=False, alpha_range=(0.004, 0.014))
+    return joints_margin(motion, limits, tilt, [HolePosition(guide.a, pins[0][1], 0.04)])
+
+
 def six_bar() -> JointsMargin:
     from graphsynth.kinematics.dimensional import embody
 
@@ -98,4 +109,4 @@ def true_margin(margin: JointsMargin, x: np.ndarray, count: int = 121) -> float:
     return float(1.0 - given.solve(motion.poses[motion.assembled], "scale").lower.max())
 
 
-CASES = {f.__name__: f for f in (four_bar, crank_slider, six_bar, fitted, spherical)}
+CASES = {f.__name__: f for f in (four_bar, crank_slider, leaning_rail, six_bar, fitted, spherical)}
