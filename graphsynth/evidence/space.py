@@ -19,8 +19,8 @@ from graphsynth.jamming.joints import RIGID, SPHERICAL, JointLimits, Misalignmen
 from graphsynth.jamming.joints.certify import certify_coupled
 from graphsynth.jamming.joints.program import problem
 from graphsynth.jamming.space.closure import Closure
-from graphsynth.jamming.space.model import in_space, start
 from graphsynth.jamming.space.optimum import least_scale
+from graphsynth.jamming.space.plane import in_space, start
 from graphsynth.jamming.space.pose import prove_pose
 from graphsynth.jamming.space.scale import largest_scale
 from graphsynth.jamming.space.turn import certify_in_space

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from graphsynth.jamming.binding.energy import least_energy
 from graphsynth.jamming.binding.parts import JointStiffness
 from graphsynth.jamming.space.closure import Closure
-from graphsynth.jamming.space.model import SpaceModel, in_space, start
+from graphsynth.jamming.space.model import SpaceModel
+from graphsynth.jamming.space.plane import in_space, start
 
 if TYPE_CHECKING:
     from graphsynth.jamming.joints.limits import Limits

@@ -158,10 +158,8 @@ def _rise(angles: _Angles, k: int) -> Array:
     """
     alpha, own, change = float(angles.seat[k]), angles.link[:, angles.base[k]], _shift(angles, k)
     less = 1.0 - np.cos(own)
-    return np.asarray(
-        change + alpha**3 * (1.0 / 2.0 + 1.0 / 6.0)
-        + (alpha + change) * (less + np.sin(alpha) * np.sin(own)) + np.sin(alpha) * less
-    )  # fmt: skip
+    aslant = (alpha + change) * (less + np.sin(alpha) * np.sin(own)) + np.sin(alpha) * less
+    return np.asarray(change + alpha**3 * (1.0 / 2.0 + 1.0 / 6.0) + aslant)
 
 
 def _angles(system: Positions, layout: Layout, blocks: Array) -> _Angles:

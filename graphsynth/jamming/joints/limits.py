@@ -129,9 +129,8 @@ class Misalignment:
     Parameters
     ----------
     base, link : int
-        The two links of the joint; the seat on ``base``, usually the frame, is the tilted one.
-        The rail of a guide leans where its slider is, so it lifts nothing; with exact closure
-        (`certify_in_space`) it leans about its own point, and the slider leaves the plane as it travels.
+        The two links of the joint; the seat on ``base``, usually the frame, is the tilted one.  It leans about its own
+        point: the rail of a guide about that on its link, so that the slider leaves the plane as it travels.
     alpha : float
         Tilt, radians (small).
     direction : float

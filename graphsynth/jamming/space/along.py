@@ -19,8 +19,9 @@ from graphsynth.intervals import Interval
 from graphsynth.jamming.joints.limits import Limits, Misalignment, bounds
 from graphsynth.jamming.joints.program import JointProblem
 from graphsynth.jamming.space.closure import Closure
-from graphsynth.jamming.space.model import SpaceModel, driven_at, in_space, start
+from graphsynth.jamming.space.model import SpaceModel
 from graphsynth.jamming.space.optimum import Optimum, least_scale
+from graphsynth.jamming.space.plane import driven_at, in_space, start
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion

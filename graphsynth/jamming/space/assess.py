@@ -18,8 +18,9 @@ from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.program import Bearings, JointProblem, problem
 from graphsynth.jamming.space.along import NOTHING, Along, Least
 from graphsynth.jamming.space.closure import Closure
-from graphsynth.jamming.space.model import MODEL, Bound, Unsupported, in_space, start
+from graphsynth.jamming.space.model import MODEL, Bound, Unsupported
 from graphsynth.jamming.space.optimum import least_scale
+from graphsynth.jamming.space.plane import in_space, start
 from graphsynth.jamming.space.sensitivity import prices
 from graphsynth.jamming.space.turn import certify_in_space
 from graphsynth.jamming.verdict import Verdict

@@ -23,8 +23,9 @@ from graphsynth.jamming.joints.limits import Misalignment, bounds, chosen
 from graphsynth.jamming.joints.program import JointProblem
 from graphsynth.jamming.joints.search import MemberWitness, limits_chosen, lowest, sharp_problem, unclosed_at
 from graphsynth.jamming.space.closure import Closure, closures
-from graphsynth.jamming.space.model import SpaceModel, driven_at, in_space, largest_spin, largest_turn, leaning, start
+from graphsynth.jamming.space.model import SpaceModel
 from graphsynth.jamming.space.optimum import Optimum, least_scale
+from graphsynth.jamming.space.plane import driven_at, in_space, largest_spin, largest_turn, leaning, start
 from graphsynth.jamming.space.pose import PoseProof, prove_pose
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.tolerances.box import relative_box

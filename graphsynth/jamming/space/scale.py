@@ -28,7 +28,8 @@ from graphsynth.jamming.joints.scale import ScaleCertificate
 from graphsynth.jamming.joints.search import limits_chosen, sharp_problem
 from graphsynth.jamming.space.along import NOTHING, Along, Change, changed
 from graphsynth.jamming.space.members import Members, at_end, extreme_member
-from graphsynth.jamming.space.model import MODEL, Unsupported, leaning
+from graphsynth.jamming.space.model import MODEL, Unsupported
+from graphsynth.jamming.space.plane import leaning
 from graphsynth.jamming.space.turn import Stint, certify_members
 from graphsynth.jamming.verdict import Verdict
 

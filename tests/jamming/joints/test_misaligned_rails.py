@@ -24,8 +24,8 @@ from graphsynth.jamming.joints.closure import joint_places, leans
 from graphsynth.jamming.joints.enclosure import Pieces
 from graphsynth.jamming.joints.program import problem, solve_poses
 from graphsynth.jamming.space.closure import Closure
-from graphsynth.jamming.space.model import in_space, start
 from graphsynth.jamming.space.optimum import least_scale
+from graphsynth.jamming.space.plane import in_space, start
 
 LONG = pytest.mark.long
 

@@ -32,8 +32,9 @@ from graphsynth.jamming.joints import RIGID, SPHERICAL, Misalignment, bearing_li
 from graphsynth.jamming.joints.program import problem
 from graphsynth.jamming.space.along import NOTHING, Along
 from graphsynth.jamming.space.closure import Closure
-from graphsynth.jamming.space.model import TURN, in_space, start
+from graphsynth.jamming.space.model import TURN
 from graphsynth.jamming.space.optimum import least_scale
+from graphsynth.jamming.space.plane import in_space, start
 from graphsynth.jamming.space.pose import prove_pose
 from graphsynth.jamming.space.turn import certify_in_space
 

@@ -28,8 +28,9 @@ from graphsynth.jamming.space.binding import (
 )
 from graphsynth.jamming.space.bodies import Bodies, stands_apart
 from graphsynth.jamming.space.closure import Closure
-from graphsynth.jamming.space.model import SpaceModel, in_space, start
+from graphsynth.jamming.space.model import SpaceModel
 from graphsynth.jamming.space.optimum import least_scale
+from graphsynth.jamming.space.plane import in_space, start
 from graphsynth.jamming.space.proof import Box
 
 

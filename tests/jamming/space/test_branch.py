@@ -17,7 +17,7 @@ from graphsynth.jamming.joints.program import problem
 from graphsynth.jamming.space import certify_in_space
 from graphsynth.jamming.space.branch import Free, faces, joined
 from graphsynth.jamming.space.closure import closures
-from graphsynth.jamming.space.model import in_space, start
+from graphsynth.jamming.space.plane import in_space, start
 from graphsynth.jamming.space.pose import free_poses
 from graphsynth.jamming.space.proof import tubes
 

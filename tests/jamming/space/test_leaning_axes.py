@@ -31,8 +31,8 @@ from graphsynth.jamming.space.binding import at, coordinates
 from graphsynth.jamming.space.bodies import Bodies
 from graphsynth.jamming.space.closure import Closure
 from graphsynth.jamming.space.members import Members
-from graphsynth.jamming.space.model import in_space, largest_turn, start
 from graphsynth.jamming.space.optimum import least_scale
+from graphsynth.jamming.space.plane import in_space, largest_turn, start
 from graphsynth.tolerances import AxisAngle, LengthTolerance, Parallelism
 
 FREE, JAMMED, SOME = Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED, Verdict.CERTIFIED_JAMMED_FOR_SOME

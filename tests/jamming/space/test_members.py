@@ -21,8 +21,8 @@ from graphsynth.jamming.space.binding import at
 from graphsynth.jamming.space.bodies import Bodies
 from graphsynth.jamming.space.closure import Closure
 from graphsynth.jamming.space.members import Members
-from graphsynth.jamming.space.model import in_space, start
 from graphsynth.jamming.space.optimum import some_closures
+from graphsynth.jamming.space.plane import in_space, start
 from graphsynth.jamming.space.pose import rates
 from graphsynth.tolerances import EndFloat, FitClearance, HolePosition, LengthTolerance, ThermalExpansion, parameter_box
 

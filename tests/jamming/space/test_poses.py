@@ -15,8 +15,9 @@ from graphsynth.intervals.balls import Balls, exact
 from graphsynth.jamming.joints import RIGID, SPHERICAL, JointLimits, Misalignment
 from graphsynth.jamming.joints.program import problem
 from graphsynth.jamming.space.closure import Closure, ball
-from graphsynth.jamming.space.model import Seat, SpaceJoint, SpaceModel, in_space, start
+from graphsynth.jamming.space.model import Seat, SpaceJoint, SpaceModel
 from graphsynth.jamming.space.optimum import least_scale
+from graphsynth.jamming.space.plane import in_space, start
 from graphsynth.jamming.space.pose import prove_pose
 from graphsynth.jamming.space.proof import _positive, shift
 
