@@ -176,7 +176,7 @@ def test_tubes_hold_the_motion_of_every_member(make, closed):
     x = system.coordinates(motion.poses, motion.velocities)[0]
     tubes = prove_tubes(system, joints, u, x, counted)
     assert tubes.proved.all()
-    r_rate, *_, fine = slopes(system, joints, u, tubes, counted)
+    (r_rate, *_), fine = slopes(system, joints, u, tubes, counted)
     assert fine.all() and r_rate.shape == (1 + box.size, 40, len(joints), 2)
     step = 1e-6
     for _ in range(6):
