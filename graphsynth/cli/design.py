@@ -54,7 +54,6 @@ def run(options: argparse.Namespace) -> int:
     else:
         print_summary(report, console.screen(), report["tables"])
         if files:
-            reach = "" if scene.mechanism.drive == "rotation" else f" --range 0 {scene.mechanism.task().span:.6g}"
             console.put(f"See them move: {folder / 'report.html'}")
-            console.put(f"Make one: graphsynth parts {files[0]}{reach}")
+            console.put(f"Make one: graphsynth parts {files[0]}")
     return 0

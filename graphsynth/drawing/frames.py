@@ -110,7 +110,7 @@ _STARTS = 24  # inputs tried where the first pose is not known
 
 
 def motion_over_reach(mechanism: Mechanism, samples: int = 361) -> Motion:
-    """Simulate one turn of the first driver; if the branch ends, everything between its two ends.
+    """Simulate the mechanism's range of inputs, if it has one; else one turn, or what lies between the branch's ends.
 
     `mechanism`: its pose, if it has one, gives the input at which the motion begins (for a linear law); otherwise the
     first of 24 inputs around the turn at which it can be assembled. `samples`: of the turn, 2 or more. Over the turn if
@@ -119,6 +119,8 @@ def motion_over_reach(mechanism: Mechanism, samples: int = 361) -> Motion:
     """
     if not mechanism.drivers:
         raise GeometryError("the mechanism has no driver, so it cannot be moved; add one")
+    if mechanism.input_range is not None:
+        return simulate(mechanism, np.linspace(*mechanism.input_range, samples))
     driver = mechanism.drivers[0]
     sliding = isinstance(mechanism.joint(*driver.pair), Prismatic)
     if sliding and mechanism.pose is None:

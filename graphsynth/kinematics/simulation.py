@@ -66,7 +66,8 @@ def simulate(
         Inputs u in the order of the motion, strictly increasing or decreasing; each driver's law turns u into its
         coordinate (the input itself by default: radians or lengths; a `UnitWarning` is shown where turning inputs look
         like degrees, as 0 to 360 do).  Degrees are ``gs.degrees(...)``, "0..360 deg" (361 samples) or a list of texts
-        with units.  Without inputs: a full rotation from the mechanism's pose on; where there is none, all that is
+        with units.  Without inputs: ``mechanism.input_range``, if it has one;
+        else a full rotation from the mechanism's pose on; where there is none, all that is
         reached from there in both directions, up to a thousandth of the range before each limit.
     modes : mapping of int to int, optional
         Assembly mode by group index: +1 or -1 for a dyad, the rank among all its modes at the first input for a
@@ -102,6 +103,8 @@ def simulate(
         raise GeometryError(f"there is no mechanism to move: {given.statement}")
     if not isinstance(found, Mechanism):
         raise GeometryError(f"{type(given).__name__} is not a Mechanism; give one, or what embody returns")
+    if inputs is None and found.input_range is not None:
+        inputs = np.linspace(*found.input_range, _SAMPLES)
     if inputs is None:
         return _simulate_whole(found, modes, start, events)
     return _simulate(found, monotonic(angles("inputs", inputs)), modes, start, events)

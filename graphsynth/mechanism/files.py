@@ -24,7 +24,7 @@ __all__ = ["JSON_MAX", "TOML_MAX", "from_dict", "from_json", "from_toml", "to_di
 
 FORMAT = "graphsynth mechanism"
 VERSION = 1
-_KEYS = {"format", "version", "graph", "joints", "drivers", "points", "pose"}
+_KEYS = {"format", "version", "graph", "joints", "drivers", "points", "pose", "input_range", "link_names"}
 #: Longest JSON text that is read, in characters.
 JSON_MAX = 3_000_000
 TOML_MAX = 400_000  #: Longest TOML text that is read, in characters.
@@ -52,6 +52,10 @@ def to_dict(mechanism: Mechanism) -> dict[str, Any]:
     data: dict[str, Any] = {"format": FORMAT, "version": VERSION, "graph": mechanism.graph.to_text()}
     if mechanism.pose is not None:
         data["pose"] = [list(row) for row in mechanism.pose]
+    if mechanism.input_range is not None:
+        data["input_range"] = list(mechanism.input_range)
+    if mechanism.link_names:
+        data["link_names"] = dict(mechanism.link_names)
     data["joints"] = [{"kind": joint.kind, **_plain(joint)} for joint in mechanism.joints]
     data["drivers"] = []
     for driver in mechanism.drivers:
@@ -100,11 +104,15 @@ def to_toml(mechanism: Mechanism) -> str:
         What :func:`from_toml` reads back without loss.
     """
     data = to_dict(mechanism)
-    lines = [f"{key} = {_toml(data[key])}" for key in ("format", "version", "graph", "pose") if key in data]
+    lines = [
+        f"{key} = {_toml(data[key])}" for key in ("format", "version", "graph", "pose", "input_range") if key in data
+    ]
     lines += [f"{key} = []" for key in ("joints", "drivers") if not data[key]]
     for key in ("joints", "drivers"):
         for entry in data[key]:
             lines += ["", f"[[{key}]]", *(f"{name} = {_toml(value)}" for name, value in entry.items())]
+    if "link_names" in data:
+        lines += ["", "[link_names]", *(f"{_toml(name)} = {link}" for name, link in data["link_names"].items())]
     if data["points"]:
         lines += ["", "[points]", *(f"{_toml(name)} = {_toml(p)}" for name, p in data["points"].items())]
     return "\n".join(lines) + "\n"
@@ -207,7 +215,8 @@ def _mechanism(data: Any) -> Mechanism:
     pose = table.get("pose")
     if pose is not None:
         pose = tuple(tuple(_list(row, f"pose[{k}]")) for k, row in _entries(pose, "pose", graph.links))
-    return _build(lambda: Mechanism(graph, tuple(joints), tuple(drivers), points, pose), "mechanism")
+    more = {key: table[key] for key in ("input_range", "link_names") if key in table}
+    return _build(lambda: Mechanism(graph, tuple(joints), tuple(drivers), points, pose, **more), "mechanism")
 
 
 def _build(make: Callable[[], _T], place: str) -> _T:

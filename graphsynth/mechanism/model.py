@@ -54,6 +54,11 @@ class Mechanism(Constructors, Shown):
     pose : sequence of (x, y, theta), optional
         A pose of every link close to an assembled one; it selects the assembly modes.  The frame is at rest at
         (0, 0, 0).
+    input_range : (float, float), optional
+        Inputs over which it is meant to move, the first that of the pose; `simulate` takes them where no inputs are
+        given.
+    link_names : mapping of str to int, optional
+        Links that have a name.
 
     Raises
     ------
@@ -77,6 +82,8 @@ class Mechanism(Constructors, Shown):
     drivers: tuple[Driver, ...] = ()
     points: Mapping[str, TracePoint] = field(default_factory=dict)
     pose: tuple[Pose, ...] | None = None
+    input_range: tuple[float, float] | None = None
+    link_names: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joints", _ordered(self.graph, _sequence("joints", self.joints)))
@@ -86,6 +93,12 @@ class Mechanism(Constructors, Shown):
         object.__setattr__(self, "points", {name: self._checked_point(name, p) for name, p in self.points.items()})
         if self.pose is not None:
             object.__setattr__(self, "pose", self._checked_pose(self.pose))
+        if self.input_range is not None:
+            object.__setattr__(self, "input_range", self._checked_range(self.input_range))
+        if not isinstance(self.link_names, Mapping):
+            raise GeometryError(f"link_names = {self.link_names!r} is not a mapping of names to links")
+        named = {name: self._checked_point(name, (link, (0.0, 0.0))).link for name, link in self.link_names.items()}
+        object.__setattr__(self, "link_names", named)
         for link, degree in enumerate(self.graph.degrees):  # a binary link of zero length would have no direction
             own = [joint for joint in self.joints if link in (joint.a, joint.b)]
             ends = [joint.at_a if joint.a == link else joint.at_b for joint in own]
@@ -127,6 +140,14 @@ class Mechanism(Constructors, Shown):
         if link >= self.graph.links:
             raise GeometryError(f"point {name} is on link {link}, but the links are 0..{self.graph.links - 1}")
         return TracePoint(link, point(f"point {name}", at))
+
+    def _checked_range(self, given: Any) -> tuple[float, float]:
+        if not isinstance(given, tuple | list) or len(given) != 2:
+            raise GeometryError(f"input_range = {given!r} must be (first, last)")
+        first, last = (finite(f"input_range[{k}]", value) for k, value in enumerate(given))
+        if first == last:
+            raise GeometryError(f"input_range = {given!r} must have two different ends")
+        return first, last
 
     def _checked_pose(self, pose: Iterable[Iterable[float]]) -> tuple[Pose, ...]:
         try:

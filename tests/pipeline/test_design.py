@@ -114,6 +114,10 @@ products = ["tables"]
     assert told["accepted"] == 1 and told["answers"][0]["error path"] < 0.01
     mechanism = gs.Mechanism.from_toml(Path(told["answers"][0]["file"]).read_text("utf-8"))
     assert mechanism.graph.key == told["answers"][0]["key"]
+    assert mechanism.input_range == (0.0, 2.0 * math.pi)
+    size = max(abs(value) for joint in mechanism.joints for value in (*joint.at_a, *joint.at_b))
+    noise = [v for joint in mechanism.joints for v in (*joint.at_a, *joint.at_b) if 0.0 < abs(v) < 1e-13 * size]
+    assert not noise and gs.Mechanism.from_toml(mechanism.to_toml()) == mechanism
     assert (tmp_path / "report" / "report.html").exists()
     assert main(["design", str(tmp_path / "own.toml"), *options, "--go-on"]) == 0
     assert json.loads(capsys.readouterr().out)["accepted"] == 1

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -36,6 +36,7 @@ from graphsynth.kinematics.dimensional.verify import (
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Mechanism
+from graphsynth.mechanism.scaling import rounded
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.certify.poses import MotionCertificate
@@ -88,7 +89,9 @@ def built(problem: TaskProblem, x: Array) -> tuple[Mechanism, tuple[float, ...]]
         x0, y0, c, s = frames[model.carrier(name)]
         points[name] = model.carrier(name), complex(x0, y0) + complex(c, s) * complex(*u.points[0, k])
     starts = tuple(float(x[aim.start]) for aim in problem.aims if isinstance(aim, TimedAim) and aim.start >= 0)
-    return lying(design, world, points, model.sense * float(u.stroke[0])), starts
+    mechanism = lying(design, world, points, model.sense * float(u.stroke[0]))
+    links = {name: model.carrier(name) for name, of_point in model.task.names.items() if not of_point}
+    return rounded(replace(mechanism, input_range=(0.0, model.task.span), link_names=links)), starts
 
 
 @dataclass(frozen=True, eq=False, repr=False)

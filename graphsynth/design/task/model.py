@@ -176,6 +176,8 @@ class Model:
 
     def through_ties(self, X: Array, slopes: Array) -> Array:
         """Return derivatives (sets, m, size) by the vector from those by the places that it gives."""
+        if not self.ties:
+            return slopes
         every = np.concatenate([self.free_places(X), X[:, self.points_at : self.own_at].reshape(len(X), -1, 2)], axis=1)
         steps = []
         for tie in self.ties:

@@ -69,8 +69,7 @@ class TaskProblem:
         values, slopes = (np.concatenate(part, axis=1) for part in zip(*self._pulled(every, u)))
         more, steep = direct_wishes(model, u, strict)
         values, slopes = np.concatenate([values, more], axis=1), np.concatenate([slopes, steep], axis=1)
-        if model.ties:
-            slopes = model.through_ties(X, slopes)
+        slopes = model.through_ties(X, slopes)
         error = np.sqrt((values**2).sum(axis=1))
         bad = ~moved.complete | ~np.isfinite(slopes).all(axis=(1, 2)) | ~np.isfinite(error)
         values[bad], slopes[bad] = 0.0, 0.0
@@ -93,12 +92,13 @@ class TaskProblem:
         found = [aim.times(moved, u, own) for aim, own in zip(self.aims, times)]
         every = [(aim.rows(own, *moved.at(own), u), *moved.at(own)) for aim, own in zip(self.aims, found)]
         every += [(rows, *moved.at(rows.times)) for rows in sampled_wishes(model, moved, u, math.inf)]
-        pulled = [(values[0], slopes[0]) for values, slopes in self._pulled(every, u)]
+        pulled = [(values[0], model.through_ties(x[None], slopes)[0]) for values, slopes in self._pulled(every, u)]
         errors = [
             (values.reshape(rows.values.shape[1:]), slopes.reshape(*rows.values.shape[1:], -1))
             for (values, slopes), (rows, _, _) in zip(pulled, every[: len(found)])
         ]
         direct, steep = direct_wishes(model, u, math.inf)
+        steep = model.through_ties(x[None], steep)
         bounds = np.concatenate([*(values for values, _ in pulled[len(found) :]), direct[0]])
         steep = np.concatenate([*(slopes for _, slopes in pulled[len(found) :]), steep[0]])
         good = moved.complete.all() and np.isfinite(steep).all() and all(np.isfinite(J).all() for _, J in errors)

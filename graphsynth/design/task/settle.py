@@ -63,7 +63,7 @@ def settled(problem: TaskProblem, x: Array) -> Settled:
             if refused >= _REFUSED:
                 break
             continue
-        gain = (before - after) / max(promised, 1e-300)
+        gain = min((before - after) / max(promised, 1e-300), 2.0)  # of more no cube is needed
         x, now, worse = x + step, later, 2.0
         damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 1e-15)
         refused = 0 if before - after > _GAIN * before else refused + 2
