@@ -3,10 +3,13 @@
     export PYTHONPATH=.:tests/jamming/joints
     python tests/jamming/space/campaign.py mechanisms --count 1000 --results FILE [--seconds 300]
     python tests/jamming/space/campaign.py bearings --count 1000 --results FILE [--seconds 300]
+    python tests/jamming/space/campaign.py rails --count 300 --results FILE [--seconds 300]
 
 A run goes on where the file ends.  *mechanisms*: poses of 4 to 8 links beside a search from many starts, whose winner
 is refined and checked with 50 digits, and for a part beside links placed by rotation matrices and a general optimizer.
-*bearings*: four-bars whose bearing at B takes all the tilt, beside the certificate of the single bearing.
+*bearings*: four-bars whose bearing at B takes all the tilt, beside the certificate of the single bearing.  *rails*:
+ranges of mechanisms with guides whose seats lean, the certificate of small tilts with bounds beside the exact one, and
+both beside the least factor of a search at five inputs.
 """
 
 from __future__ import annotations
@@ -16,11 +19,13 @@ import json
 import math
 import time
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import mpmath
 import numpy as np
 from coupled_oracles import four_bar
+from rails import MAKES, case as guided, question
 from space_oracles import case, joint_limits
 from spatial_oracle import spatial
 from test_poses import refined
@@ -28,7 +33,7 @@ from test_poses import refined
 from graphsynth import simulate
 from graphsynth.jamming import Bearing, ToleranceBox, certify_jamming
 from graphsynth.jamming.bearing.arcs import contains
-from graphsynth.jamming.joints import RIGID, SPHERICAL, Misalignment, bearing_limits
+from graphsynth.jamming.joints import RIGID, SPHERICAL, Misalignment, bearing_limits, certify_coupled
 from graphsynth.jamming.joints.program import problem
 from graphsynth.jamming.space.along import NOTHING, Along
 from graphsynth.jamming.space.closure import Closure
@@ -129,7 +134,51 @@ def one_bearing(seed):
     return row
 
 
-KINDS = {"mechanisms": mechanism, "bearings": one_bearing}
+def rail(seed):
+    """One range of a mechanism whose rail, or slider, leans: limits 1e-3 to 0.3 (relative) away from the verge."""
+    rng = np.random.default_rng([seed, 79])
+    name = list(MAKES)[seed % len(MAKES)]
+    while True:
+        plane, motion, pair = guided(rng, name)
+        limits, tilts = question(rng, plane, pair, 0.1 * 10.0 ** rng.uniform(-2.0, 0.0))
+        inputs = np.linspace(motion.inputs[0], motion.inputs[-1], 5)
+        poses = simulate(plane, inputs, start=motion.poses[0]).poses
+        factors = [factor(plane, pose, limits, tilts)[0] for pose in poses]
+        if 0.05 < max(factors) < 5.0 and max(factors) * max(own.alpha for own in tilts) < 0.5:
+            break
+    away = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3.0, -0.5))
+    grown = max(factors) * (1.0 + away)
+    limits = {pair: grow(own, grown) for pair, own in limits.items()}
+    begin = time.process_time()
+    first = certify_coupled(motion, limits, tilts, resolution=0.02, max_pieces=400)
+    second = certify_in_space(motion, limits, tilts, resolution=0.1, max_pieces=60, seconds=20.0)
+    row = {"seed": seed, "name": name, "rail": plane.joint(*pair).a == pair[0], "away": away,
+           "verdicts": [first.verdict.name, second.verdict.name],
+           "seconds": round(time.process_time() - begin, 3)}  # fmt: skip
+    row["wrong"] = any(
+        max(a, c) <= min(b, d) for side in (1, -1) for a, b in first.arcs(side) for c, d in second.arcs(-side)
+    )
+    for u, pose in zip(inputs, poses):
+        scale, missed = factor(plane, pose, limits, tilts)
+        for proof in (first, second):
+            found = -1 if scale > 1.0 + 1e-6 else 1 if scale < 1.0 - 1e-9 and missed < 1e-9 else 0
+            row["wrong"] |= found != 0 and any(low <= u <= high for low, high in proof.arcs(-found))
+    return row
+
+
+def factor(plane, pose, limits, tilts):
+    """Least factor on all limits at a pose, as a search finds it, and what its loops miss."""
+    model = in_space(problem(plane, limits, tilts))
+    found = least_scale(Closure(model, False), start(model, plane, pose))
+    return found.scale, found.missed
+
+
+def grow(own, by):
+    return replace(own, **{name: getattr(own, name) * by for name in (*own.tilts, "axial_clearance")},
+                   **{f"{name}_range": None for name in (*own.tilts, "axial_clearance")})  # fmt: skip
+
+
+KINDS = {"mechanisms": mechanism, "bearings": one_bearing, "rails": rail}
 
 
 def campaign(kind, count, results, seconds=math.inf):
@@ -160,6 +209,12 @@ def told(kind, rows):
             text.append(f"  {links} links: {len(own)}, free {states[1]}, jammed {states[-1]}, undecided {states[0]} "
                         f"({100 * states[0] / max(len(own), 1):.1f} %), CPU {np.median(cost):.2f} s, at most "
                         f"{cost.max():.1f} s; {told} searched by the optimizer")  # fmt: skip
+    elif kind == "rails":
+        pairs = Counter(tuple(row["verdicts"]) for row in rows)
+        text += [f"  small tilts with bounds {a}, exact {b}: {n}" for (a, b), n in sorted(pairs.items())]
+        text.append(f"  rails: {sum(row['rail'] for row in rows)}, seats on the slider: "
+                    f"{sum(not row['rail'] for row in rows)}, "
+                    f"CPU {np.median([row['seconds'] for row in rows]):.2f} s")  # fmt: skip
     else:
         pairs = Counter((s, k) for row in rows for s, k in zip(row["states"], row["known"]))
         text.append(
