@@ -295,8 +295,9 @@ def _system(M: Array, F: Array, W: Array, at: tuple[Array, ...], loaded: Mask, p
     matrix, right = np.zeros((count, n, n)), np.zeros((count, n))
     flat = M.reshape(count, 2 * blocks, k)
     bend = (np.eye(2) - unit[..., :, None] * unit[..., None, :]) * (loaded * T[:, None] / size)[..., None, None]
-    matrix[:, :k, :k] = -np.einsum("nbik,nbij,nbjl->nkl", M, bend, M, optimize=True)
-    slope = np.einsum("nbik,nbi->nk", M, unit)
+    across = flat.transpose(0, 2, 1)
+    matrix[:, :k, :k] = -across @ (bend @ M).reshape(flat.shape)
+    slope = (across @ unit.reshape(count, -1, 1))[..., 0]
     matrix[:, :k, k], matrix[:, k, :k] = -slope, slope
     idle = np.repeat(~loaded, 2, axis=1) & (flat != 0.0).any(axis=2)
     rest = np.zeros((count, 2 * blocks + forces), dtype=bool)

@@ -20,8 +20,10 @@ from graphsynth.jamming.space.closure import Closure, Loop
 Array = NDArray[np.float64]
 _ROUNDS = 60
 #: Rounds after which Newton's method is tried before the programs come to rest.
-_TRIES = (6, 10, 16, 26, 40)
+_TRIES = (2, 4, 6, 10, 16, 26, 40)
 _RANK = 1e-11
+#: Gap between tilts and wrenches of a program, relative, that leaves nothing to gain.
+_TIGHT = 1e-13
 _PROJECTIONS, _STEPS, _GAUSS = 100, 5, 6
 #: Largest step of an unknown in one round (radians, units).
 _STEP = 0.3
@@ -344,7 +346,9 @@ def _cone(blocks: Array, work: Array) -> tuple[float, Array, Array]:
         own = _restored(M, W, again)
         if np.isfinite(own[0]) and own[0] <= best[0] and np.isfinite(again.q).all():
             best = own
-    T, tau, q = best
+        T, tau, q = best
+        if T * np.linalg.norm(M[0] @ q, axis=-1).sum() - abs(W[0] @ q) <= _TIGHT * T:
+            break
     # the dual form has W q = T, sum |M_b q| = 1; in the closure T (s + by . g) has the slope of the factor
     return T * size / unit, tau * (size / unit), span @ q
 
