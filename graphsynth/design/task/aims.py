@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ _OFFSETS, _DIFFERENCE = (
     np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0,
 )
 #: Samples all over a curve that shall draw a closed path, and half the width of the band that holds it, over a side.
-_WHOLE, _BAND = 48, 0.2
+_WHOLE, BAND = 48, 0.2
 #: Steps of the times of a path after each step of its mechanism.
 _ROUNDS = 2
 
@@ -43,6 +44,10 @@ class Aim(ABC):
     @abstractmethod
     def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
         """Return the inputs (sets, n) at which it is looked at, near those before, if any."""
+
+    def looked(self, moved: Moved, times: Array) -> tuple[Array, Array]:
+        """Return frames (sets, n, links, 4) and rates (sets, n, links, 3) of all links there."""
+        return moved.at(times)
 
     @abstractmethod
     def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
@@ -144,6 +149,13 @@ class PointAim(TimedAim):
         found = super().times(moved, u, None if before is None else before[:, :n])
         return np.concatenate([found, np.tile(self.whole, (len(found), 1))], axis=1) if len(self.whole) else found
 
+    def put(self, loads: Array, direct: Array, arm: Complex, w: Complex) -> None:
+        """Write how the place of the point over the size changes into the first two rows."""
+        loads[:, 0, self.link, 0] = loads[:, 1, self.link, 1] = 1.0 / self.size
+        loads[:, 0, self.link, 2], loads[:, 1, self.link, 2] = -arm.imag / self.size, arm.real / self.size
+        direct[:, 0, :, self.point], direct[:, 1, :, self.point] = w.real / self.size, w.imag / self.size
+        direct[:, 0, :, self.point + 1], direct[:, 1, :, self.point + 1] = -w.imag / self.size, w.real / self.size
+
     def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
         """Real and imaginary parts of distances over the size, and angles."""
         own = frames[:, :, self.link]
@@ -155,10 +167,7 @@ class PointAim(TimedAim):
         e = (z + arm - goal) / self.size
         sets, n = z.shape
         loads, direct = self.blank(sets, 2 + (self.turn is not None), n)
-        loads[:, 0, self.link, 0] = loads[:, 1, self.link, 1] = 1.0 / self.size
-        loads[:, 0, self.link, 2], loads[:, 1, self.link, 2] = -arm.imag / self.size, arm.real / self.size
-        direct[:, 0, :, self.point], direct[:, 1, :, self.point] = w.real / self.size, w.imag / self.size
-        direct[:, 0, :, self.point + 1], direct[:, 1, :, self.point + 1] = -w.imag / self.size, w.real / self.size
+        self.put(loads, direct, arm, w)
         if len(self.whole):
             inside = e == 0.0
             loads, direct = loads * ~inside[:, None, None, None], direct * ~inside[:, None, :, None]
@@ -180,7 +189,7 @@ def beside(z: Complex, corners: Complex) -> Complex:
     part = (np.conj(side) * (z[..., None] - corners)).real / np.maximum(np.abs(side) ** 2, 1e-300)
     on = corners + np.clip(part, 0.0, 1.0) * side
     away = np.maximum(np.abs(z[..., None] - on), 1e-300)
-    over = np.maximum(away - _BAND * np.abs(side), 0.0)
+    over = np.maximum(away - BAND * np.abs(side), 0.0)
     k = over.argmin(axis=-1)[..., None]
     way = (z[..., None] - on) * over / away
     return np.asarray(z - np.take_along_axis(way, k, axis=-1)[..., 0])
@@ -360,16 +369,19 @@ class RatioAim(Aim):
         return Rows(times, (values @ mix.T)[:, None], loads, direct, self.weight, mix=mix, start=self.at)
 
 
-def aims_of(model: Model, few: int) -> list[Aim]:
+def aims_of(model: Model, few: int, others: Mapping[int, Aim]) -> list[Aim]:
     """Return the aims of all targets, with their own unknowns one after the other.
 
-    ``few``: points at most of a path or motion without times, for a first look; 0 for all.
+    ``few``: points at most of a path or motion without times, for a first look; 0 for all.  ``others``: made
+    already, by the id of their target.
     """
     found: list[Aim] = []
     at = model.own_at
     for target in model.task.targets:
         made: list[Aim] = []
-        if isinstance(target, PathTarget | PosesTarget):
+        if id(target) in others:
+            made.append(others[id(target)])
+        elif isinstance(target, PathTarget | PosesTarget):
             made.append(PointAim(model, at, target, few))
         elif isinstance(target, FunctionTarget | DwellTarget):
             made.append(FunctionAim(model, at, target))

@@ -43,12 +43,18 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
 Array = NDArray[np.float64]
+#: What is said of targets, not of bounds.
+_MISSED = " is missed"
 #: Relative difference of a length from that of a given bar.
 _FIT = 1e-3
 #: Samples of a motion that is certified, and boxes it may take.
 _PROVED, _BOXES = 181, 20_000
 #: Distance of the bounds of the margin of binding, and the time of its proof.
 _GAP, _SECONDS = 0.02, 5.0
+
+
+#: Key of a graph, and links that carry what is named.
+Chain = tuple[str, tuple[int, ...]]
 
 
 class Origin(NamedTuple):
@@ -70,8 +76,13 @@ class Candidate(NamedTuple):
 
     @property
     def plan(self) -> Plan:
-        """Its chain."""
+        """All but its numbers."""
         return self.origin.plan
+
+    @property
+    def chain(self) -> Chain:
+        """Its graph and the links that carry what is named."""
+        return self.plan.design.graph.key, self.plan.carriers
 
 
 def built(problem: TaskProblem, x: Array) -> tuple[Mechanism, tuple[float, ...]]:
@@ -148,6 +159,11 @@ class DesignedMechanism(Shown):
         return str(self.mechanism.graph.key)
 
     @property
+    def kept(self) -> bool:
+        """Whether it keeps every bound, though it may miss targets."""
+        return all(reason.endswith(_MISSED) for reason in self.reasons)
+
+    @property
     def certified(self) -> bool:
         """Whether its motion is proved over the whole range."""
         return self.certificate is not None and self.certificate.certified
@@ -183,7 +199,7 @@ def judged(task: DesignTask, found: Candidate) -> DesignedMechanism:
     }
     for target, error in zip(task.targets, errors):
         name = type(target).__name__.removesuffix("Target").lower()
-        wrong[f"the {name} is missed"] = wrong.get(f"the {name} is missed", False) or not error <= target.tolerance
+        wrong[f"the {name}{_MISSED}"] = wrong.get(f"the {name}{_MISSED}", False) or not error <= target.tolerance
     margin = math.nan
     if task.misalignment is not None and not any(wrong.values()):
         scale = largest_scale(motion, task.joint_tilt, task.misalignment, relative_gap=_GAP, seconds=_SECONDS)
@@ -192,6 +208,8 @@ def judged(task: DesignTask, found: Candidate) -> DesignedMechanism:
     reasons = tuple(reason for reason, is_so in wrong.items() if is_so)
     size = float(abs(complex(*np.ptp(places.reshape(-1, 2), axis=0)))) if done else math.inf
     worst = max(error / target.tolerance * target.weight for target, error in zip(task.targets, errors))
+    if done and any(isinstance(target, PathTarget) and target.outline for target in task.targets):
+        worst = found.error  # a curve is as good as its mean distance
     links, weight = found.mechanism.graph.links, task.rank
     score = weight["error"] * worst + weight["links"] * links + weight["size"] * size / task.size
     score -= weight["transmission"] * (angle if done else 0.0)
@@ -338,7 +356,7 @@ def _point_error(task: DesignTask, target: PathTarget | PosesTarget, motion: Mot
         times = matched(own, Wanted(target.goal, turn, target.size, closed, free=False))
     at = at_times(own, times)[0][0]
     far = float(np.abs(at[:, 0] + 1j * at[:, 1] - target.goal).max()) / target.size
-    if isinstance(target, PathTarget) and target.closed and target.inputs is None:  # nor may the curve be elsewhere
+    if isinstance(target, PathTarget) and target.outline:  # nor may the curve be elsewhere
         z = own.frames[0, :, 0] + 1j * own.frames[0, :, 1]
         far = max(far, float(np.abs(z - beside(z, target.goal)).max()) / target.size)
     if turn is None:

@@ -68,12 +68,33 @@ class Moved(NamedTuple):
         return at_times(MovingLink(self.inputs, self.frames, self.rates, self.period), times)
 
 
+class Picks(NamedTuple):
+    """Numbers along a motion: at the sample ``low`` (sets, m) and a ``part`` of the way to the next one.
+
+    ``way`` (sets, d, m): the direction in which each is measured.
+    """
+
+    low: NDArray[np.intp]
+    part: Array
+    way: Array
+
+    def of(self, J: Array) -> Array:
+        """Take derivatives (sets, d, n, size) at the samples to (sets, 1, m, size)."""
+        row = np.arange(len(J))[:, None]
+        found = np.zeros((*self.low.shape, J.shape[-1]))
+        for d in range(J.shape[1]):
+            for k, share in ((self.low, 1.0 - self.part), (self.low + 1, self.part)):
+                found += (self.way[:, d] * share)[..., None] * J[row, d, k]
+        return found[:, None]
+
+
 class Rows(NamedTuple):
     """Numbers that shall vanish, sampled: values (sets, d, n), how they change with the poses and the unknowns.
 
     ``loads`` (sets, d, links, 3, n) by x, y, theta of every link, ``direct`` (sets, d, n, size) by the unknowns at
     unchanged poses.  ``free``: the times are found, so that along the motion nothing changes.  ``mix`` (m, n) makes
     m numbers of n samples; the values then are (sets, 1, m).  ``start``: the unknown that shifts the times.
+    ``picks``: numbers along the motion, found from the samples; the values then are (sets, 1, m), too.
     """
 
     times: Array
@@ -84,6 +105,7 @@ class Rows(NamedTuple):
     free: bool = False
     mix: Array | None = None
     start: int = -1
+    picks: Picks | None = None
 
 
 class Model:

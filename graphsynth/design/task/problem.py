@@ -11,9 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.design.task.aims import aims_of
+from graphsynth.design.task.aims import Aim, aims_of
+from graphsynth.design.task.contours import ContourAim
 from graphsynth.design.task.model import Model, Rows, Unknowns
-from graphsynth.design.task.wishes import direct_wishes, sampled_wishes
+from graphsynth.design.task.targets import PathTarget
+from graphsynth.design.task.wishes import Lengths, direct_wishes, sampled_wishes
 from graphsynth.kinematics.engine.gradients import pose_gradients
 
 Array = NDArray[np.float64]
@@ -45,11 +47,17 @@ _PASSES, _AROUND = 3, np.linspace(-1.0, 1.0, 17)
 
 
 class TaskProblem:
-    """What the candidates of a model shall achieve; ``few``: at so many points of a path, for a first look."""
+    """What the candidates of a model shall achieve.
 
-    def __init__(self, model: Model, few: int = 0) -> None:
+    ``few``: at so many points of a path, for a first look; ``turned``: outlines as a whole, as of `ContourAim`.
+    """
+
+    def __init__(self, model: Model, few: int = 0, turned: float = 0.0) -> None:
         self.model = model
-        self.aims = aims_of(model, few)
+        outlines = [own for own in model.task.targets if isinstance(own, PathTarget) and own.outline and turned > 0.0]
+        made = {id(own): ContourAim(model, own, turned) for own in outlines}
+        self.aims: list[Aim] = aims_of(model, few, made)
+        self.lengths = Lengths(model)
 
     def linearise(self, X: Array, times: list[Array] | None, strict: float) -> tuple[Linearised, list[Array]]:
         """Return errors and derivatives of candidates (sets, size), and the times found, from those given if any.
@@ -63,11 +71,11 @@ class TaskProblem:
         times = [aim.times(moved, u, own) for aim, own in zip(self.aims, before)]
         every: list[tuple[Rows, Array, Array]] = []
         for aim, own in zip(self.aims, times):
-            frames, rates = moved.at(own)
+            frames, rates = aim.looked(moved, own)
             every.append((aim.rows(own, frames, rates, u), frames, rates))
         every += [(rows, *moved.at(rows.times)) for rows in sampled_wishes(model, moved, u, strict)]
         values, slopes = (np.concatenate(part, axis=1) for part in zip(*self._pulled(every, u)))
-        more, steep = direct_wishes(model, u, strict)
+        more, steep = direct_wishes(model, u, strict, self.lengths)
         values, slopes = np.concatenate([values, more], axis=1), np.concatenate([slopes, steep], axis=1)
         slopes = model.through_ties(X, slopes)
         error = np.sqrt((values**2).sum(axis=1))
@@ -97,7 +105,7 @@ class TaskProblem:
             (values.reshape(rows.values.shape[1:]), slopes.reshape(*rows.values.shape[1:], -1))
             for (values, slopes), (rows, _, _) in zip(pulled, every[: len(found)])
         ]
-        direct, steep = direct_wishes(model, u, math.inf)
+        direct, steep = direct_wishes(model, u, math.inf, self.lengths)
         steep = model.through_ties(x[None], steep)
         bounds = np.concatenate([*(values for values, _ in pulled[len(found) :]), direct[0]])
         steep = np.concatenate([*(slopes for _, slopes in pulled[len(found) :]), steep[0]])
@@ -141,6 +149,8 @@ class TaskProblem:
             if rows.free:
                 unit = along / np.maximum(np.sqrt((along**2).sum(axis=1, keepdims=True)), 1e-300)
                 J = J - unit[..., None] * (unit[..., None] * J).sum(axis=1, keepdims=True)
+            if rows.picks is not None:
+                J = rows.picks.of(J)
             if rows.mix is not None:
                 J = np.einsum("mn,sdni->sdmi", rows.mix, J)
             J = rows.weight * J.reshape(sets, -1, model.size)

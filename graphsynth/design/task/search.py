@@ -23,21 +23,29 @@ from graphsynth.core.errors import GeometryError, GraphsynthError
 from graphsynth.core.limits import Clock, here, told
 from graphsynth.core.ordered import in_order
 from graphsynth.core.shown import Shown
-from graphsynth.design.task.answers import Candidate, DesignedMechanism, Origin, built, judged, proved, signature
+from graphsynth.design.task.answers import Candidate, Chain, DesignedMechanism, Origin, built, judged, proved, signature
 from graphsynth.design.task.descend import Descended, best, descend
 from graphsynth.design.task.impossible import proof
 from graphsynth.design.task.model import Model, Unknowns
-from graphsynth.design.task.plans import plans
+from graphsynth.design.task.plans import Plan, plans
 from graphsynth.design.task.problem import TaskProblem
 from graphsynth.design.task.settle import levelled, settled
 from graphsynth.design.task.starts import Starts, from_mechanism, placed_starts, planned, random_starts, shaken
+from graphsynth.design.task.targets import PathTarget
 from graphsynth.design.task.task import DesignTask
 
 Array = NDArray[np.float64]
 
 #: First candidates of a piece; kept at each stage, and iterations there: with bounds weak, then strict.
 _FIRST = 1200
-_STAGES = ((80, 0.2, 8), (25, 0.2, 15), (6, 3.0, 40))
+Stages = tuple[tuple[int, float, int], ...]
+_STAGES: Stages = ((80, 0.2, 8), (25, 0.2, 15), (6, 3.0, 40))
+#: Of more mechanisms to begin with than these, so many in each wave get a glance; the other pieces go on from the best.
+_MANY, _GLANCES = 16, 6
+_GLANCE: Stages = ((4, 0.2, 12), (1, 1.0, 6))
+_ONWARD: Stages = ((24, 0.2, 10), (6, 1.0, 15), (2, 3.0, 20))
+#: How much directions count beside distances where outlines are drawn: at first, in the last stage.
+_TURNED = 0.5, 0.05
 #: Points at most of a path without times before the last stage; errors, in tolerances, of answers that miss the task
 #: below which the largest error is made small in the end.
 _FEW, _EVEN = 24, 10.0
@@ -45,22 +53,33 @@ _FEW, _EVEN = 24, 10.0
 _COPIES, _SHAKEN = 80, (-2.5, -0.4)
 #: Pieces of a wave, of which so many go on from the best; waves in each round by the number of links.
 _WAVE, _AGAIN, _WAVES = 8, 4, {4: 2, 6: 4, 8: 6, 10: 6}
+#: By how much a candidate's error counts more for each time that the search went on from it in vain.
+_TIRED = 1.1
 #: Waves without another answer after which a search rests that has some.
 _IDLE = 6
 #: Candidates of a piece that are kept; mechanisms whose lengths differ by less, all of them, are near copies.
 _KEPT, _ALIKE = 2, 0.1
 #: Candidates judged after each wave, for each answer asked; at once if their error is less, in tolerances.
 _JUDGED, _NEAR = 3, 2.0
+#: The same of outlines, which few mechanisms draw exactly.
+_OUTLINED = 0.3
+
+
+class Begun(NamedTuple):
+    """What a piece begins with: a plan and random candidates, a mechanism, or the best so far of another piece."""
+
+    origin: Origin
+    parent: Array | None = None
+    stages: Stages = _STAGES
 
 
 class Piece(NamedTuple):
-    """A part of the search: with random candidates, from a mechanism, or from the best so far of another piece."""
+    """A part of the search."""
 
     task: DesignTask
     seed: int
     number: int
-    origin: Origin
-    parent: Array | None = None
+    begun: Begun
 
 
 class Progress(NamedTuple):
@@ -206,10 +225,31 @@ class _Run:
         self.judged: dict[int, tuple[Candidate, DesignedMechanism]] = {}
         self.reasons: Counter[str] = Counter()
         self.pieces, self.stopped = 0, ""
+        self.tries: Counter[tuple[Chain, float]] = Counter()
+        outlines = any(isinstance(target, PathTarget) and target.outline for target in task.targets)
+        self.near, self.even = (_OUTLINED, _OUTLINED) if outlines else (_NEAR, _EVEN)
         self.before, self.idle = 0, 0  # accepted before the last wave, waves without another one
 
     def search(self, executor: Executor | None, progress: Callable[[Progress], None] | None) -> None:
         """Go round by the numbers of links, the smallest first, until there are enough answers or no time is left."""
+        begun = planned(self.task, self.starts, min(self.clock.seconds, self.clock.processor))
+        given = [Origin(plan, k, mechanism) for k, (plan, mechanism) in enumerate(begun)]
+        many = len(given) > _MANY
+        for k in range(0, len(given), _GLANCES if many else _WAVE):
+            some = [Begun(origin) for origin in given[k : k + (_GLANCES if many else _WAVE)]]
+            if many:
+                some = [own._replace(stages=_GLANCE) for own in some] + self._again(_WAVE - _GLANCES, _ONWARD)
+            if self._wave(some, executor, progress):
+                return
+        fresh = {links: cycle(own) for links, own in self._plans().items()}
+        for links in chain.from_iterable(repeat([n for n in fresh for _ in range(_WAVES[n])])):
+            again = self._again(_WAVE - 1, _ONWARD) if many else self._again(_AGAIN, _STAGES)
+            new = [Begun(Origin(next(fresh[links]), -1, None)) for _ in range(_WAVE - len(again))]
+            if self._wave([*new, *again], executor, progress):
+                return
+
+    def _plans(self) -> dict[int, list[Plan]]:
+        """Return all plans by the number of links, in an order of chance."""
         every = {links: list(plans(self.task, links)) for links in self.task.links}
         if not any(every.values()):
             raise GeometryError(
@@ -218,37 +258,29 @@ class _Run:
             )
         for links, own in every.items():
             np.random.default_rng([self.seed, links]).shuffle(own)
-        begun = planned(self.task, self.starts, min(self.clock.seconds, self.clock.processor))
-        given = [Origin(plan, k, mechanism) for k, (plan, mechanism) in enumerate(begun)]
-        for k in range(0, len(given), _WAVE):
-            if self._wave([(origin, None) for origin in given[k : k + _WAVE]], executor, progress):
-                return
-        fresh = {links: cycle(own) for links, own in every.items() if own}
-        for links in chain.from_iterable(repeat([n for n in fresh for _ in range(_WAVES[n])])):
-            again = self._best(_AGAIN)
-            new = [Origin(next(fresh[links]), -1, None) for _ in range(_WAVE - len(again))]
-            if self._wave([*((origin, None) for origin in new), *((c.origin, c.x) for c in again)], executor, progress):
-                return
+        return {links: own for links, own in every.items() if own}
 
-    def _best(self, count: int) -> list[Candidate]:
-        """Return the best candidates so far, of different chains."""
-        found: dict[tuple[str, tuple[int, ...]], Candidate] = {}
+    def _again(self, count: int, stages: Stages) -> list[Begun]:
+        """Go on from the best candidates so far, of different chains; those that do not come on have to wait."""
+        found: dict[Chain, Candidate] = {}
         for candidate in self.found:  # sorted
-            plan = candidate.plan
-            found.setdefault((plan.design.graph.key, plan.carriers), candidate)
-        return list(found.values())[:count]
+            found.setdefault(candidate.chain, candidate)
+        turn = sorted(found.values(), key=lambda own: own.error * _TIRED ** self.tries[own.chain, own.error])[:count]
+        for own in turn:
+            self.tries[own.chain, own.error] += 1
+        return [Begun(own.origin, own.x, stages) for own in turn]
 
     def _wave(
         self,
-        chosen: Sequence[tuple[Origin, Array | None]],
+        chosen: Sequence[Begun],
         executor: Executor | None,
         progress: Callable[[Progress], None] | None,
     ) -> bool:
         """Do a piece for each, judge what came of them, and tell whether that is enough."""
         begun = []
-        for number, (origin, x) in enumerate(chosen, self.pieces):
+        for number, (origin, x, stages) in enumerate(chosen, self.pieces):
             own = origin if x is not None else origin._replace(number=number)
-            begun.append(Piece(self.task, self.seed, number, own, x))
+            begun.append(Piece(self.task, self.seed, number, Begun(own, x, stages)))
         results = in_order(executor, partial(told, worked, here()), begun)
         try:
             for (found, reasons), spent in results:
@@ -256,7 +288,7 @@ class _Run:
                 self.found += found
                 self.reasons.update(reasons)
                 self.pieces += 1
-                if found and found[0].error < _NEAR:
+                if found and found[0].error < self.near:
                     self._judge()
                 if progress is not None:
                     least = min((c.error for c in self.found), default=math.inf)
@@ -287,7 +319,7 @@ class _Run:
         self.found.sort(key=lambda candidate: candidate.error)
         for k, candidate in enumerate(self.found[: _JUDGED * self.count]):
             if id(candidate) not in self.judged:
-                own = self.found[k] = self._settled(candidate) if candidate.error < _NEAR else candidate
+                own = self.found[k] = self._settled(candidate) if candidate.error < self.near else candidate
                 self.judged[id(own)] = own, judged(self.task, own)
                 if own.error < 1.0:  # then the largest error may be small enough, too
                     self._level(own)
@@ -322,7 +354,8 @@ class _Run:
         """Return what was judged, accepted ones first, without near copies."""
         kept: list[DesignedMechanism] = []
         marks: list[np.ndarray] = []
-        for answer in sorted((own for _, own in self.judged.values()), key=lambda a: (not a.accepted, a.score)):
+        order = sorted((own for _, own in self.judged.values()), key=lambda a: (not a.accepted, not a.kept, a.score))
+        for answer in order:
             mark = signature(self.task, answer)
             same = any(
                 other.key == answer.key and len(own) == len(mark) and np.abs(own - mark).max() < _ALIKE
@@ -339,8 +372,10 @@ class _Run:
             self._judge()
         nearest = self._ranked()[: self.count]
         if not any(answer.accepted for answer in nearest):
-            for candidate in [own for own, answer in self.judged.values() if answer in nearest and own.error < _EVEN]:
-                own = candidate if candidate.error < _NEAR else self._settled(candidate)
+            for candidate in [
+                own for own, answer in self.judged.values() if answer in nearest and own.error < self.even
+            ]:
+                own = candidate if candidate.error < self.near else self._settled(candidate)
                 if own is not candidate:
                     self.judged[id(own)] = own, judged(self.task, own)
                     self.found.append(own)  # keeps its place among those judged
@@ -375,25 +410,26 @@ class _Run:
 
 def worked(piece: Piece) -> tuple[list[Candidate], dict[str, int]]:
     """Do one piece: begin with many candidates, keep the best, improve them; return the best and what failed."""
-    origin, random = piece.origin, np.random.default_rng([piece.seed, piece.number, 1])
+    (origin, parent, stages), random = piece.begun, np.random.default_rng([piece.seed, piece.number, 1])
     try:
         model, given = _modelled(piece.task, piece.seed, origin)
         if not model.regular:
             return [], {"the chain cannot be assembled": 1}
-        problem, coarse = TaskProblem(model), TaskProblem(model, _FEW)
-        if piece.parent is not None:
-            X, times = _children(coarse, piece.parent, random)
+        problem, coarse = TaskProblem(model, 0, _TURNED[1]), TaskProblem(model, _FEW, _TURNED[0])
+        if parent is not None:
+            X, times = _children(coarse, parent, stages[0][0], random)
         else:
-            first = random_starts(model, _FIRST, random) if given is None else shaken(given, _COPIES, random)
-            X, times = placed_starts(coarse, first, _STAGES[0][0], random)
+            copies = _COPIES if stages is _STAGES else 2 * stages[0][0]
+            first = random_starts(model, _FIRST, random) if given is None else shaken(given, copies, random)
+            X, times = placed_starts(coarse, first, stages[0][0], random)
     except GraphsynthError:
         return [], {"the chain cannot be moved": 1}
     reasons = {"no candidate completes the range": 1} if not len(X) else {}
     found = Descended(X, np.zeros(len(X)), times)
-    for stage, (keep, strict, iterations) in enumerate(_STAGES):
+    for stage, (keep, strict, iterations) in enumerate(stages):
         found = best(found, keep)
         if len(found.X):
-            last = stage == len(_STAGES) - 1  # at all points
+            last = stage == len(stages) - 1  # at all points
             found = descend(problem if last else coarse, found.X, strict, iterations, None if last else found.times)
     candidates = []
     error = found.error + model.untransmitted(found.X)
@@ -413,14 +449,16 @@ def _modelled(task: DesignTask, seed: int, origin: Origin) -> tuple[Model, Unkno
     return Model(task, origin.plan, random, given, sense), given
 
 
-def _children(problem: TaskProblem, parent: Array, random: np.random.Generator) -> tuple[Array, list[Array]]:
+def _children(
+    problem: TaskProblem, parent: Array, count: int, random: np.random.Generator
+) -> tuple[Array, list[Array]]:
     """Return copies of a candidate, shaken by little and by much, with the times of the candidate."""
     model = problem.model
     scale = np.where(np.arange(model.size) < model.own_at, model.task.size, 0.3)
-    amount = 10.0 ** random.uniform(*_SHAKEN, (_COPIES, 1))
-    X = parent + amount * scale * random.normal(0.0, 1.0, (_COPIES, model.size))
+    amount = 10.0 ** random.uniform(*_SHAKEN, (count, 1))
+    X = parent + amount * scale * random.normal(0.0, 1.0, (count, model.size))
     X[0] = parent
     if model.task.linear:
-        X[:, model.stroke_at] = parent[model.stroke_at] * np.exp(amount[:, 0] * random.normal(0.0, 1.0, _COPIES))
+        X[:, model.stroke_at] = parent[model.stroke_at] * np.exp(amount[:, 0] * random.normal(0.0, 1.0, count))
     _, times = problem.linearise(parent[None], None, 1.0)
-    return X, [np.repeat(own, _COPIES, axis=0) for own in times]
+    return X, [np.repeat(own, count, axis=0) for own in times]

@@ -316,9 +316,9 @@ def _screened(
     few = np.unique(np.linspace(0, n - 1, min(n, _COMPARED)).round().astype(int))
     best, times, c = np.full(sets, np.inf), np.zeros((sets, n)), np.zeros((sets, 3), dtype=np.complex128)
     joints = model.plan.design.joints_of(aim.link)
-    for _ in range(1 if aim.inputs is not None else _TRIED):
+    for again in range(1 if aim.inputs is not None else _TRIED):
         point = u.places[:, joints].mean(axis=1) + random.normal(0.0, 0.8, (sets, 2))
-        guess = point[:, :1] + 1j * point[:, 1:]
+        guess = point[:, :1] + 1j * point[:, 1:] if again else aim.place(u)
         for at in (slice(k, k + _TOGETHER) for k in range(0, sets, _TOGETHER)):
             some = own._replace(frames=own.frames[at], rates=own.rates[at])
             tried = _guesses(model, aim, some, guess[at], wanted)  # (sets, guesses, n)

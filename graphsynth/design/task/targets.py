@@ -146,6 +146,11 @@ class PathTarget(TimedTarget):
         self._time(len(places))
 
     @property
+    def outline(self) -> bool:
+        """Whether it is a whole curve, however fast it is run through."""
+        return self.closed and self.inputs is None
+
+    @property
     def goal(self) -> NDArray[np.complex128]:
         """The points as complex numbers."""
         return np.array([complex(*p) for p in self.points])

@@ -122,42 +122,40 @@ def _box(model: Model, moved: Moved, u: Unknowns, box: tuple[float, ...], strict
     return Rows(times, values, loads, direct, 1.0 if exact else strict / _UNIT)
 
 
-def direct_wishes(model: Model, u: Unknowns, strict: float) -> tuple[Array, Array]:
+def direct_wishes(model: Model, u: Unknowns, strict: float, lengths: Lengths) -> tuple[Array, Array]:
     """Lengths, pivots and the stroke: numbers (sets, m) and their derivatives (sets, m, size).
 
     ``strict`` as of `sampled_wishes`; what shall be equal then comes twice, with both signs.
     """
     task, sets, exact = model.task, len(u.places), strict == math.inf
     beyond, spare = (1.0 + _HAIR, _HAIR) if exact else (_BEYOND, _SPARE)
-    values: list[Array] = []
+    values: list[Array] = []  # (sets, some) each
     slopes: list[Array] = []
 
     def add(value: Array, slope: Array) -> None:
         active = exact | (value > 0.0)
         values.append(np.where(active, value, 0.0))
-        slopes.append(slope * active[:, None])
+        slopes.append(slope * active[..., None])
 
     def equal(value: Array, slope: Array) -> None:
-        values.extend((value, -value) if exact else (value,))
-        slopes.extend((slope, -slope) if exact else (slope,))
+        both = (1.0, -1.0) if exact else (1.0,)
+        values.extend(sign * value[:, None] for sign in both)
+        slopes.extend(sign * slope[:, None] for sign in both)
 
-    sides, arms = _pairs(model)
-    length, by = _logarithms(model, u, sides + arms)
-    short = length[:, : len(sides)].argmin(axis=1)
-    row = np.arange(sets)
-    for k in range(len(sides) + len(arms)):
-        over = length[:, k] - length[row, short] - math.log(task.length_ratio / beyond)
-        add(over, by[:, k] - by[row, short])
+    sides, row = lengths.pairs[: lengths.sides], np.arange(sets)
+    length, by = lengths.logarithms(u)
+    own, own_by = length[:, : len(sides)], by[:, : len(sides)]
+    short = own.argmin(axis=1)
+    add(length - length[row, short][:, None] - math.log(task.length_ratio / beyond), by - by[row, short][:, None])
     if task.lengths is not None:
-        for k in range(len(sides)):
-            add(math.log(task.lengths[0]) + spare - length[:, k], -by[:, k])
-            add(length[:, k] - math.log(task.lengths[1]) + spare, by[:, k])
+        add(math.log(task.lengths[0]) + spare - own, -own_by)
+        add(own - math.log(task.lengths[1]) + spare, own_by)
     if task.crank is not None and (k := _crank(model, sides)) >= 0:
         equal(length[:, k] - math.log(task.crank), by[:, k])
     used = np.zeros((sets, len(sides)), dtype=np.bool_)
     used[:, [p in model.fixed and q in model.fixed for p, q in sides]] = True  # sides of the frame are no bars
     for bar in task.bars:
-        away = np.where(used, np.inf, np.abs(length[:, : len(sides)] - math.log(bar)))
+        away = np.where(used, np.inf, np.abs(own - math.log(bar)))
         k = away.argmin(axis=1)
         used[row, k] = True
         equal(np.where(np.isfinite(away[row, k]), length[row, k] - math.log(bar), 1.0), by[row, k])
@@ -168,42 +166,48 @@ def direct_wishes(model: Model, u: Unknowns, strict: float) -> tuple[Array, Arra
             if (at := model.column(joint)) >= 0:
                 for axis in (0, 1):
                     for sign, limit in ((-1.0, task.pivot_region[axis]), (1.0, task.pivot_region[axis + 2])):
-                        slope = np.zeros((sets, model.size))
-                        slope[:, at + axis] = sign / task.size
-                        add(sign * (u.places[:, joint, axis] - limit) / task.size + spare, slope)
+                        slope = np.zeros((sets, 1, model.size))
+                        slope[..., at + axis] = sign / task.size
+                        add(sign * (u.places[:, joint, axis, None] - limit) / task.size + spare, slope)
     if task.linear and task.stroke is not None:
         for sign, bound in ((-1.0, task.stroke[0]), (1.0, task.stroke[1])):
-            slope = np.zeros((sets, model.size))
-            slope[:, model.stroke_at] = sign / u.stroke
-            add(sign * (np.log(np.maximum(u.stroke, 1e-300)) - math.log(bound)) + spare, slope)
+            slope = np.zeros((sets, 1, model.size))
+            slope[:, 0, model.stroke_at] = sign / u.stroke
+            add(sign * (np.log(np.maximum(u.stroke[:, None], 1e-300)) - math.log(bound)) + spare, slope)
     weight = 1.0 if exact else strict / _UNIT
-    if not values:
-        return np.zeros((sets, 0)), np.zeros((sets, 0, model.size))
-    return weight * np.stack(values, axis=1), weight * np.stack(slopes, axis=1)
+    return weight * np.concatenate(values, axis=1), weight * np.concatenate(slopes, axis=1)
 
 
-def _pairs(model: Model) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
-    """Pairs of joints whose distance is a length; of points (numbers after the joints) and joints of their link."""
-    design, arms, number = model.plan.design, [], model.joints
-    for name, of_point in model.task.names.items():
-        if of_point:
-            arms += [(number, k) for k in design.joints_of(model.carrier(name)) if design.kinds[k] == "R"]
-            number += 1
-    return [(int(p), int(q)) for p, q in design.sides], arms
+class Lengths:
+    """Distances that are lengths: ``pairs`` of joints, first the ``sides`` of links, then arms of points.
 
+    Points are numbers after the joints.
+    """
 
-def _logarithms(model: Model, u: Unknowns, pairs: list[tuple[int, int]]) -> tuple[Array, Array]:
-    """Logarithms of distances (sets, pairs) and their derivatives."""
-    places = np.concatenate([u.places, u.points], axis=1)
-    found, slope = np.zeros((len(places), len(pairs))), np.zeros((len(places), len(pairs), model.size))
-    for k, (p, q) in enumerate(pairs):
-        d = places[:, p] - places[:, q]
-        square = np.maximum((d**2).sum(axis=1), 1e-24)
-        found[:, k] = 0.5 * np.log(square)
-        for place, sign in ((p, 1.0), (q, -1.0)):
-            if (at := model.place_at(place)) >= 0:
-                slope[:, k, at : at + 2] += sign * d / square[:, None]
-    return found, slope
+    def __init__(self, model: Model) -> None:
+        design, number = model.plan.design, model.joints
+        self.pairs = [(int(p), int(q)) for p, q in design.sides]
+        self.sides = len(self.pairs)
+        for name, of_point in model.task.names.items():
+            if of_point:
+                own = design.joints_of(model.carrier(name))
+                self.pairs += [(number, k) for k in own if design.kinds[k] == "R"]
+                number += 1
+        self.ends = np.array(self.pairs, dtype=np.intp).reshape(-1, 2)
+        self.by = np.zeros((len(self.pairs), model.size, 2))  # of both coordinates of a distance, by the unknowns
+        for k, pair in enumerate(self.pairs):
+            for place, sign in zip(pair, (1.0, -1.0)):
+                if (at := model.place_at(place)) >= 0:
+                    self.by[k, at, 0] += sign
+                    self.by[k, at + 1, 1] += sign
+
+    def logarithms(self, u: Unknowns) -> tuple[Array, Array]:
+        """Logarithms of lengths (sets, pairs) and their derivatives."""
+        places = np.concatenate([u.places, u.points], axis=1)
+        d = places[:, self.ends[:, 0]] - places[:, self.ends[:, 1]]
+        square = np.maximum((d**2).sum(axis=2), 1e-24)
+        part = d / square[..., None]
+        return 0.5 * np.log(square), part[:, :, None, 0] * self.by[..., 0] + part[:, :, None, 1] * self.by[..., 1]
 
 
 def _crank(model: Model, sides: list[tuple[int, int]]) -> int:

@@ -14,10 +14,9 @@ from graphsynth.core.checks import finite_array
 from graphsynth.core.compilation import named
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.engine import codes
-from graphsynth.kinematics.engine.program import Number, joint_rows
+from graphsynth.kinematics.engine.program import Number, decomposed, joint_rows
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Mechanism
-from graphsynth.structure.assur import decompose
 
 Array = NDArray[np.float64]
 _CRANK, _DYAD, _GENERAL = 0, 1, 2
@@ -183,7 +182,7 @@ def _room(program: _Adjoint, links: int, drivers: int) -> _Work:
 
 def _adjoint(mechanism: Mechanism, sizes: Array) -> _Adjoint:
     """Write down the groups for the kernel: cranks and dyads of revolute joints by name, all others by their rows."""
-    found = decompose(mechanism.graph, [driver.pair for driver in mechanism.drivers])
+    found = decomposed(mechanism.graph, tuple(driver.pair for driver in mechanism.drivers))
     pairs = {joint.pair: k for k, joint in enumerate(mechanism.joints)}
     driven = {driver.pair: (k, driver) for k, driver in enumerate(mechanism.drivers)}
     placed, steps = {mechanism.frame}, []

@@ -115,7 +115,7 @@ def compile_program(mechanism: Mechanism, dimensions: Array | None = None) -> Pr
     if not isinstance(mechanism, Mechanism):
         raise GeometryError(f"{type(mechanism).__name__} is not a Mechanism; give one")
     try:
-        found = _decomposed(mechanism.graph, tuple(driver.pair for driver in mechanism.drivers))
+        found = decomposed(mechanism.graph, tuple(driver.pair for driver in mechanism.drivers))
     except GraphError as error:
         raise GeometryError(f"the mechanism cannot be simulated: {error}") from error
     sizes = mechanism.dimensions[None] if dimensions is None else dimensions
@@ -124,7 +124,7 @@ def compile_program(mechanism: Mechanism, dimensions: Array | None = None) -> Pr
 
 
 @lru_cache(maxsize=512)
-def _decomposed(graph: MechanismGraph, drivers: tuple[tuple[int, int], ...]) -> Decomposition:
+def decomposed(graph: MechanismGraph, drivers: tuple[tuple[int, int], ...]) -> Decomposition:
     """Structural groups, kept: searches compile the same graph again and again."""
     return decompose(graph, drivers)
 

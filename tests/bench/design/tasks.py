@@ -201,7 +201,7 @@ def _letter(letter: str) -> Trial:
             transmission="5 deg", length_ratio=30.0,
         )  # fmt: skip
 
-    return Trial(f"letter_{letter}", f"letter {letter}", "curve", "Chamfer, of the size", "DejaVu Sans", task, 0.06,
+    return Trial(f"letter_{letter}", f"letter {letter}", "curve", "Chamfer, of the size", "DejaVu Sans", task, 0.01,
                  goals)  # fmt: skip
 
 

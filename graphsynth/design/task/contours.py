@@ -1,0 +1,166 @@
+"""A closed path as a whole: distances of the curve from the outline and of the outline from the curve.
+
+Both are cut at equal lengths; nearest points that run the same way are found anew after each step [Besl & McKay 1992],
+and only the distance across counts [Chen & Medioni 1992].  Theory: docs/explanation/embodiment.md, "Closed paths".
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.design.task.aims import BAND, PointAim
+from graphsynth.design.task.model import Model, Moved, Picks, Rows, Unknowns
+from graphsynth.design.task.targets import PathTarget
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Whole = NDArray[np.intp]
+#: Points of equal distance along the curve and along the outline; chords between two samples of the motion.
+_ALONG, _CHORDS = 128, 4
+#: Points by which a curve is placed.
+_PLACED = 24
+#: Steps to the nearest points of a curve.
+_SLIDES = 3
+#: No distance, over the size, has a direction below this one.
+_NONE = 1e-9
+
+
+class Polygon(NamedTuple):
+    """Closed polygons (sets, n): corners, directions of the sides that begin there."""
+
+    z: Complex
+    way: Complex
+
+    @classmethod
+    def of(cls, z: Complex) -> Polygon:
+        """From corners."""
+        side = np.roll(z, -1, axis=-1) - z
+        return cls(z, side / np.maximum(np.abs(side), 1e-300))
+
+    def foot(self, of: Complex, near: Whole) -> Complex:
+        """Points nearest to others (sets, m) on the two sides at the corners ``near`` of one polygon."""
+        n, found = self.z.shape[1], []
+        for k in ((near - 1) % n, near):
+            a, side = self.z[0, k], self.z[0, (k + 1) % n] - self.z[0, k]
+            part = (np.conj(side) * (of - a)).real / np.maximum(np.abs(side) ** 2, 1e-300)
+            found.append(a + np.clip(part, 0.0, 1.0) * side)
+        return np.where(np.abs(found[0] - of) < np.abs(found[1] - of), *found)
+
+
+class ContourAim(PointAim):
+    """A named point draws a closed outline, however fast; looked at at all samples of the motion.
+
+    ``turned``: distance, over the size, that counts like an angle of a radian between directions when nearest points
+    are looked for.  Points of the curve shall lie on the polygon, until all do but for its sagitta; given points always
+    on the curve.
+    """
+
+    def __init__(self, model: Model, target: PathTarget, turned: float) -> None:
+        super().__init__(model, 0, target, _PLACED)
+        self.turned = turned * self.size
+        z = np.append(target.goal, target.goal[0])
+        sides = np.abs(np.diff(z))
+        length = np.concatenate([[0.0], np.cumsum(sides)])
+        along = np.arange(_ALONG) / _ALONG * length[-1]
+        self.outline, self.given = Polygon.of(np.interp(along, length, z)[None]), Polygon.of(target.goal[None])
+        self.band = BAND * sides[np.searchsorted(length, along, side="right") - 1] / self.size
+        self.weight = target.weight / target.tolerance / math.sqrt(2.0 * _ALONG)
+        self.heavy = math.sqrt(_ALONG / len(target.goal))
+
+    def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
+        """Nothing is kept from step to step: as many zeros as there are distances."""
+        return np.zeros((len(moved.frames), _ALONG + self.given.z.shape[1]))
+
+    def looked(self, moved: Moved, times: Array) -> tuple[Array, Array]:
+        """At all samples of the motion."""
+        return moved.frames, moved.rates
+
+    def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
+        """Distances of points of the curve from the outline, then of given points from the curve."""
+        sets, n = frames.shape[:2]
+        own, speed = frames[:, :, self.link], rates[:, :, self.link]
+        turn = own[..., 2] + 1j * own[..., 3]
+        arm = turn * self.place(u)
+        h = np.diff(self.model.inputs)
+        z, v = own[..., 0] + 1j * own[..., 1] + arm, speed[..., 0] + 1j * speed[..., 1] + 1j * speed[..., 2] * arm
+        curve = _Cubics(z[:, :-1], z[:, 1:], v[:, :-1] * h, v[:, 1:] * h)
+        at, corners = curve.equal()
+        polygon = Polygon.of(corners)
+        there, back = _nearest(polygon, self.outline, self.given, self.turned)
+        foot = self.outline.foot(polygon.z, there)
+        away = polygon.z - foot
+        outside = (np.abs(away) > self.band[there] * self.size).any(axis=1, keepdims=True)
+        back_at = curve.nearest(at[np.arange(sets)[:, None], back], self.given.z)
+        e = np.concatenate([away * outside, self.heavy * (curve.at(back_at)[0] - self.given.z)], axis=1) / self.size
+        far = np.abs(e)
+        way = np.where(far > _NONE, e / np.maximum(far, _NONE), 0.0)
+        way[:, _ALONG:] *= self.heavy
+        loads, direct = self.blank(sets, 2, n)
+        self.put(loads, direct, arm, turn)
+        low, part = curve.split(np.concatenate([at, back_at], axis=1))
+        return Rows(times, far[:, None], loads, direct, self.weight, picks=Picks(low, part, _parts(way)))
+
+
+class _Cubics(NamedTuple):
+    """Closed curves in cubics (sets, n): both ends and the velocities there; places are in cubics."""
+
+    a: Complex
+    b: Complex
+    p: Complex
+    q: Complex
+
+    def split(self, at: Array) -> tuple[Whole, Array]:
+        """Return cubics and parts of them."""
+        low = np.floor(at).astype(np.intp)
+        return low % self.a.shape[1], at - low
+
+    def at(self, at: Array) -> tuple[Complex, Complex]:
+        """Return points and velocities at places (sets, m)."""
+        k, x = self.split(at)
+        row, y = np.arange(len(k))[:, None], 1.0 - x
+        a, b, p, q = (own[row, k] for own in self)
+        z = y * y * ((1 + 2 * x) * a + x * p) + x * x * ((1 + 2 * y) * b - y * q)
+        return z, 6 * x * y * (b - a) + y * (1 - 3 * x) * p + x * (3 * x - 2) * q
+
+    def equal(self) -> tuple[Array, Complex]:
+        """Return places (sets, _ALONG), and points of equal distance along the curves."""
+        sets, n = self.a.shape
+        fine, _ = self.at(np.tile(np.arange(n * _CHORDS) / _CHORDS, (sets, 1)))
+        side = np.roll(fine, -1, axis=1) - fine
+        share = np.cumsum(np.abs(side), axis=1)
+        share /= np.maximum(share[:, -1:], 1e-300)
+        row, wanted = np.arange(sets)[:, None], (np.arange(_ALONG) + 0.5) / _ALONG
+        k = np.searchsorted((share + row).ravel(), (wanted + row).ravel()).reshape(sets, -1) - row * n * _CHORDS
+        k = np.clip(k, 0, n * _CHORDS - 1)
+        begin = np.where(k > 0, share[row, k - 1], 0.0)
+        part = np.clip((wanted - begin) / np.maximum(share[row, k] - begin, 1e-300), 0.0, 1.0)
+        return (k + part) / _CHORDS, fine[row, k] + part * side[row, k]
+
+    def nearest(self, at: Array, goal: Complex) -> Array:
+        """Slide places to where the curves are nearest to points (sets, m)."""
+        for _ in range(_SLIDES):
+            z, v = self.at(at)
+            at = at + np.clip((np.conj(v) * (goal - z)).real / np.maximum(np.abs(v) ** 2, 1e-300), -0.5, 0.5)
+        return at
+
+
+def _nearest(curve: Polygon, outline: Polygon, given: Polygon, turned: float) -> tuple[Whole, Whole]:
+    """Corner of the outline nearest to every one of the curves (sets, _ALONG); of the curves to every given point."""
+    one, two, three = (_four(own, turned) for own in (curve, outline, given))
+    there = (one @ two[0].T - 0.5 * (two[0] ** 2).sum(axis=1)).argmax(axis=2)
+    return there, (three[0] @ one.transpose(0, 2, 1) - 0.5 * (one**2).sum(axis=2)[:, None]).argmax(axis=2)
+
+
+def _parts(z: Complex) -> Array:
+    return np.stack([z.real, z.imag], axis=1)
+
+
+def _four(own: Polygon, turned: float) -> NDArray[np.float32]:
+    """Places and, as far as they count, directions."""
+    way = own.way + np.roll(own.way, 1, axis=1)
+    way = turned * way / np.maximum(np.abs(way), 1e-300)
+    return np.stack([own.z.real, own.z.imag, way.real, way.imag], axis=2).astype(np.float32)
