@@ -140,11 +140,19 @@ class _Cubics(NamedTuple):
         part = np.clip((wanted - begin) / np.maximum(share[row, k] - begin, 1e-300), 0.0, 1.0)
         return (k + part) / _CHORDS, fine[row, k] + part * side[row, k]
 
+    def bends(self, at: Array) -> Complex:
+        """Return accelerations at places (sets, m)."""
+        k, x = self.split(at)
+        a, b, p, q = (own[np.arange(len(k))[:, None], k] for own in self)
+        return 6.0 * (1.0 - 2.0 * x) * (b - a) + (6.0 * x - 4.0) * p + (6.0 * x - 2.0) * q
+
     def nearest(self, at: Array, goal: Complex) -> Array:
         """Slide places to where the curves are nearest to points (sets, m)."""
         for _ in range(_SLIDES):
             z, v = self.at(at)
-            at = at + np.clip((np.conj(v) * (goal - z)).real / np.maximum(np.abs(v) ** 2, 1e-300), -0.5, 0.5)
+            along, square = (np.conj(v) * (goal - z)).real, np.abs(v) ** 2
+            steep = np.maximum(square - (np.conj(self.bends(at)) * (goal - z)).real, 0.1 * square)
+            at = at + np.clip(along / np.maximum(steep, 1e-300), -0.5, 0.5)
         return at
 
 
