@@ -165,7 +165,7 @@ def draw_curves(trials: Iterable[Trial], curves: Mapping[str, Any], path: Path, 
         for by, colour, wide in (("dyads", "b", 0.9), ("ours", "a", 1.4)):
             z = curves.get(f"{trial.name} {by}")
             if z is not None:
-                z = np.asarray(z)[:: max(1, len(z) // 80)]
+                z = np.asarray(z)[:: max(1, len(z) // (360 if trial.kind == "curve" else 80))]
                 z = np.append(z, z[0]) if trial.kind == "curve" else z
                 axes.plot(z.real, z.imag, color=LIGHT[colour], lw=wide)
         if trial.kind != "curve":
