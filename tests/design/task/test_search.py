@@ -454,3 +454,11 @@ def test_given_bars_are_used_and_a_misalignment_is_forgiven() -> None:
     assert found[0].jam_margin == pytest.approx(report.smallest_scale, rel=0.05) and found[0].jam_margin >= 1.0
     too_much = design(DesignTask(targets=[path], links=[4], bars=[2.0, 5.0], misalignment="20 deg"), count=1, seconds=4)
     assert not too_much.accepted and too_much.rejected["its joints bind at the misalignment"]
+
+
+def test_no_candidates_have_no_vectors() -> None:
+    """As where none of a few completes its range at a size that fits."""
+    task, links = TASKS["path"]
+    model = Model(task, next(iter(plans(task, links))), np.random.default_rng(0))
+    u = random_starts(model, 3, np.random.default_rng(1))
+    assert model.write(_some(u, np.zeros(0, dtype=np.intp))).shape == (0, model.size)
