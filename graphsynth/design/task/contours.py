@@ -48,7 +48,7 @@ class Polygon(NamedTuple):
             a, side = self.z[0, k], self.z[0, (k + 1) % n] - self.z[0, k]
             part = (np.conj(side) * (of - a)).real / np.maximum(np.abs(side) ** 2, 1e-300)
             found.append(a + np.clip(part, 0.0, 1.0) * side)
-        return np.where(np.abs(found[0] - of) < np.abs(found[1] - of), *found)
+        return np.asarray(np.where(np.abs(found[0] - of) < np.abs(found[1] - of), *found))
 
 
 class ContourAim(PointAim):

@@ -228,7 +228,7 @@ class Model:
             u.own,
             u.stroke[:, None][:, : self.task.linear],
         ]
-        return np.concatenate([part.reshape(sets, math.prod(part.shape[1:])) for part in parts], axis=1)
+        return np.concatenate([part.reshape(sets, -1) for part in parts], axis=1)
 
     def tied(self, places: Array, numbers: Array) -> tuple[Array, Array]:
         """Put the guide of a cylinder on the line of its two ends."""

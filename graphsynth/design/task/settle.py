@@ -65,7 +65,7 @@ def settled(problem: TaskProblem, x: Array) -> Settled:
             continue
         gain = min((before - after) / max(promised, 1e-300), 2.0)  # of more no cube is needed
         x, now, worse = x + step, later, 2.0
-        damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * min(max(gain, -1e3), 1e3) - 1.0) ** 3), 1e-15)
+        damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 1e-15)
         refused = 0 if before - after > _GAIN * before else refused + 2
         if _kept(now) and _squares(now) < best.error**2:
             best = Settled(x, float(np.sqrt(_squares(now))))

@@ -179,6 +179,8 @@ def placed_starts(
     u = _posed(model, u, moved, late)
     order = np.argsort(error, kind="stable")[:keep]
     order = order[np.isfinite(error[order])]
+    if not len(order):
+        return np.zeros((0, model.size)), []
     u, s, t, q = _some(u, order), s[order], t[order], q[order]
     z = u.places[..., 0] + 1j * u.places[..., 1]
     p = u.points[..., 0] + 1j * u.points[..., 1]
@@ -318,7 +320,7 @@ def _screened(
     joints = model.plan.design.joints_of(aim.link)
     for again in range(1 if aim.inputs is not None else _TRIED):
         point = u.places[:, joints].mean(axis=1) + random.normal(0.0, 0.8, (sets, 2))
-        guess = point[:, :1] + 1j * point[:, 1:] if again else aim.place(u)
+        guess = point[:, :1] + 1j * point[:, 1:] if again or not wanted.closed else aim.place(u)
         for at in (slice(k, k + _TOGETHER) for k in range(0, sets, _TOGETHER)):
             some = own._replace(frames=own.frames[at], rates=own.rates[at])
             tried = _guesses(model, aim, some, guess[at], wanted)  # (sets, guesses, n)

@@ -21,6 +21,7 @@ from graphsynth.design import (
     SwingTarget,
     design,
 )
+from graphsynth.design.task.aims import PointAim
 from graphsynth.design.task.answers import Candidate, Origin, judged, signature
 from graphsynth.design.task.classical import solutions
 from graphsynth.design.task.descend import descend
@@ -456,9 +457,13 @@ def test_given_bars_are_used_and_a_misalignment_is_forgiven() -> None:
     assert not too_much.accepted and too_much.rejected["its joints bind at the misalignment"]
 
 
-def test_no_candidates_have_no_vectors() -> None:
-    """As where none of a few completes its range at a size that fits."""
-    task, links = TASKS["path"]
-    model = Model(task, next(iter(plans(task, links))), np.random.default_rng(0))
-    u = random_starts(model, 3, np.random.default_rng(1))
-    assert model.write(_some(u, np.zeros(0, dtype=np.intp))).shape == (0, model.size)
+def test_candidates_that_all_fit_at_no_fair_size_are_no_starts() -> None:
+    """A huge mechanism whose point hardly moves, as an index may give: nothing is left to begin with."""
+    task = DesignTask(targets=[PathTarget(points=POINTS[:3], closed=True)], links=[4])
+    problem = TaskProblem(Model(task, next(iter(plans(task, 4))), np.random.default_rng(0)), 24, 0.5)
+    u = random_starts(problem.model, 40, np.random.default_rng(1))
+    (aim,) = problem.aims
+    assert isinstance(aim, PointAim) and aim.wanted is not None
+    aim.wanted = aim.wanted._replace(size=1e9 * aim.wanted.size)  # then every mechanism is tiny
+    X, times = placed_starts(problem, u, 10, np.random.default_rng(2))
+    assert X.shape == (0, problem.model.size) and times == []
