@@ -318,12 +318,8 @@ def loop(signature: Signature) -> Any:
     return pytest.param(signature, id=name, marks=() if name in ("add", "sin") else pytest.mark.long)
 
 
-@pytest.mark.long
-@needs_library
-@pytest.mark.parametrize("signature", [loop(s) for s in read_list() if s.kernel.startswith(FLAT)])
-def test_interval_loops_give_the_bits_of_numba_for_any_numbers(signature: Signature, each: int = 2000) -> None:
-    rng = np.random.default_rng(5)
-    kernel = kernel_of(signature.kernel)
+def interval_numbers(signature: Signature, each: int, rng: np.random.Generator) -> tuple[Any, ...]:
+    """Arguments of a loop over intervals: any bits, usual numbers and special ones."""
     types = signature.types.split(", ")
     inputs = sum(kind == "f8[1Cr]" for kind in types)
     any_bits = rng.integers(-(2**63), 2**63 - 1, (inputs, each)).view(np.float64)
@@ -334,7 +330,14 @@ def test_interval_loops_give_the_bits_of_numba_for_any_numbers(signature: Signat
         values[k : k + 2] = np.sort(values[k : k + 2], axis=0)
     arrays = iter(values)
     args = [int(rng.integers(-5, 9)) if kind == "i8" else next(arrays, None) for kind in types]
-    assert agree_on(kernel, tuple(np.empty(each) if value is None else value for value in args))
+    return tuple(np.zeros(each) if value is None else value for value in args)
+
+
+@pytest.mark.long
+@needs_library
+@pytest.mark.parametrize("signature", [loop(s) for s in read_list() if s.kernel.startswith(FLAT)])
+def test_interval_loops_give_the_bits_of_numba_for_any_numbers(signature: Signature, each: int = 2000) -> None:
+    assert agree_on(kernel_of(signature.kernel), interval_numbers(signature, each, np.random.default_rng(5)))
 
 
 @needs_library

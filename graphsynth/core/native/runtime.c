@@ -7,8 +7,7 @@
    A kernel takes its arguments as a row of 64-bit slots: numbers as they are, an array as its owner, its object, number
    of items, bytes of an item, data, shape and strides, a tuple as its items.  Results come back in the same way. */
 
-#include <stddef.h>
-#include <stdint.h>
+#include "support.h"
 
 /* -- Python ------------------------------------------------------------------------------------------------------- */
 
@@ -76,109 +75,13 @@ static DtypeOf dtype_of;
 static SetBase set_base;
 static PyObject *array_type, *scalar_types[16];
 
-/* -- memory of kernels (numba's layout) ----------------------------------------------------------------------------- */
-
-typedef struct {
-    size_t count; void (*destroy)(void *, size_t, void *); void *about; void *data; size_t size; void *allocator;
-} Owner;
-
-void *malloc(size_t);
-void free(void *);
-
-void *NRT_Allocate(size_t size) { return malloc(size); }
-
-void NRT_Free(void *data) { free(data); }
-
-void *NRT_MemInfo_alloc_aligned(size_t size, unsigned align) {
-    size_t room = sizeof(Owner) + size + 2 * (size_t)align;
-    Owner *owner = room < size ? NULL : malloc(room);
-    if (!owner) return NULL;
-    uintptr_t begin = (uintptr_t)(owner + 1);
-    *owner = (Owner){1, NULL, NULL, (void *)((begin + align - 1) / align * align), size, NULL};
-    return owner;
-}
-
-void *NRT_MemInfo_alloc(size_t size) { return NRT_MemInfo_alloc_aligned(size, 16); }
-
-void *NRT_MemInfo_alloc_safe_aligned(size_t size, unsigned align) { return NRT_MemInfo_alloc_aligned(size, align); }
-
-void NRT_MemInfo_call_dtor(Owner *owner) {
-    if (owner->destroy) owner->destroy(owner->data, owner->size, owner->about);
-    free(owner);
-}
+/* -- memory that kernels return ------------------------------------------------------------------------------------- */
 
 static void drop(Owner *owner) {
     if (__atomic_sub_fetch(&owner->count, 1, __ATOMIC_ACQ_REL) == 0) NRT_MemInfo_call_dtor(owner);
 }
 
 static void drop_capsule(PyObject *capsule) { drop(PyCapsule_GetPointer(capsule, NULL)); }
-
-double frexp(double, int *);
-double ldexp(double, int);
-double numba_frexp(double x, int *exponent) {
-    if (x - x != 0.0) { *exponent = 0; return x; }
-    return frexp(x, exponent);
-}
-double numba_ldexp(double x, int exponent) { return ldexp(x, exponent); }
-double nextafter(double, double);
-double numba_nextafter(double x, double y) { return nextafter(x, y); }
-
-/* -- a b + c with one rounding, for code made for processors that cannot do it -------------------------------------- */
-
-typedef unsigned __int128 Wide;
-typedef union { double number; uint64_t bits; } Double;
-
-/* Fraction between 2^52 and 2^53 and exponent of a finite number that is not 0. */
-static uint64_t parts(double x, int *exponent) {
-    uint64_t bits = (Double){.number = x}.bits, fraction = bits & 0xFFFFFFFFFFFFF;
-    int biased = (int)(bits >> 52 & 0x7FF), up = biased ? 0 : __builtin_clzll(fraction) - 11;
-    *exponent = (biased ? biased : 1) - 1075 - up;
-    return biased ? fraction | 1ull << 52 : fraction << up;
-}
-
-/* Shift to the right; what falls out is kept as the last bit. */
-static Wide jammed(Wide x, int by) { return by > 127 ? x != 0 : x >> by | ((x >> by) << by != x); }
-
-/* The number nearest to x 2^e, x > 0, ties to even. */
-static double nearest(Wide x, int e) {
-    int top = x >> 64 ? 127 - __builtin_clzll((uint64_t)(x >> 64)) : 63 - __builtin_clzll((uint64_t)x);
-    int by = top + e >= -1022 ? top - 52 : -1074 - e; /* to 53 bits, or to multiples of the least number */
-    uint64_t fraction;
-    if (by <= 0) fraction = (uint64_t)(x << -by);
-    else {
-        Wide few = by > 1 ? jammed(x, by - 2) : x << 1; /* two bits more, the last one standing for all that follow */
-        fraction = (uint64_t)(few >> 2) + ((few & 3) + (uint64_t)(few >> 2 & 1) > 2);
-    }
-    int scale = e + by;
-    double found = (double)fraction;
-    if (scale >= -1022 && scale <= 900) return found * (Double){.bits = (uint64_t)(scale + 1023) << 52}.number;
-    return ldexp(found, scale);
-}
-
-/* Integers alone.  The product and c are aligned with 20 bits to spare, so nothing is lost where they nearly cancel, and
-   the last bit stands for what is lost where they do not. */
-double fma(double a, double b, double c) {
-    if (!(a - a == 0.0) || !(b - b == 0.0) || a == 0.0 || b == 0.0) return a * b + c;
-    if (!(c - c == 0.0)) return c + c;
-    if (c == 0.0) return a * b;
-    int ea, eb, ec;
-    Wide p = (Wide)parts(a, &ea) * parts(b, &eb) << 20, s = (Wide)parts(c, &ec) << 72;
-    int negative = (a < 0.0) != (b < 0.0), other = c < 0.0, e = ea + eb - 20, apart = e - (ec - 72);
-    if (apart >= 0) s = jammed(s, apart);
-    else {
-        p = jammed(p, -apart);
-        e = ec - 72;
-    }
-    if (negative == other) s += p;
-    else if (p == s) return 0.0;
-    else if (p > s) s = p - s;
-    else {
-        s -= p;
-        negative = other;
-    }
-    double found = nearest(s, e);
-    return negative ? -found : found;
-}
 
 /* -- table of the kernels --------------------------------------------------------------------------------------------- */
 

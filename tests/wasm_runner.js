@@ -1,0 +1,103 @@
+"use strict";
+/* Makes the calls that a test asks for, one chunk after another, and sends what came out: in Node and in a browser. */
+
+class Writer {
+  constructor() { this.bytes = new Uint8Array(1 << 16); this.size = 0; }
+  put(source) {
+    if (this.size + source.length > this.bytes.length) {
+      const larger = new Uint8Array(2 * (this.size + source.length));
+      larger.set(this.bytes.subarray(0, this.size));
+      this.bytes = larger;
+    }
+    this.bytes.set(source, this.size);
+    this.size += source.length;
+  }
+  word(View, value) { this.put(new Uint8Array(View.of(value).buffer)); }
+}
+
+/* A result by its type, in a fixed order of bytes. */
+function write(out, type, value) {
+  if (type.kind === "tuple") type.items.forEach((item, k) => write(out, item, value[k]));
+  else if (type.kind === "array") {
+    for (const length of value.shape) out.word(BigInt64Array, BigInt(length));
+    out.put(new Uint8Array(value.data.buffer));
+  } else if (type.kind === "number") {
+    if (type.letter === "d" || type.letter === "f") out.word(Float64Array, value);
+    else if (type.letter === "D") value.forEach((part) => out.word(Float64Array, part));
+    else out.word(BigInt64Array, BigInt.asIntN(64, BigInt(value)));
+  }
+}
+
+const VIEWS = {
+  b1: Uint8Array, i1: Int8Array, u1: Uint8Array, i2: Int16Array, u2: Uint16Array, i4: Int32Array, u4: Uint32Array,
+  i8: BigInt64Array, u8: BigUint64Array, f4: Float32Array, f8: Float64Array, c16: Float64Array,
+};
+const WORDS = { c16: 2 };
+
+/* The arguments of call `k`; arrays that change from call to call are views of the chunk. */
+function arguments_of(tree, leaves, k) {
+  return tree.map((part) => {
+    if (Array.isArray(part)) return arguments_of(part, leaves, k);
+    const leaf = leaves[part];
+    if (leaf.kind === "array") {
+      const each = leaf.length;
+      return { data: leaf.data.subarray(k * each, (k + 1) * each), shape: leaf.shape };
+    }
+    if (leaf.kind === "float") return leaf.data[k];
+    return leaf.kind === "whole" ? BigInt(leaf.value) : leaf.value;
+  });
+}
+
+function run(modules, head, buffer) {
+  const module = modules[head.module], entries = module.kernels.get(head.kernel);
+  for (const leaf of head.leaves) {
+    if (leaf.kind !== "array" && leaf.kind !== "float") continue;
+    const View = VIEWS[leaf.type];
+    leaf.length = (leaf.shape || []).reduce((a, b) => a * b, 1) * (WORDS[leaf.type] || 1);
+    leaf.data = new View(buffer, leaf.at, leaf.length * head.count);
+  }
+  const out = new Writer();
+  for (let k = 0; k < head.count; k++) {
+    const args = arguments_of(head.tree, head.leaves, k);
+    let result = null, kind = "";
+    try {
+      result = module.call(head.kernel, ...args);
+    } catch (error) {
+      if (!error.kind) throw error;
+      kind = error.kind;
+    }
+    const name = new TextEncoder().encode(kind);
+    out.put([name.length]);
+    if (kind) out.put(name);
+    else write(out, (entries.length === 1 ? entries[0] : entries.find((one) => module.fits(one.types, args))).result, result);
+  }
+  for (const leaf of head.leaves) {
+    if (leaf.kind === "array") out.put(new Uint8Array(leaf.data.buffer, leaf.data.byteOffset, leaf.data.byteLength));
+  }
+  return out.bytes.slice(0, out.size);
+}
+
+async function serve(Kernels, address) {
+  const modules = {};
+  for (;;) {
+    const answer = await fetch(`${address}/next`, { method: "POST" });
+    const all = await answer.arrayBuffer();
+    const size = new DataView(all).getUint32(0, true);
+    const head = JSON.parse(new TextDecoder().decode(new Uint8Array(all, 8, size)));
+    if (head.end) return;
+    let found;
+    try {
+      if (!(head.module in modules)) {
+        const [code, table] = await Promise.all(["wasm", "json"].map((end) => fetch(`${address}/${head.module}.${end}`)));
+        modules[head.module] = await Kernels.open(head.module, await code.arrayBuffer(), await table.json());
+      }
+      found = run(modules, head, all.slice(8 * Math.ceil((8 + size) / 8)));
+    } catch (error) {
+      await fetch(`${address}/failed`, { method: "POST", body: String(error.stack || error) });
+      return;
+    }
+    await fetch(`${address}/result`, { method: "POST", body: found });
+  }
+}
+
+if (typeof process !== "undefined") serve(require(process.argv[2]), process.argv[3]);
