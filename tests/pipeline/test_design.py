@@ -35,8 +35,10 @@ def test_tables_make_the_targets_of_the_library() -> None:
         poses=[{"points": [[0, 0], [1, 0]], "angles_deg": [0, 30], "tolerance": 0.2}],
         functions=[{"formula": "x**2", "between": [0, 1], "input_range": 60, "output_range_deg": 30}],
         dwells=[{"span": 60, "start": 10, "weight": 3}],
-        swings=[{"least_deg": 40, "time_ratio": 1.2, "link": "ram"}],
-        pivots=[[0, 0]],
+        swings=[{"least_deg": 40, "time_ratio": 1.2, "link": "ram", "pivot": [1, 2]}],
+        pivots=[[0, 0], [3, 3, 4, 5]],
+        drive_pivot=[7, 7],
+        rank={"size": 0.5},
         transmission_deg=30,
     ).mechanism.task()
     path, drawn, poses, function, dwell, swing = own.targets
@@ -47,7 +49,9 @@ def test_tables_make_the_targets_of_the_library() -> None:
     assert isinstance(function, FunctionTarget) and function.outputs[12] == pytest.approx(math.radians(7.5))
     assert isinstance(dwell, DwellTarget) and dwell.span == pytest.approx(math.pi / 3) and dwell.weight == 3
     assert isinstance(swing, SwingTarget) and swing.most == math.inf and swing.link == "ram"
-    assert own.transmission == pytest.approx(math.pi / 6) and own.pivots == ((0.0, 0.0),)
+    assert own.transmission == pytest.approx(math.pi / 6) and own.pivots == ((0.0, 0.0), (3.0, 3.0, 4.0, 5.0))
+    assert swing.pivot == (1.0, 2.0) and own.drive_pivot == (7.0, 7.0)
+    assert (own.rank["size"], own.rank["error"]) == (0.5, 1.0)
 
 
 def test_a_link_slides_where_its_tolerance_is_a_length() -> None:

@@ -195,7 +195,7 @@ def judged(task: DesignTask, found: Candidate) -> DesignedMechanism:
         **faults(motion, task.drive == "rotation"),
         "the transmission angle is too small": not angle >= task.transmission - SLACK,
         "the length ratio is too large": not ratio <= task.length_ratio * (1.0 + SLACK),
-        **_bounds(task, motion, places),
+        **_bounds(task, motion, places, found.plan),
     }
     for target, error in zip(task.targets, errors):
         name = type(target).__name__.removesuffix("Target").lower()
@@ -233,7 +233,7 @@ def _places(motion: Motion) -> Array:
     return np.stack([*own, *(motion.point(name).position for name in motion.mechanism.points)], axis=1)
 
 
-def _bounds(task: DesignTask, motion: Motion, places: Array) -> dict[str, bool]:
+def _bounds(task: DesignTask, motion: Motion, places: Array, plan: Plan) -> dict[str, bool]:
     """Tell which bounds of the task are broken."""
     slack, mechanism = SLACK * task.size, motion.mechanism
     broken: dict[str, bool] = {}
@@ -247,11 +247,18 @@ def _bounds(task: DesignTask, motion: Motion, places: Array) -> dict[str, bool]:
     frame = [k for k, joint in enumerate(mechanism.joints) if mechanism.frame in joint.pair]
     if task.pivot_region is not None:
         broken["a pivot leaves its region"] = outside(task.pivot_region, places[:1, frame])
+    for joint, region in plan.regions:
+        leaves = outside(region, places[:1, [joint]])
+        broken["a pivot leaves its region"] = broken.get("a pivot leaves its region", False) or leaves
     lengths = side_lengths(mechanism) or [1.0]
     if task.lengths is not None:
         broken["a length is out of its bounds"] = bool(
             min(lengths) < task.lengths[0] * (1 - SLACK) or max(lengths) > task.lengths[1] * (1 + SLACK)
         )
+        names = [*mechanism.points]
+        arms = [places[0, joint] - places[0, len(mechanism.joints) + names.index(name)] for name, joint in plan.idling]
+        short = any(math.hypot(*arm) < task.lengths[0] * (1 - SLACK) for arm in arms)
+        broken["a point lies at a joint, so that links do nothing"] = short
     if task.bars:
         lengths = side_lengths(mechanism, {*range(mechanism.graph.links)} - {mechanism.frame}) or [1.0]
         for bar in task.bars:

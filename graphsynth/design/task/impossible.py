@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from itertools import combinations
 
+from graphsynth.design.task.places import meet, outside
 from graphsynth.design.task.targets import PathTarget, PosesTarget
-from graphsynth.design.task.task import Box, DesignTask
+from graphsynth.design.task.task import DesignTask
 
 
 def proof(task: DesignTask) -> str:
@@ -16,39 +18,33 @@ def proof(task: DesignTask) -> str:
     'point (1.02128, 0) of a path lies outside the box'
     """
     for box, name in ((task.box, "box"), (task.pivot_region, "region of the pivots")):
-        for p in task.pivots:
-            if box is not None and _outside(p, box) > 0.0:
+        for p in task.every_pivot if box is not None else ():
+            assert box is not None
+            if len(p) == 2 and any(outside(p, box)):
                 return f"the given pivot ({p[0]:g}, {p[1]:g}) lies outside the {name}"
+            if len(p) == 4 and not meet(p, box):
+                return f"the region {p} of a pivot lies outside the {name}"
     if task.box is not None:
-        if task.pivot_region is not None and not _meet(task.box, task.pivot_region):
+        if task.pivot_region is not None and not meet(task.box, task.pivot_region):
             return "the box and the region of the pivots do not meet"
         for target in task.targets:
             if isinstance(target, PathTarget | PosesTarget):
                 for z in target.goal.tolist():
-                    if _outside((z.real, z.imag), task.box) > target.tolerance * target.size:
+                    if math.hypot(*outside((z.real, z.imag), task.box)) > target.tolerance * target.size:
                         what = "a path" if isinstance(target, PathTarget) else "a motion"
                         return f"point ({z.real:g}, {z.imag:g}) of {what} lies outside the box"
-    apart = [(math.dist(p, q), p, q) for i, p in enumerate(task.pivots) for q in task.pivots[i + 1 :]]
+    apart = [(math.dist(p, q), p, q) for p, q in combinations(task.given_pivots, 2)]
     for distance, p, q in apart:
         between = f"the given pivots ({p[0]:g}, {p[1]:g}) and ({q[0]:g}, {q[1]:g}) are {distance:.4g} apart"
         if task.lengths is not None and not task.lengths[0] <= distance <= task.lengths[1]:
             return f"{between}, but lengths must be {task.lengths[0]:g} to {task.lengths[1]:g}"
         if task.crank is not None and max(distance / task.crank, task.crank / distance) > task.length_ratio:
             return f"{between} and the crank is {task.crank:g}: a larger ratio than {task.length_ratio:g}"
-    if len(task.pivots) > max(task.links) // 2:
+    if len(task.every_pivot) > max(task.links) // 2:
         return (
-            f"{len(task.pivots)} pivots are given, but no link of a chain of {max(task.links)} links and one "
+            f"{len(task.every_pivot)} pivots are given, but no link of a chain of {max(task.links)} links and one "
             f"freedom has more than {max(task.links) // 2} joints"
         )
     if task.lengths is not None and task.crank is not None and not task.lengths[0] <= task.crank <= task.lengths[1]:
         return f"the crank is {task.crank:g}, but lengths must be {task.lengths[0]:g} to {task.lengths[1]:g}"
     return ""
-
-
-def _outside(p: tuple[float, float], box: Box) -> float:
-    """How far a point lies outside a box."""
-    return math.hypot(max(box[0] - p[0], 0.0, p[0] - box[2]), max(box[1] - p[1], 0.0, p[1] - box[3]))
-
-
-def _meet(a: Box, b: Box) -> bool:
-    return a[0] <= b[2] and b[0] <= a[2] and a[1] <= b[3] and b[1] <= a[3]

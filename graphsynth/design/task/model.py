@@ -125,6 +125,10 @@ class Model:
         self.names = list(task.names)
         self.fixed = {*design.joints_of(design.graph.frame or 0)}
         self.given = np.array([k for k, _ in plan.given], dtype=np.intp)
+        # where a placement takes pivots: those given, those with regions to their middles
+        self.held = np.array([k for k, _ in (*plan.given, *plan.regions)], dtype=np.intp)
+        middles = [complex(x0 + x1, y0 + y1) / 2.0 for _, (x0, y0, x1, y1) in plan.regions]
+        self.goals = np.array([*(complex(*p) for _, p in plan.given), *middles])
         tied = [] if plan.pins is None else [plan.pins[0]]
         self.free = np.setdiff1d(np.arange(self.joints), [*self.given, *tied])
         self.angles = [c for c, (k, _) in enumerate(design.numbers) if k not in tied]

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, permutations, product
 
-from graphsynth.design.task.targets import Point
+from graphsynth.design.task.places import Box, Place, Point
+from graphsynth.design.task.targets import LinkTarget, PathTarget
 from graphsynth.design.task.task import DesignTask
 from graphsynth.kinematics.dimensional.design import Design, choices
 from graphsynth.structure.assur import decompose, find_fault
@@ -17,14 +18,17 @@ from graphsynth.structure.graph import MechanismGraph
 class Plan:
     """All but the numbers.
 
-    ``carriers``: the link of every name of the task, in its order; ``given``: joints on the frame whose places are
-    given, and these; ``pins``: of a cylinder its driven joint and the joints at its two ends.
+    ``carriers``: the link of every name of the task, in its order; ``given``, ``regions``: joints on the frame whose
+    places are given or bounded, and these; ``pins``: of a cylinder its driven joint and the joints at its two ends;
+    ``idling``: named points and joints of their links (indices); where these coincide, other links do nothing.
     """
 
     design: Design
     carriers: tuple[int, ...]
     given: tuple[tuple[int, Point], ...] = ()
     pins: tuple[int, int, int] | None = None
+    regions: tuple[tuple[int, Box], ...] = ()
+    idling: tuple[tuple[str, int], ...] = ()
 
     @property
     def text(self) -> str:
@@ -55,9 +59,50 @@ def fitting(task: DesignTask, design: Design) -> Iterator[Plan]:
         (own,) = design.driver_joints
         first, second = (next(k for k in design.joints_of(link) if k != own) for link in design.drivers[0])
         pins = own, first, second
+    moved_by = needs(design)
     for carriers in _carriers(task, design):
-        for given in _given(task, design):
-            yield Plan(design, carriers, given, pins)
+        if len(set().union(*(moved_by[link] for link in carriers))) < design.graph.links:
+            continue  # some links would do nothing
+        idling = tuple(_idling(task, design, carriers, moved_by))
+        for taken in _given(task, design, carriers):
+            given = tuple((k, (p[0], p[1])) for k, p in taken if len(p) == 2)
+            regions = tuple((k, p) for k, p in taken if len(p) == 4)
+            yield Plan(design, carriers, given, pins, regions, idling)
+
+
+def needs(design: Design) -> list[set[int]]:
+    """Return for every link those that move it: without all others it moves as it does.
+
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> watt = MechanismGraph(6, [(0, 1), (1, 2), (2, 3), (0, 3), (2, 4), (4, 5), (3, 5)], frame=0)
+    >>> needs(Design(watt, ((0, 1),), ("R",) * 7))[2:5]
+    [{0, 1, 2, 3}, {0, 1, 2, 3}, {0, 1, 2, 3, 4, 5}]
+    """
+    graph = design.graph
+    driven = {graph.frame or 0}.union(*design.drivers)
+    found = [{*driven, link} for link in range(graph.links)]
+    placed = {*driven}
+    for group in decompose(graph, design.drivers).groups:
+        own = {*group.links}
+        before = {n for a, b, _ in graph.joints if {a, b} & own for n in (a, b)} & placed
+        placed |= own
+        whole = own.union(*(found[n] for n in before))
+        for link in own:
+            found[link] = whole
+    return found
+
+
+def _idling(
+    task: DesignTask, design: Design, carriers: tuple[int, ...], moved_by: list[set[int]]
+) -> Iterator[tuple[str, int]]:
+    """Yield points of paths and the joints that would do as well, as points of a link that needs fewer others."""
+    posed = {str(getattr(t, "point", "")) for t in task.targets if not isinstance(t, PathTarget)}
+    for n, (name, carrier) in enumerate(zip(task.names, carriers, strict=True)):
+        for k in design.joints_of(carrier) if task.names[name] and name not in posed else ():
+            (other,) = {*design.graph.joints[k][:2]} - {carrier}
+            links = (*carriers[:n], other, *carriers[n + 1 :])
+            if design.kinds[k] == "R" and len(set().union(*(moved_by[link] for link in links))) < design.graph.links:
+                yield name, k
 
 
 def _driven(task: DesignTask, chain: MechanismGraph) -> Iterator[tuple[MechanismGraph, tuple[int, int]]]:
@@ -104,9 +149,20 @@ def _carriers(task: DesignTask, design: Design) -> Iterator[tuple[int, ...]]:
     yield from product(*(free if of_point else outputs[name in task.sliding] for name, of_point in task.names.items()))
 
 
-def _given(task: DesignTask, design: Design) -> Iterator[tuple[tuple[int, Point], ...]]:
-    """Yield the ways in which joints on the frame take the given pivots."""
-    assert design.graph.frame is not None
-    own = [k for k in design.joints_of(design.graph.frame) if design.kinds[k] == "R"]
-    for chosen in permutations(own, len(task.pivots)):
-        yield tuple(zip(chosen, task.pivots, strict=True))
+def _given(task: DesignTask, design: Design, carriers: tuple[int, ...]) -> Iterator[tuple[tuple[int, Place], ...]]:
+    """Yield the ways in which joints on the frame take the given pivots, whose links may be known."""
+    frame = design.graph.frame
+    assert frame is not None
+    own = [k for k in design.joints_of(frame) if design.kinds[k] == "R"]
+    links = dict(zip(task.names, carriers, strict=True))
+    asked = [(target.pivot, {links[target.link]}) for target in task.targets if isinstance(target, LinkTarget)]
+    named: dict[int, Place] = {}
+    for place, turning in [(task.drive_pivot, {*design.drivers[0]} - {frame}), *asked]:
+        if place is None:
+            continue
+        joint = next((k for k in own if {*design.graph.joints[k][:2]} & turning), -1)
+        if joint < 0 or named.setdefault(joint, place) != place:
+            return
+    free = [place for place in task.pivots if place not in named.values()]
+    for chosen in permutations([k for k in own if k not in named], len(free)):
+        yield (*named.items(), *zip(chosen, free, strict=True))

@@ -157,8 +157,7 @@ def placed_starts(
     whole = np.flatnonzero(moved.complete)
     u, moved = _some(u, whole), _moved(moved, whole)
     first = next((aim for aim in problem.aims if isinstance(aim, PointAim)), None)
-    held = u.places[:, model.given, 0] + 1j * u.places[:, model.given, 1]
-    goals = np.array([complex(*p) for _, p in model.plan.given])
+    held, goals = u.places[:, model.held, 0] + 1j * u.places[:, model.held, 1], model.goals
     if not len(whole):
         return np.zeros((0, model.size)), []
     late = np.zeros(len(whole), dtype=np.intp)
@@ -190,7 +189,9 @@ def placed_starts(
         p[:, k : k + 1] = q + t
     place = s * z + t
     if len(goals):
-        place[:, model.given] = goals
+        place[:, model.given] = goals[: len(model.given)]
+    for joint, (x0, y0, x1, y1) in model.plan.regions:
+        place[:, joint] = np.clip(place[:, joint].real, x0, x1) + 1j * np.clip(place[:, joint].imag, y0, y1)
     numbers = u.numbers + np.angle(s)
     u = Unknowns(
         _pairs(place), numbers, _pairs(p), u.own, u.stroke * np.abs(s[:, 0]) if model.task.linear else u.stroke

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from graphsynth.core.angles import Kept, angle, angles, listed, optional
 from graphsynth.core.checks import finite, point, positive, whole
 from graphsynth.core.errors import GeometryError
+from graphsynth.design.task.places import Place, Point, place
 
-Point = tuple[float, float]
 #: Place and angle.
 Pose = tuple[float, float, float]
 #: Angles or parts of a stroke, if any; type checkers forget what is kept of a frozen field that is inherited.
@@ -295,7 +295,23 @@ class PosesTarget(TimedTarget):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FunctionTarget(TimedTarget):
+class LinkTarget(Target):
+    """A target of a link that is jointed to the frame: see `FunctionTarget`."""
+
+    link: str = "output"
+    slides: bool = False
+    pivot: Place | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.pivot is not None and self.slides:
+            raise GeometryError(f"link {self.link!r} slides and has no pivot; leave slides or pivot out")
+        if self.pivot is not None:
+            object.__setattr__(self, "pivot", place("pivot", self.pivot))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FunctionTarget(LinkTarget, TimedTarget):
     """The angle of a link is a function of the input; of a slider its place.  Only differences count.
 
     Parameters
@@ -306,12 +322,12 @@ class FunctionTarget(TimedTarget):
         Name of the output link, which is jointed to the frame.
     slides : bool
         It slides on the frame: outputs and tolerance are lengths.
+    pivot : (x, y) or (x0, y0, x1, y1), optional
+        Where its joint on the frame is: a place, or a region.
     """
 
     outputs: Kept[Sequence[float | str], tuple[float, ...]] = Kept(listed)
     inputs: Inputs = Kept(optional(listed), None)
-    link: str = "output"
-    slides: bool = False
     tolerance: Tolerance = Kept(_within, 0.01)
 
     def __post_init__(self) -> None:
@@ -356,7 +372,7 @@ class FunctionTarget(TimedTarget):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DwellTarget(Target):
+class DwellTarget(LinkTarget):
     """A link stands still while the driver goes on; ``tolerance`` says how still, ``SwingTarget`` what it does else.
 
     Parameters
@@ -365,14 +381,12 @@ class DwellTarget(Target):
         How long: of the input.
     start : float or str, optional
         From where on; free by default.
-    link, slides
+    link, slides, pivot
         As of a function.
     """
 
     span: Kept[float | str, float] = Kept(angle)
     start: Kept[float | str | None, float | None] = Kept(optional(angle), None)
-    link: str = "output"
-    slides: bool = False
     tolerance: Tolerance = Kept(_within, 0.01)
 
     def __post_init__(self) -> None:
@@ -394,7 +408,7 @@ def _limit(name: str, value: float | str) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SwingTarget(Target):
+class SwingTarget(LinkTarget):
     """A link swings to and fro: how far, and how much longer one way than the other.
 
     Parameters
@@ -403,15 +417,13 @@ class SwingTarget(Target):
         Limits of the stroke: radians or texts such as "30 deg", lengths of a slider.
     time_ratio : float, optional
         Time of the slow stroke over that of the quick one, at a constant speed of the driver (full rotation).
-    link, slides
+    link, slides, pivot
         As of a function.
     """
 
     least: Kept[float | str, float] = Kept(angle, 0.0)
     most: Kept[float | str, float] = Kept(_limit, math.inf)
     time_ratio: float | None = None
-    link: str = "output"
-    slides: bool = False
     tolerance: Tolerance = Kept(_within, 0.01)
 
     def __post_init__(self) -> None:

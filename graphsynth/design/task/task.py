@@ -9,10 +9,11 @@ from itertools import combinations
 from typing import Literal
 
 from graphsynth.core.angles import Kept, angle, optional
-from graphsynth.core.checks import choice, finite, point, positive, whole
+from graphsynth.core.checks import choice, finite, positive, whole
 from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import Shown
-from graphsynth.design.task.targets import PathTarget, Point, PosesTarget, SwingTarget, Target
+from graphsynth.design.task.places import Box, Place, Point, box, limits, place
+from graphsynth.design.task.targets import PathTarget, PosesTarget, SwingTarget, Target
 
 Drive = Literal["rotation", "rocking", "cylinder", "slide"]
 #: How the driven link turns: counter-clockwise is positive.
@@ -20,8 +21,6 @@ Turning = Literal["either", "counter-clockwise", "clockwise"]
 _SENSES = {"either": 0, "counter-clockwise": 1, "clockwise": -1}
 #: Lengths of links unless they are given, in sizes of the task.
 _SHORT, _LONG = 0.1, 6.0
-#: x and y of the lower left, then of the upper right corner.
-Box = tuple[float, float, float, float]
 #: What answers are ranked by, and how much each counts: errors in tolerances, links, size of the task, radians,
 #: the margin of binding (at most 4).
 RANKED = {"error": 1.0, "links": 0.05, "size": 0.02, "transmission": 0.1, "jam": 0.05}
@@ -63,13 +62,16 @@ class DesignTask(Shown):
         Most prismatic joints, the drive not counted.
     dyads_only : bool
         Only mechanisms that are assembled dyad by dyad, none with a larger structural group.
-    pivots : sequence of (x, y)
-        Given revolute joints on the frame; a chain may have more of them.
+    pivots : sequence of (x, y) or (x0, y0, x1, y1)
+        Given revolute joints on the frame, each at a place or in a region; a chain may have more of them.  Which link
+        turns there, the search finds out; `drive_pivot` and the ``pivot`` of a target say it.
+    drive_pivot : (x, y) or (x0, y0, x1, y1), optional
+        Where the driven link turns on the frame, or the foot of the cylinder.
     pivot_region, box : (x0, y0, x1, y1), optional
         Where all joints on the frame lie; where all joints and named points stay over the whole motion.
     lengths : (float, float), optional
         Shortest and longest distance of two revolute joints on a link; by default 0.1 and 6 sizes of
-        the task.
+        the task.  A point is no nearer to a joint than the shortest, if other links would do nothing there.
     crank : float, optional
         Given length of the driven link.
     crank_start : float, str or a pair of them, optional
@@ -107,7 +109,8 @@ class DesignTask(Shown):
     links: Sequence[int] = (4, 6)
     sliders: int = 0
     dyads_only: bool = False
-    pivots: Sequence[Point] = ()
+    pivots: Sequence[Place] = ()
+    drive_pivot: Place | None = None
     pivot_region: Box | None = None
     box: Box | None = None
     lengths: tuple[float, float] | None = None
@@ -137,21 +140,25 @@ class DesignTask(Shown):
             )
         put(self, "span", span)
         if self.stroke is not None:
-            put(self, "stroke", _between("stroke", self.stroke))
+            put(self, "stroke", limits("stroke", self.stroke))
         put(self, "links", tuple(sorted({whole("links", n, 4, 10) for n in self.links})))
         if not self.links or any(n % 2 for n in self.links):
             raise GeometryError(f"links = {self.links} must be even numbers, 4 to 10: others have not one freedom")
         whole("sliders", self.sliders, 0, 3)
-        put(self, "pivots", tuple(point(f"pivots[{k}]", p) for k, p in enumerate(self.pivots)))
+        put(self, "pivots", tuple(place(f"pivots[{k}]", p) for k, p in enumerate(self.pivots)))
         if len(set(self.pivots)) < len(self.pivots):
             raise GeometryError("pivots repeat; give each once")
+        if self.drive_pivot is not None:
+            put(self, "drive_pivot", place("drive_pivot", self.drive_pivot))
+            if self.drive == "slide":
+                raise GeometryError("a slide on the frame has no pivot; leave drive_pivot out")
         for name in ("pivot_region", "box"):
             if getattr(self, name) is not None:
-                put(self, name, _box(name, getattr(self, name)))
+                put(self, name, box(name, getattr(self, name)))
         if self.lengths is not None:
-            put(self, "lengths", _between("lengths", self.lengths))
+            put(self, "lengths", limits("lengths", self.lengths))
         else:
-            sizes = [self.size, *(math.dist(p, q) for p, q in combinations(self.pivots, 2))]
+            sizes = [self.size, *(math.dist(p, q) for p, q in combinations(self.given_pivots, 2))]
             put(self, "lengths", (_SHORT * min(sizes), _LONG * max(sizes)))
         if self.crank is not None:
             positive("crank", self.crank)
@@ -208,6 +215,17 @@ class DesignTask(Shown):
         return next(target.point for target in self.targets if isinstance(target, PathTarget | PosesTarget))
 
     @property
+    def every_pivot(self) -> tuple[Place, ...]:
+        """Places and regions of joints on the frame, whoever has them, each once."""
+        named = (self.drive_pivot, *(getattr(target, "pivot", None) for target in self.targets))
+        return tuple(dict.fromkeys(p for p in (*self.pivots, *named) if p is not None))
+
+    @property
+    def given_pivots(self) -> tuple[Point, ...]:
+        """Those of `every_pivot` that are places."""
+        return tuple(p for p in self.every_pivot if len(p) == 2)
+
+    @property
     def linear(self) -> bool:
         """Whether the drive pushes; then inputs are parts of its stroke."""
         return self.drive in ("cylinder", "slide")
@@ -216,14 +234,14 @@ class DesignTask(Shown):
     def size(self) -> float:
         """Length by which the task is measured: of its largest path, else the distance of given pivots, else 1."""
         sizes = [target.size for target in self.targets if isinstance(target, PathTarget | PosesTarget)]
-        apart = [math.dist(p, q) for p, q in combinations(self.pivots, 2)]
+        apart = [math.dist(p, q) for p, q in combinations(self.given_pivots, 2)]
         return max(sizes, default=0.0) or max(apart, default=0.0) or 1.0
 
     @property
     def sized(self) -> bool:
         """Whether the task knows a length: else a mechanism does it in any size."""
         lengths = any(isinstance(t, PathTarget | PosesTarget) or getattr(t, "slides", False) for t in self.targets)
-        return lengths or any((self.pivots, self.bars, self.crank, self.box, self.pivot_region, self.stroke))
+        return lengths or any((self.every_pivot, self.bars, self.crank, self.box, self.pivot_region, self.stroke))
 
     @property
     def names(self) -> dict[str, bool]:
@@ -242,17 +260,3 @@ class DesignTask(Shown):
     def _told(self) -> tuple[str, list[tuple[str, str]]]:
         rows = [(type(t).__name__, f"tolerance {t.tolerance:g}, weight {t.weight:g}") for t in self.targets]
         return f"Task: {self.drive}, {' or '.join(map(str, self.links))} links", rows
-
-
-def _between(name: str, given: tuple[float, float]) -> tuple[float, float]:
-    least, most = (positive(f"{name}[{k}]", value) for k, value in enumerate(given))
-    if least > most:
-        raise GeometryError(f"{name} = ({least:g}, {most:g}): the first must not be larger than the second")
-    return least, most
-
-
-def _box(name: str, given: Box) -> Box:
-    x0, y0, x1, y1 = (finite(f"{name}[{k}]", value) for k, value in enumerate(given))
-    if not (x0 < x1 and y0 < y1):
-        raise GeometryError(f"{name} = {given} must be (x0, y0, x1, y1) with x0 < x1 and y0 < y1")
-    return x0, y0, x1, y1

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.design.task.model import Corner, Model, Moved, Rows, Unknowns
+from graphsynth.design.task.places import Box
 
 Array = NDArray[np.float64]
 #: How much of a bound is asked beyond by a penalty, and the violation that counts like a tolerance.
@@ -150,6 +151,8 @@ def direct_wishes(model: Model, u: Unknowns, strict: float, lengths: Lengths) ->
     if task.lengths is not None:
         add(math.log(task.lengths[0]) + spare - own, -own_by)
         add(own - math.log(task.lengths[1]) + spare, own_by)
+        arms = lengths.idling
+        add(math.log(task.lengths[0]) + spare - length[:, arms], -by[:, arms])
     if task.crank is not None and (k := _crank(model, sides)) >= 0:
         equal(length[:, k] - math.log(task.crank), by[:, k])
     used = np.zeros((sets, len(sides)), dtype=np.bool_)
@@ -159,16 +162,13 @@ def direct_wishes(model: Model, u: Unknowns, strict: float, lengths: Lengths) ->
         k = away.argmin(axis=1)
         used[row, k] = True
         equal(np.where(np.isfinite(away[row, k]), length[row, k] - math.log(bar), 1.0), by[row, k])
-    if task.pivot_region is not None:
-        frame = model.plan.design.graph.frame
-        assert frame is not None
-        for joint in model.plan.design.joints_of(frame):
-            if (at := model.column(joint)) >= 0:
-                for axis in (0, 1):
-                    for sign, limit in ((-1.0, task.pivot_region[axis]), (1.0, task.pivot_region[axis + 2])):
-                        slope = np.zeros((sets, 1, model.size))
-                        slope[..., at + axis] = sign / task.size
-                        add(sign * (u.places[:, joint, axis, None] - limit) / task.size + spare, slope)
+    for joint, region in _regions(model):
+        if (at := model.column(joint)) >= 0:
+            for axis in (0, 1):
+                for sign, limit in ((-1.0, region[axis]), (1.0, region[axis + 2])):
+                    slope = np.zeros((sets, 1, model.size))
+                    slope[..., at + axis] = sign / task.size
+                    add(sign * (u.places[:, joint, axis, None] - limit) / task.size + spare, slope)
     if task.linear and task.stroke is not None:
         for sign, bound in ((-1.0, task.stroke[0]), (1.0, task.stroke[1])):
             slope = np.zeros((sets, 1, model.size))
@@ -178,20 +178,31 @@ def direct_wishes(model: Model, u: Unknowns, strict: float, lengths: Lengths) ->
     return weight * np.concatenate(values, axis=1), weight * np.concatenate(slopes, axis=1)
 
 
+def _regions(model: Model) -> list[tuple[int, Box]]:
+    """Return joints on the frame, each with a region in which it lies."""
+    design, whole = model.plan.design, model.task.pivot_region
+    assert design.graph.frame is not None
+    every = [] if whole is None else [(joint, whole) for joint in design.joints_of(design.graph.frame)]
+    return [*model.plan.regions, *every]
+
+
 class Lengths:
     """Distances that are lengths: ``pairs`` of joints, first the ``sides`` of links, then arms of points.
 
-    Points are numbers after the joints.
+    Points are numbers after the joints.  ``idling``: indices of arms without which other links would do nothing.
     """
 
     def __init__(self, model: Model) -> None:
         design, number = model.plan.design, model.joints
         self.pairs = [(int(p), int(q)) for p, q in design.sides]
         self.sides = len(self.pairs)
+        self.idling: list[int] = []
         for name, of_point in model.task.names.items():
             if of_point:
-                own = design.joints_of(model.carrier(name))
-                self.pairs += [(number, k) for k in own if design.kinds[k] == "R"]
+                for k in design.joints_of(model.carrier(name)):
+                    if design.kinds[k] == "R":
+                        self.idling += [len(self.pairs)] if (name, k) in model.plan.idling else []
+                        self.pairs.append((number, k))
                 number += 1
         self.ends = np.array(self.pairs, dtype=np.intp).reshape(-1, 2)
         self.by = np.zeros((len(self.pairs), model.size, 2))  # of both coordinates of a distance, by the unknowns

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from graphsynth.pipeline.tables import In, require
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 Deg = Annotated[float, In("deg")]
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
+#: x and y of a place, or of two corners of a region.
+Place = tuple[float, ...]
 #: Ways to give a path.
 _SHAPES = ("points", "polyline", "segment", "arc", "svg")
 
@@ -119,6 +121,7 @@ class FunctionTable:
     place_range: float = 1.0
     own_start: bool = False
     link: str = "output"
+    pivot: Place = ()
     within: Annotated[float | None, In(above=0)] = None
     tolerance: Deg = 0.5 * DEGREE
     weight: Annotated[float, In(above=0)] = 1.0
@@ -150,6 +153,7 @@ class DwellTable:
     span: float
     start: float | None = None
     link: str = "output"
+    pivot: Place = ()
     within: Annotated[float | None, In(above=0)] = None
     tolerance: Deg = 0.5 * DEGREE
     weight: Annotated[float, In(above=0)] = 1.0
@@ -171,6 +175,7 @@ class SwingTable:
     stroke: tuple[float, float] | None = None
     time_ratio: Annotated[float | None, In(least=1, most=20)] = None
     link: str = "output"
+    pivot: Place = ()
     within: Annotated[float | None, In(above=0)] = None
     tolerance: Deg = 0.5 * DEGREE
     weight: Annotated[float, In(above=0)] = 1.0
@@ -190,10 +195,22 @@ class SwingTable:
 
 
 def _of_link(table: FunctionTable | DwellTable | SwingTable) -> dict[str, Any]:
-    """Return link, tolerance and weight; with ``within``, a tolerance of lengths, the link slides."""
+    """Return link, pivot, tolerance and weight; with ``within``, a tolerance of lengths, the link slides."""
     slides = table.within is not None
     tolerance = table.within if slides else table.tolerance
-    return {"link": table.link, "slides": slides, "tolerance": tolerance, "weight": table.weight}
+    more = {"pivot": table.pivot or None, "tolerance": tolerance, "weight": table.weight}
+    return {"link": table.link, "slides": slides, **more}
+
+
+@dataclass(frozen=True, slots=True)
+class RankTable:
+    """What counts how much in the ranking: errors in tolerances, links, sizes of the task, radians, margins."""
+
+    error: float = 1.0
+    links: float = 0.05
+    size: float = 0.02
+    transmission: float = 0.1
+    jam: float = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,7 +232,8 @@ class DesignTable:
     links: tuple[int, ...] = (4, 6)
     sliders: Annotated[int, In(least=0, most=3)] = 0
     dyads_only: bool = False
-    pivots: tuple[Point, ...] = ()
+    pivots: tuple[Place, ...] = ()
+    drive_pivot: Place = ()
     pivot_region: Box | None = None
     box: Box | None = None
     lengths: tuple[float, float] | None = None
@@ -229,6 +247,7 @@ class DesignTable:
     transmission: Annotated[float, In("deg", least=0, below=90)] = 25.0 * DEGREE
     misalignment: Annotated[float | None, In("deg", above=0)] = None
     joint_tilt: Annotated[float, In("deg", above=0)] = 0.3 * DEGREE
+    rank: RankTable = field(default_factory=RankTable)
     begin: tuple[str, ...] = ()  # files of mechanisms to begin with
     index: str = ""  # folder of an index of curves to begin with
     seconds: Annotated[float, In(above=0)] = 60.0
@@ -247,6 +266,7 @@ class DesignTable:
         tables: tuple[Any, ...] = (*self.paths, *self.poses, *self.functions, *self.dwells, *self.swings)
         targets: list[Target] = [table.target(turn) for table in tables]
         start = self.crank_start * 2 if len(self.crank_start) == 1 else self.crank_start or None
-        shared = {own.name for own in fields(self)} & {own.name for own in fields(DesignTask)} - {"crank_start"}
+        shared = {own.name for own in fields(self)} & {own.name for own in fields(DesignTask)} - {"crank_start", "rank"}
         more: dict[str, Any] = {name: getattr(self, name) for name in shared}
-        return DesignTask(targets=targets, crank_start=start, **more)
+        more["drive_pivot"] = self.drive_pivot or None
+        return DesignTask(targets=targets, crank_start=start, rank=asdict(self.rank), **more)

@@ -72,6 +72,15 @@ TASKS = {
         ),
         6,
     ),
+    "a region of a pivot, the pivot of the drive, arms of some length": (
+        DesignTask(
+            targets=[PathTarget(points=POINTS, inputs=even(4, 1.5))],
+            pivots=[(2, 2, 2.1, 2.1)],
+            drive_pivot=(0, 0),
+            lengths=(2.0, 9.0),
+        ),
+        6,
+    ),
     "function of a slider": (
         DesignTask(
             targets=[FunctionTarget(inputs=even(5, 2.0), outputs=[0, 0.1, 0.3, 0.4, 0.5], slides=True)], sliders=1
