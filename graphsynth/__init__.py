@@ -23,6 +23,7 @@ _shown.WORK.update(
         "embody": "graphsynth.kinematics.dimensional.api:embody",
         "draw graph": "graphsynth.drawing.methods:draw_graph",
         "graph picture": "graphsynth.drawing.methods:graph_picture",
+        "open mechanism": "graphsynth.workbench.opening:open_workbench",
         "draw mechanism": "graphsynth.drawing.methods:draw_posed",
         "plot mechanism": "graphsynth.drawing.methods:plot_posed",
         "mechanism picture": "graphsynth.drawing.methods:mechanism_picture",

@@ -100,6 +100,19 @@ _VERBS: dict[str, tuple[str, *tuple[Option, ...]]] = {
         _option("--range", "inputs of MECHANISM.toml, radians or lengths", type=float, nargs=2, metavar=("A", "B")),
         _option("--save FILE", "keep the mechanism found: FILE.toml or .json", Path),
     ),
+    "workbench": (
+        "Write the page on which mechanisms are drawn and dragged; it opens from a disk.",
+        _option(
+            "MECHANISM",
+            "what lies on the table: a dimensioned mechanism (.toml, .json), the name of a classic one, or the key or "
+            "text form of a graph, for which dimensions are found",
+            dest="mechanism",
+            nargs="?",
+        ),
+        _option("-o --output PLACE", "folder (default workbench), or with --single FILE.html", Path),
+        _option("--single", "write one file instead of a folder"),
+        _option("--seed S", "of the search for dimensions (default 0)", int, default=0),
+    ),
     "parts": (
         "Make parts of a dimensioned mechanism: layers without collisions, drawings to cut, bill of parts.",
         _option("MECHANISM", "a dimensioned mechanism (.toml, .json), or the name of a classic one", dest="mechanism"),

@@ -266,6 +266,14 @@ class Mechanism(Constructors, Shown):
         """Animate ``self.simulate()``; see `Motion.animate`."""
         return self.simulate().animate(path, **options)
 
+    def open(self, path: str | Path | None = None, *, browser: bool | None = None) -> gs.OpenedWorkbench:
+        """Lay it on the workbench, a page on which it is dragged and changed.
+
+        See :func:`graphsynth.workbench.opening.open_workbench`.
+        """
+        found: gs.OpenedWorkbench = work("open mechanism")(self, path, browser=browser)
+        return found
+
     def closure_equations(self) -> list[sympy.Expr]:
         """Return the equations of all joints as formulas; see :mod:`graphsynth.mechanism.symbolic`."""
         from graphsynth.mechanism.symbolic import closure_equations

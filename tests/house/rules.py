@@ -18,7 +18,7 @@ PACKAGE = ROOT / "graphsynth"
 ORDER = (
     ("core",), ("intervals", "structure"), ("synthesis", "mechanism"), ("tolerances",), ("kinematics",),
     ("jamming", "dynamics"), ("design",), ("drawing", "formats"), ("evidence",), ("pipeline",), ("systems",),
-    ("atlas",), ("cli", "testing"),
+    ("workbench",), ("atlas",), ("cli", "testing"),
 )  # fmt: skip
 #: Modules whose methods are written down elsewhere and looked up on first use.
 FACADES = {"graphsynth.structure.graph", "graphsynth.mechanism.model"}

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -25,6 +22,7 @@ from graphsynth.atlas.site.families import (
 from graphsynth.atlas.site.motions import MotionTask, motion_of
 from graphsynth.atlas.stored import stored_mechanisms
 from graphsynth.core.errors import GraphsynthError, SpecError
+from graphsynth.core.wholefolders import PageFolder, put
 
 if TYPE_CHECKING:
     from graphsynth.atlas.catalogue import Catalogue
@@ -33,6 +31,8 @@ if TYPE_CHECKING:
 #: Data of the first load in bytes; families beyond it are loaded when they are asked for.
 _FIRST_LOAD = 450_000
 
+#: What pages consist of; a folder with anything else is somebody's.
+_PAGES = PageFolder("atlas-page.txt", {".": (".html", ".css", ".js"), "data": (".js",), "motions": (".html", ".toml")})
 #: Told ``(what is done now, steps done, steps in all)``.
 Watch = Callable[[str, int, int], None]
 
@@ -99,7 +99,7 @@ def build_site(
     """
     if motion_links < 0:
         raise SpecError(f"motion_links = {motion_links} must be 0 (no motions) or more")
-    with replaced(Path(folder)) as (target, building):
+    with _PAGES.replaced(Path(folder)) as (target, building):
         with catalogue.reading(screened=True):
             found = families(catalogue.connection)
         if not found:
@@ -151,8 +151,8 @@ def _write(
     (folder / "motions").mkdir()
     for shown in in_order(executor, motion_of, tasks):
         if shown.page:
-            _put(folder / "motions" / f"{shown.label}.html", shown.page)
-            _put(folder / "motions" / f"{shown.label}.toml", shown.mechanism)
+            put(folder / "motions" / f"{shown.label}.html", shown.page)
+            put(folder / "motions" / f"{shown.label}.toml", shown.mechanism)
         progress.add("motions", 10)
         motions[shown.label] = shown.facts
     places = {row["key"]: (family.name, k) for family in found for k, row in enumerate(family.rows)}
@@ -160,10 +160,10 @@ def _write(
     for family in found:
         with catalogue.reading():
             text, relatives = family_script(family), relatives_script(catalogue.connection, family, places)
-        _put(data / f"family-{family.name}.js", text)
-        _put(data / f"relatives-{family.name}.js", relatives)
+        put(data / f"family-{family.name}.js", text)
+        put(data / f"relatives-{family.name}.js", relatives)
         for name, sketches, count in sketch_scripts(family, executor):
-            _put(data / name, sketches)
+            put(data / name, sketches)
             progress.add("sketches", count)
         size = (data / f"family-{family.name}.js").stat().st_size
         if size <= room:
@@ -172,10 +172,10 @@ def _write(
     more = {"first": first, "sketchesPerFile": PER_FILE, "motions": motions, "motionLinks": motion_links}
     with catalogue.reading():
         known, groups = contents(catalogue.connection, found, **more), groups_script(catalogue.connection)
-    _put(data / "contents.js", known)
-    _put(data / "groups.js", groups)
+    put(data / "contents.js", known)
+    put(data / "groups.js", groups)
     loaded = [*_write_pages(folder, first), data / "contents.js", *(data / f"family-{name}.js" for name in first)]
-    _put(folder / MARK, "This folder is written by 'graphsynth catalog site' and replaced by it.\n")
+    put(folder / _PAGES.mark, "This folder is written by 'graphsynth catalog site' and replaced by it.\n")
     everything = [path for path in folder.rglob("*") if path.is_file()]
     moving = sum("frame" in facts for facts in motions.values())
     size, first_load = (sum(path.stat().st_size for path in paths) for paths in (everything, loaded))
@@ -197,87 +197,5 @@ def _write_pages(folder: Path, first: list[str]) -> list[Path]:
         "index.html": page.from_string(texts["index.html"]).render(data=data),
     }
     for name, text in loaded.items():
-        _put(folder / name, text)
+        put(folder / name, text)
     return [folder / name for name in loaded]
-
-
-def _put(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, "utf-8", newline="\n")
-    except OSError as error:
-        raise unwritten(error, path) from None
-
-
-#: In every folder that was written as a page.
-MARK = "atlas-page.txt"
-
-#: What pages consist of; a folder with anything else is somebody's.
-_OWN = {".": (".html", ".css", ".js"), "data": (".js",), "motions": (".html", ".toml")}
-
-
-@contextmanager
-def replaced(folder: Path) -> Iterator[tuple[Path, Path]]:
-    """Give (the folder, an empty one beside it); when the block ends well, the second takes the place of the first.
-
-    Whatever happens, the older page stays until the new one is whole, and no other file is touched.
-
-    Raises `GraphsynthError` at once, if the folder cannot be made or replaced, or holds other files; later, if the
-    disk is full.
-    """
-    target = folder.resolve()
-    _check(folder, target)
-    try:
-        # a name that nobody has, beside the folder: moving it is then one step
-        beside = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    except OSError as error:
-        raise unwritten(error, target.parent) from None
-    try:
-        new = beside / "new"
-        new.mkdir()
-        yield target, new
-        _check(folder, target)  # it may have changed meanwhile
-        old = beside / "old"
-        try:
-            if target.exists():
-                target.rename(old)
-            new.rename(target)
-        except OSError as error:
-            if old.exists() and not target.exists():
-                old.rename(target)
-            raise unwritten(error, target) from None
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-
-
-def unwritten(error: OSError, place: Path) -> GraphsynthError:
-    """Return the error of a file that cannot be written: its name and the remedy."""
-    return GraphsynthError(
-        f"{error.filename or place} cannot be written ({error.strerror or error}): make room or name another folder; "
-        "an older page stays as it was"
-    )
-
-
-def _check(folder: Path, target: Path) -> None:
-    """Refuse before anything is computed what could not be replaced at the end."""
-    parent = target.parent
-    if not parent.is_dir():
-        raise GraphsynthError(f"{folder}: the folder {parent} does not exist; make it first")
-    if target.exists() and not target.is_dir():
-        raise GraphsynthError(f"{folder} is a file; name a folder")
-    if target.is_mount() or target == parent:
-        raise GraphsynthError(f"{folder} is the root of a file system, which cannot be replaced; name a folder in it")
-    others = (own.name for own in target.iterdir()) if target.is_dir() else iter(())
-    if (target / MARK).is_file():
-        others = (str(own.relative_to(target)) for own in sorted(target.rglob("*")) if not _is_of_page(own, target))
-    other = min(others, default="")
-    if other:
-        raise GraphsynthError(f"{folder} holds other files ({other}); name an empty or a new folder")
-
-
-def _is_of_page(own: Path, target: Path) -> bool:
-    inside = own.relative_to(target)
-    if own.is_symlink():
-        return False
-    if own.is_dir():
-        return str(inside) in _OWN
-    return own.is_file() and (str(inside) == MARK or own.suffix in _OWN.get(str(inside.parent), ()))

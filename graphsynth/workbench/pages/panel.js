@@ -1,0 +1,142 @@
+// The panel of what is chosen: names, numbers with units, and what can be done with it.
+"use strict";
+
+(function () {
+  const { make, field, check, choice, button } = Bench;
+
+  function number(text, unit) {
+    const value = Bench.parseLength(text, unit);
+    if (!Number.isFinite(value)) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });
+    return value;
+  }
+  function angle(text) {
+    const value = Number(text.replace(",", ".").replace("−", "-").replace(/[°\s]/g, ""));
+    if (!Number.isFinite(value) || !text.trim()) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });
+    return (value * Math.PI) / 180;
+  }
+  const degrees = value => String(Number(((value * 180) / Math.PI).toPrecision(10)));
+  const tidy = value => String(Number(value.toPrecision(12)));
+  const take = (app, change) => app.attempt(sheet => ({ sheet: change(sheet) }));
+
+  function named(text, names) {
+    const name = text.trim();
+    if (!name || name.length > Bench.LIMITS.name || names.includes(name)) throw new Bench.Fault("fault.name", { name: name.slice(0, 20) });
+    return name;
+  }
+
+  function pointPanel(app, id) {
+    const { sheet } = app, point = sheet.points[id], links = Bench.linksAt(sheet, id), { unit } = sheet;
+    const others = Object.keys(sheet.points).filter(own => own !== id).map(own => sheet.points[own].name);
+    const put = change => take(app, s => Bench.placed(s, { [id]: change(s.points[id]) }));
+    const set = more => take(app, s => ({ ...s, points: { ...s.points, [id]: { ...s.points[id], ...more } } }));
+    return [
+      make("h3", {}, Bench.word("panel.point", { p: point.name })),
+      field(app, "panel.name", point.name, text => set({ name: named(text, others) })),
+      field(app, "panel.x", tidy(point.x), text => { const x = number(text, unit); put(p => [x, p.y]); }, { unit }),
+      field(app, "panel.y", tidy(point.y), text => { const y = number(text, unit); put(p => [p.x, y]); }, { unit }),
+      check("panel.fixed", links.includes(Bench.GROUND), () => app.attempt(s => Bench.TOOLS.ground.apply(s, [{ point: id }]))),
+      check("panel.traced", point.trace, on => set({ trace: on })),
+      make("p", { class: "soft" }, Bench.word("panel.through", { links: links.map(own => Bench.linkName(sheet, own)).join(", ") || "–" })),
+      ...driverPart(app, Bench.driverAt(sheet, id)),
+      links.length > 1 && button("do.separate", () => take(app, s => Bench.unpinned(s, id))),
+    ];
+  }
+
+  /** The driver of a joint: there or not, its speed, where it begins. */
+  function driverPart(app, links) {
+    if (!links) return [];
+    const { sheet } = app, own = sheet.drivers.find(d => links.includes(d.base) && links.includes(d.link));
+    const box = check("panel.driven", Boolean(own), () => take(app, s => Bench.toggleDriver(s, ...links)));
+    if (!own || own.law.kind !== "linear") return [box];
+    const set = law => take(app, s => ({ ...s, drivers: s.drivers.map(d => (d === own ? { ...d, law: { ...d.law, ...law } } : d)), range: null }));
+    const value = text => {
+      const found = Number(text.replace(",", "."));
+      if (!Number.isFinite(found) || found === 0) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });
+      return found;
+    };
+    return [box, field(app, "panel.rate", String(own.law.rate), text => set({ rate: value(text) }))];
+  }
+
+  function linkPanel(app, id) {
+    const { sheet } = app, link = sheet.links[id], { unit } = sheet;
+    const others = Object.keys(sheet.links).filter(own => own !== id).map(own => sheet.links[own].name);
+    const name = field(app, "panel.name", link.name, text => take(app, s => ({
+      ...s, links: { ...s.links, [id]: { ...s.links[id], name: text.trim() ? named(text, others) : "" } } })));
+    const lengths = [];
+    for (let k = 0; k < link.points.length && link.points.length > 1; k++) {
+      const a = link.points[k], b = link.points[(k + 1) % link.points.length];
+      if (k === 1 && link.points.length === 2) break;
+      lengths.push([a, b]);
+    }
+    const fixed = p => sheet.links[Bench.GROUND].points.includes(p);
+    const stretch = (a, b, text) => {
+      const wanted = number(text, unit);
+      if (!(wanted > 0)) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });
+      const [stay, go] = fixed(b) && !fixed(a) ? [b, a] : [a, b];
+      take(app, s => {
+        const p = s.points[stay], q = s.points[go], factor = wanted / Bench.distance(s, a, b);
+        return Bench.placed(s, { [go]: [p.x + (q.x - p.x) * factor, p.y + (q.y - p.y) * factor] });
+      });
+    };
+    const rows = lengths.map(([a, b]) => {
+      const made = field(app, "panel.length", tidy(Bench.distance(sheet, a, b)), text => stretch(a, b, text), { unit });
+      made.firstChild.textContent = Bench.word("panel.between", { a: sheet.points[a].name, b: sheet.points[b].name });
+      return made;
+    });
+    const [a, b] = link.points;
+    const turn = link.points.length === 2 && field(app, "panel.angle",
+      degrees(Math.atan2(sheet.points[b].y - sheet.points[a].y, sheet.points[b].x - sheet.points[a].x)), text => {
+        const to = angle(text);
+        take(app, s => {
+          const p = s.points[a], length = Bench.distance(s, a, b);
+          return Bench.placed(s, { [b]: [p.x + length * Math.cos(to), p.y + length * Math.sin(to)] });
+        });
+      }, { unit: "°" });
+    return [make("h3", {}, Bench.linkName(sheet, id)), name, ...rows, turn];
+  }
+
+  function pairPanel(app, id) {
+    const { sheet } = app, pair = sheet.pairs[id];
+    const set = more => take(app, s => ({ ...s, pairs: { ...s.pairs, [id]: { ...s.pairs[id], ...more } } }));
+    const parts = [make("h3", {}, Bench.word(`pair.${pair.kind}`)),
+      make("p", { class: "soft" }, Bench.word("panel.pair", { a: Bench.linkName(sheet, pair.a), b: Bench.linkName(sheet, pair.b) }))];
+    if (pair.kind === "P" || pair.kind === "pin-slot") {
+      parts.push(field(app, "panel.direction", degrees(Bench.direction(sheet, pair)), text => set({ angle: angle(text), along: undefined }), { unit: "°" }));
+    }
+    if (pair.kind === "P") {
+      const free = Object.keys(sheet.links).filter(own => own !== pair.b && (own === pair.a || !Bench.joined(sheet, own, pair.b)));
+      parts.push(choice("panel.guide", pair.a, free.map(own => [own, Bench.linkName(sheet, own)]), own => set({ a: own })));
+      parts.push(...driverPart(app, [pair.a, pair.b]));
+    }
+    if (pair.kind === "gear") {
+      const teeth = k => text => {
+        const own = app.sheet.pairs[id], radii = [...own.radii];
+        radii[k] = number(text, sheet.unit);
+        take(app, s => Bench.withTeeth(s, id, ...radii, own.internal));
+      };
+      parts.push(field(app, "panel.first", tidy(pair.radii[0]), teeth(0), { unit: sheet.unit }),
+        field(app, "panel.second", tidy(pair.radii[1]), teeth(1), { unit: sheet.unit }),
+        check("panel.internal", pair.internal, on => take(app, s => Bench.withTeeth(s, id, pair.radii[0],
+          on && pair.radii[0] === pair.radii[1] ? 2 * pair.radii[1] : pair.radii[1], on))));
+    }
+    return parts;
+  }
+
+  /** Show what is chosen. */
+  Bench.showPanel = (app, place) => {
+    const focused = place.contains(document.activeElement) ? [...place.querySelectorAll("input,select,button")].indexOf(document.activeElement) : -1;
+    const { sheet, selection } = app, [id] = selection;
+    let parts;
+    if (selection.length === 0) parts = [make("p", { class: "soft" }, Bench.word("panel.none"))];
+    else if (selection.length > 1) parts = [make("h3", {}, Bench.word("panel.many", { n: selection.length }))];
+    else if (sheet.points[id]) parts = pointPanel(app, id);
+    else if (sheet.links[id]) parts = linkPanel(app, id);
+    else parts = pairPanel(app, id);
+    if (selection.length) {
+      parts.push(make("div", { class: "acts" }, button("do.duplicate", () => Bench.do.duplicate(app)),
+        button("do.mirror", () => Bench.do.mirror(app)), button("do.delete", () => Bench.do.delete(app))));
+    }
+    place.replaceChildren(...parts.filter(Boolean));
+    if (focused >= 0) [...place.querySelectorAll("input,select,button")][focused]?.focus();
+  };
+})();

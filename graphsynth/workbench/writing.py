@@ -1,0 +1,177 @@
+"""Writing the page: a folder of files, or all in one file."""
+
+from __future__ import annotations
+
+import json
+from base64 import b64encode
+from collections.abc import Iterable
+from hashlib import sha256
+from importlib.resources import files
+from pathlib import Path
+
+from graphsynth.core.errors import GraphsynthError
+from graphsynth.core.wholefiles import replacing
+from graphsynth.core.wholefolders import PageFolder, put
+from graphsynth.mechanism.model import Mechanism
+
+_FOLDER = PageFolder("workbench-page.txt", {".": (".html", ".css", ".js")})
+
+
+def write_workbench(place: str | Path, mechanism: Mechanism | None = None, *, single: bool = False) -> Path:
+    """Write the workbench page, which opens from a disk and loads nothing from elsewhere.
+
+    Parameters
+    ----------
+    place : str or Path
+        A folder, made if it does not exist; a page that is there is replaced, anything else is refused.  Of a single
+        page, the file.
+    mechanism : Mechanism, optional
+        What lies on the table when the page is opened, in its pose, or in one that is found.
+    single : bool
+        Write one file instead of a folder.
+
+    Returns
+    -------
+    Path
+        The page to open.
+
+    Raises
+    ------
+    GraphsynthError
+        If the folder holds something else, or the page cannot be written.
+    GeometryError
+        If the mechanism has more than 64 links, or no pose can be found.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from graphsynth import Mechanism
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     page = write_workbench(folder + "/bench", Mechanism.four_bar(4, 1, 3.5, 3))
+    ...     page.name, page.stat().st_size > 0
+    ('index.html', True)
+    """
+    place, given = Path(place), _given(mechanism)
+    if single:
+        if place.is_dir() or not place.parent.is_dir():
+            raise GraphsynthError(f"{place} is a folder, or in none: name a file in a folder that exists")
+        with replacing(place) as fresh:
+            put(fresh, single_page(given))
+        return place
+    with _FOLDER.replaced(place) as (target, building):
+        scripts = page_scripts(given)
+        for name, text in scripts.items():
+            put(building / f"{name}.js", text)
+        put(building / "style.css", page_file("style.css"))
+        named = [f'<script src="{name}.js"></script>' for name in scripts if name != "theme"]
+        put(
+            building / "index.html",
+            _page(
+                theme='<script src="theme.js"></script>',
+                style='<link rel="stylesheet" href="style.css">',
+                scripts=named,
+                own="'self' file:",
+                allowed="'self' file:",
+            ),
+        )
+        put(building / _FOLDER.mark, "This folder is written by 'graphsynth workbench' and replaced by it.\n")
+    return target / "index.html"
+
+
+def single_page(given: str = "") -> str:
+    """Return the whole page as one text; ``given`` is the JSON of what lies on the table."""
+    scripts = page_scripts(given)
+    theme = scripts.pop("theme")
+    allowed = " ".join(_digest(text) for text in (theme, *scripts.values()))
+    return _page(
+        theme=f"<script>{theme}</script>",
+        style=f"<style>{page_file('style.css')}</style>",
+        scripts=[f"<script>{text}</script>" for text in scripts.values()],
+        own="",
+        allowed=allowed,
+    )
+
+
+def page_scripts(given: str = "") -> dict[str, str]:
+    """Return the scripts by name, in the order in which the page loads them."""
+    order = page_file("order.txt").split()
+    last = order.index("main")
+    words = (f"Bench.words({_json(name)}, {_json(table)});\n" for name, table in languages().items())
+    data = f"Bench.templates = {_json(templates())};\nBench.given = {_json(given)};\n"
+    return {
+        "theme": page_file("theme.js"),
+        "workbench": "".join(page_file(f"{name}.js") for name in order[:last]),
+        "words": "".join(words),
+        "given": data,
+        **{f"{path.name.partition('.')[0]}.wasm": path.read_text("utf-8") for path in _modules()},
+        "main": "".join(page_file(f"{name}.js") for name in order[last:]),
+    }
+
+
+def languages() -> dict[str, dict[str, str]]:
+    """Return the words of every language by name, English first."""
+    folder = files("graphsynth.workbench").joinpath("pages", "words")
+    names = sorted(
+        (path.name for path in folder.iterdir() if path.name.endswith(".json")), key=lambda n: (n != "en.json", n)
+    )
+    return {name.removesuffix(".json"): json.loads(folder.joinpath(name).read_text("utf-8")) for name in names}
+
+
+def templates() -> list[dict[str, str]]:
+    """Return the classic mechanisms that the page offers, each with its name and its JSON."""
+    from graphsynth.mechanism import gallery
+
+    found = {
+        "four_bar": Mechanism.four_bar(4.0, 1.2, 3.5, 3.0, coupler_point=(1.8, 1.4)),
+        "slider_crank": Mechanism.slider_crank(1.0, 3.0),
+        **{name: getattr(gallery, name)() for name in gallery.__all__},
+    }
+    return [{"name": name, "text": _compact(mechanism)} for name, mechanism in found.items()]
+
+
+def page_file(name: str) -> str:
+    """Return a file of the page."""
+    return files("graphsynth.workbench").joinpath("pages", name).read_text("utf-8")
+
+
+def _modules() -> Iterable[Path]:
+    """Files of compiled kernels, as scripts that hand them to the loader."""
+    return ()
+
+
+def _given(mechanism: Mechanism | None) -> str:
+    if mechanism is None:
+        return ""
+    from graphsynth.workbench.posing import assembled
+
+    return _compact(assembled(mechanism))
+
+
+def _compact(mechanism: Mechanism) -> str:
+    from graphsynth.mechanism.files import to_dict
+
+    return json.dumps(to_dict(mechanism), separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+
+
+def _json(value: object) -> str:
+    """Return JSON that may stand in a script of a page, whatever it holds."""
+    return json.dumps(value, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _digest(script: str) -> str:
+    return f"'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'"
+
+
+def _page(theme: str, style: str, scripts: list[str], own: str, allowed: str) -> str:
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    page = Environment(undefined=StrictUndefined, autoescape=True, keep_trailing_newline=True)
+    return page.from_string(page_file("index.html")).render(
+        words=languages()["en"],
+        theme=Markup(theme),
+        style=Markup(style),
+        scripts=Markup("\n".join(scripts)),
+        own=Markup(own),
+        allowed=Markup(allowed),
+    )
