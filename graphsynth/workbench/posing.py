@@ -50,4 +50,4 @@ def assembled(mechanism: Mechanism) -> Mechanism:
     motion = mechanism.simulate([first_input(mechanism)], events=False)
     if not motion.assembled.any():
         raise GeometryError(f"no pose can be drawn: {motion.reason}")
-    return replace(mechanism, pose=tuple(tuple(map(float, row)) for row in motion.poses[0]))
+    return replace(mechanism, pose=tuple((float(x), float(y), float(turn)) for x, y, turn in motion.poses[0]))

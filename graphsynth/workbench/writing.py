@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from base64 import b64encode
-from collections.abc import Iterable
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
@@ -13,7 +12,10 @@ from graphsynth.core.errors import GraphsynthError
 from graphsynth.core.wholefiles import replacing
 from graphsynth.core.wholefolders import PageFolder, put
 from graphsynth.mechanism.model import Mechanism
+from graphsynth.workbench.modules import names, script
 
+#: Modules of kernels that the page loads at once.
+_FIRST = ("motion",)
 _FOLDER = PageFolder("workbench-page.txt", {".": (".html", ".css", ".js")})
 
 
@@ -103,7 +105,7 @@ def page_scripts(given: str = "") -> dict[str, str]:
         "workbench": "".join(page_file(f"{name}.js") for name in order[:last]),
         "words": "".join(words),
         "given": data,
-        **{f"{path.name.partition('.')[0]}.wasm": path.read_text("utf-8") for path in _modules()},
+        **{f"{name}.wasm": script(name) for name in names() if name in _FIRST},
         "main": "".join(page_file(f"{name}.js") for name in order[last:]),
     }
 
@@ -111,10 +113,9 @@ def page_scripts(given: str = "") -> dict[str, str]:
 def languages() -> dict[str, dict[str, str]]:
     """Return the words of every language by name, English first."""
     folder = files("graphsynth.workbench").joinpath("pages", "words")
-    names = sorted(
-        (path.name for path in folder.iterdir() if path.name.endswith(".json")), key=lambda n: (n != "en.json", n)
-    )
-    return {name.removesuffix(".json"): json.loads(folder.joinpath(name).read_text("utf-8")) for name in names}
+    found = [path.name.removesuffix(".json") for path in folder.iterdir() if path.name.endswith(".json")]
+    found.sort(key=lambda name: (name != "en", name))
+    return {name: json.loads(folder.joinpath(f"{name}.json").read_text("utf-8")) for name in found}
 
 
 def templates() -> list[dict[str, str]]:
@@ -132,11 +133,6 @@ def templates() -> list[dict[str, str]]:
 def page_file(name: str) -> str:
     """Return a file of the page."""
     return files("graphsynth.workbench").joinpath("pages", name).read_text("utf-8")
-
-
-def _modules() -> Iterable[Path]:
-    """Files of compiled kernels, as scripts that hand them to the loader."""
-    return ()
 
 
 def _given(mechanism: Mechanism | None) -> str:
