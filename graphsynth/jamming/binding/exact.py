@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from graphsynth.jamming.binding.energy import least_energy
 from graphsynth.jamming.binding.parts import JointStiffness
+from graphsynth.jamming.joints.limits import JointLimits
 from graphsynth.jamming.space.closure import Closure
 from graphsynth.jamming.space.model import SpaceModel
 from graphsynth.jamming.space.plane import in_space, start
@@ -59,6 +60,7 @@ def _movable(own: Limits, spring: JointStiffness) -> Limits:
     names = [name for name in own.tilts if math.isfinite(spring.tilt)]
     names += ["axial_clearance"] if math.isfinite(spring.axial) else []
     changed = {name: _NONE for name in names if getattr(own, name) == 0.0}
+    changed |= {"radial_clearance": 0.0} if isinstance(own, JointLimits) else {}  # takes no part: theory 9
     return replace(own, **changed, **{f"{name}_range": None for name in changed})  # type: ignore[arg-type]
 
 

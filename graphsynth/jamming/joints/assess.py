@@ -233,8 +233,9 @@ def assess_coupled(
 def _report(given: JointProblem, motion: Motion, condition: Condition, begin: float) -> CoupledReport:
     """Assess at the samples."""
     keep = np.flatnonzero(motion.assembled)
-    tilt, scale = given.solve(motion.poses[keep]), given.solve(motion.poses[keep], "scale")
-    layout = given.layout
+    layout, tilt = given.layout, given.solve(motion.poses[keep])
+    played = np.isfinite(layout.end_float) & (layout.end_float > 0.0)  # without any both factors are one
+    scale = given.solve(motion.poses[keep], "scale") if played.any() else tilt
 
     def spread(values: Array) -> Array:
         """Repeat for all inputs; NaN where the mechanism is not assembled."""
@@ -247,9 +248,7 @@ def _report(given: JointProblem, motion: Motion, condition: Condition, begin: fl
         allowed = np.where(scale.lower > 0.0, 1.0 / scale.lower, math.inf)
         lean = np.hypot(tilt.tau[..., 0], tilt.tau[..., 1])
         used = np.where(layout.limit > 0.0, lean / (tilt.lower[:, None] * layout.limit), 0.0)
-        slip = np.where(
-            np.isfinite(layout.end_float) & (layout.end_float > 0.0), np.abs(tilt.zeta) / layout.end_float, 0.0
-        )
+        slip = np.where(played, np.abs(tilt.zeta) / layout.end_float, 0.0)
     used = np.where(tilt.lower[:, None] > 0.0, used, 0.0)
     verdict, reason = _verdict(scale.lower, motion, keep)
     inputs, rows, notes = motion.inputs[keep], [], []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, NamedTuple, TypeAlias
 
@@ -98,15 +99,12 @@ def _round(limits: Any) -> bool:
     return isinstance(limits, Bearing)
 
 
-def _with_play(limits: Any, play: EndFloat) -> JointLimits | SlideLimits:
+def _with_play(limits: Bearing | JointLimits | SlideLimits, play: EndFloat) -> JointLimits | SlideLimits:
     """Limits with an end float, which is twice what the joint may slip to either side."""
     if isinstance(limits, Bearing):
         limits = bearing_limits(limits)
     ends = 0.5 * play.least, 0.5 * play.most
-    kept = {name: getattr(limits, name) for tilt in limits.tilts for name in (tilt, f"{tilt}_range")}
-    middle = 0.5 * (ends[0] + ends[1])
-    found: JointLimits | SlideLimits = type(limits)(**kept, axial_clearance=middle, axial_clearance_range=ends)
-    return found
+    return replace(limits, axial_clearance=0.5 * (ends[0] + ends[1]), axial_clearance_range=ends)
 
 
 def fit_limits(given: FitClearance) -> JointLimits:

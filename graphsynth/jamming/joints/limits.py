@@ -68,7 +68,10 @@ class JointLimits:
     axial_clearance : float
         Axial clearance (end float): largest slip to either side, in the length unit of the mechanism; ``math.inf`` for
         a joint that floats.
-    tilt_range, axial_clearance_range : (float, float), optional
+    radial_clearance : float
+        Largest shift across the axis, any tilt beside it, in the same unit.  Only exact closure counts it: to first
+        order it changes nothing (theory/what-binding-costs 9), and proofs about small tilts refuse it.
+    tilt_range, axial_clearance_range, radial_clearance_range : (float, float), optional
         Tolerance boxes; the value itself by default.
 
     Examples
@@ -81,10 +84,15 @@ class JointLimits:
     axial_clearance: float = 0.0
     tilt_range: Range | None = None
     axial_clearance_range: Range | None = None
+    radial_clearance: float = 0.0
+    radial_clearance_range: Range | None = None
     tilts: ClassVar[tuple[str, ...]] = ("tilt",)
+    names: ClassVar[tuple[str, ...]] = (*tilts, "axial_clearance", "radial_clearance")
 
     def __post_init__(self) -> None:
-        _fill(self, _limit, *self.tilts, "axial_clearance")
+        _fill(self, _limit, *self.names)
+        if bounds(self, "radial_clearance")[1] == math.inf:
+            raise GeometryError("radial_clearance = inf would leave links that are not joined; give a length")
 
 
 @dataclass(frozen=True)
@@ -102,17 +110,23 @@ class SlideLimits:
     pitch_range: Range | None = None
     axial_clearance_range: Range | None = None
     tilts: ClassVar[tuple[str, ...]] = ("roll", "pitch")
+    names: ClassVar[tuple[str, ...]] = (*tilts, "axial_clearance")
 
     def __post_init__(self) -> None:
-        _fill(self, _limit, *self.tilts, "axial_clearance")
+        _fill(self, _limit, *self.names)
 
 
 Limits: TypeAlias = JointLimits | SlideLimits
 
 
+def shift_range(own: Limits) -> Range:
+    """Return the tolerance box of the largest shift across the axis of a joint; a guide has none."""
+    return bounds(own, "radial_clearance") if isinstance(own, JointLimits) else (0.0, 0.0)
+
+
 def chosen(own: Limits, value: Callable[[Limits, str], float]) -> Limits:
     """Return limits without ranges, each the value that is chosen of it by name."""
-    values: Any = {name: value(own, name) for name in (*own.tilts, "axial_clearance")}
+    values: Any = {name: value(own, name) for name in own.names}
     return type(own)(**values)
 
 

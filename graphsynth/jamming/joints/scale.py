@@ -256,7 +256,8 @@ class LimitSensitivity(NamedTuple):
     ``scale`` is the smallest allowed scale over the range then, and ``binds_at`` the input where it is reached;
     ``gain`` its relative growth per relative growth of the limit (0.4: ten percent more limit, four percent more
     misalignment); ``promised`` the same from the shadow price at the worst input, never less; ``without`` the smallest
-    scale if the joint had no such limit at all: no more can be had from this joint alone.
+    scale if the joint had no such limit at all: no more can be had from this joint alone (NaN for a shift across the
+    axis, without whose limit the links are not joined).
     """
 
     joint: tuple[int, int]
@@ -290,7 +291,7 @@ class SensitivityTable:
             if gain > 0.0:
                 lines.append(
                     f"  joint {a}-{b} {what:5s} {self.by:+.0%}: scale {scale:.6g}, gain {gain:.3f}, binds at "
-                    f"{binds_at:.6g}; without limit {without:.6g}"
+                    f"{binds_at:.6g}{'' if math.isnan(without) else f'; without limit {without:.6g}'}"
                 )
         if rest := sum(row.gain <= 0.0 for row in self.rows):
             lines.append(f"  {rest} other limits gain nothing alone")

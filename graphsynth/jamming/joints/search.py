@@ -276,7 +276,7 @@ def jamming_member(work: Work, pieces: Found, own: Mask) -> MemberWitness | None
             return found
     left = np.flatnonzero(own & (pieces.upper > 1.0))
     boxes = [bounds(tilt, name) for tilt in work.given.misalignments for name in ("alpha", "direction")]
-    boxes += [bounds(own, name) for own in work.given.limits for name in (*own.tilts, "axial_clearance")]
+    boxes += [bounds(own, name) for own in work.given.limits for name in own.names]
     if left.size == 0 or not (work.box.size or any(low < high for low, high in boxes)):
         return None
     tilts = tuple(tilt.sharp() for tilt in work.given.misalignments)
@@ -320,7 +320,7 @@ def limits_chosen(given: JointProblem, limits: tuple[Limits, ...]) -> tuple[tupl
     """Return names and values of the limits that a problem leaves a range, wider than what encloses one number."""
     found = []
     for joint, limit, own in zip(given.mechanism.joints, given.limits, limits):
-        for name in (*limit.tilts, "axial_clearance"):
+        for name in limit.names:
             low, high = bounds(limit, name)
             if high - low > _ROUNDING * high:
                 found.append((f"{name.replace('_', ' ')} of joint {joint.a}-{joint.b}", getattr(own, name)))

@@ -67,7 +67,7 @@ def changed(given: JointProblem, change: Change) -> JointProblem:
     for k, limit in enumerate(given.limits):
         limit = other.get(k, limit)
         values: Any = {}
-        for name in (*limit.tilts, "axial_clearance"):
+        for name in limit.names:
             values[name] = getattr(limit, name) * change.limits if getattr(limit, name) else 0.0
             values[f"{name}_range"] = _times(bounds(limit, name), change.limits)
         limits.append(replace(limit, **values))

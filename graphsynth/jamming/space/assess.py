@@ -86,11 +86,10 @@ def _tabled(report: CoupledReport, along: Along) -> CoupledReport:
     factor = tables["factor"]
     worst = int(np.argmax(np.where(np.isnan(factor), -1.0, factor)))
     tight = int(np.argmin(np.where(np.isnan(tables["allowed_scale"]), math.inf, tables["allowed_scale"])))
-    slope = found[int(np.searchsorted(keep, tight))].slope
-    rows = [Sensitivity(*name, price / slope) for name, price in zip(given.names, tables["shadow_price"][tight])]
-    rows += [
-        Sensitivity(p, "play", price / slope) for p, price in zip(given.pairs, tables["axial_shadow_price"][tight])
-    ]
+    model, least, rows = along.model(NOTHING), found[int(np.searchsorted(keep, tight))], []
+    if 0.0 < least.scale < math.inf:
+        for own, price in zip(model.bounds, prices(model, least.optimum).tolist()):
+            rows.append(Sensitivity(given.mechanism.joints[own.joint].pair, own.kind, price / least.slope))
     verdict, reason = _verdict(factor[keep], motion)
     lost = int(np.isnan(factor[keep]).sum())
     notes = tuple(note for note in report.notes if "small tilts" not in note)
@@ -123,6 +122,8 @@ def _used(tables: dict[str, Array], row: int, given: JointProblem, along: Along,
     for bound, price in zip(model.bounds, share.tolist()):
         pair = given.mechanism.joints[bound.joint].pair
         size = _size(bound, found.q)
+        if bound.kind == "shift":
+            continue
         if bound.kind == "play":
             column = given.pairs.index(pair)
             tables["axial_clearance_used"][row, column] = size / bound.limit

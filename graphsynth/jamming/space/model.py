@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval, cos, sin, tan
-from graphsynth.jamming.joints.limits import Limits, bounds
+from graphsynth.jamming.joints.limits import Limits, bounds, shift_range
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -65,9 +65,9 @@ class Seat:
 class SpaceJoint:
     """A joint between links a and b with its seats.
 
-    ``limits``: largest tilt and slide (of a guide roll and pitch, by components of x); ``radial`` the largest shift
-    across the axis.  ``driven``: the turn (of a guide the travel along the x axis of seat a) is given.  A guide
-    (``guide``) travels along x and does not turn, a slot (``guide`` and ``turns``) does both.
+    ``limits``: largest tilt, slide and shift (of a guide roll and pitch, by components of x).  ``driven``: the turn
+    (of a guide the travel along the x axis of seat a) is given.  A guide (``guide``) travels along x and does not turn,
+    a slot (``guide`` and ``turns``) does both.
     ``parameter``: its turn is this parameter of the model, at most ``lean``; no limits, and no joint of the mechanism.
     """
 
@@ -76,7 +76,6 @@ class SpaceJoint:
     seat_a: Seat
     seat_b: Seat
     limits: Limits
-    radial: float = 0.0
     driven: bool = False
     guide: bool = False
     turns: bool = True
@@ -167,8 +166,8 @@ class SpaceModel:
                 TURN: joint.turns and joint.parameter < 0 and not (joint.driven and not joint.guide),
                 TILT_X: tilts[0],
                 TILT_Y: tilts[-1],
-                SHIFT_X: (joint.guide and not joint.driven) or joint.radial > 0.0,
-                SHIFT_Y: joint.radial > 0.0,
+                SHIFT_X: not joint.driven if joint.guide else shift_range(joint.limits)[1] > 0.0,
+                SHIFT_Y: shift_range(joint.limits)[1] > 0.0,
                 SLIDE: bounds(joint.limits, "axial_clearance")[1] > 0.0,
             }
             for place, wanted in sizes.items():
@@ -204,13 +203,15 @@ class SpaceModel:
                 box = bounds(joint.limits, name)
                 if 0.0 < box[1] < _FREE:
                     found.append(Bound(k, name, tuple(own), getattr(joint.limits, name), True, box))
-            if joint.radial > 0.0 and not joint.guide:
-                size = joint.radial / self.unit
-                found.append(Bound(k, "shift", tuple(columns[SHIFT_X:SLIDE]), size, False, (size, size)))
-            low, high = (end / self.unit for end in bounds(joint.limits, "axial_clearance"))
-            if 0.0 < high < math.inf:
-                size = joint.limits.axial_clearance / self.unit
-                found.append(Bound(k, "play", (columns[SLIDE],), size, False, (low, high)))
+            across = columns[SHIFT_Y:SLIDE] if joint.guide else columns[SHIFT_X:SLIDE]
+            size = getattr(joint.limits, "radial_clearance", 0.0)
+            for kind, own, limit, box in (
+                ("shift", across, size, shift_range(joint.limits)),
+                ("play", columns[SLIDE:], joint.limits.axial_clearance, bounds(joint.limits, "axial_clearance")),
+            ):
+                if 0.0 < box[1] < math.inf:
+                    low, high = (end / self.unit for end in box)
+                    found.append(Bound(k, kind, tuple(own), limit / self.unit, False, (low, high)))
         return tuple(found)
 
     @cached_property

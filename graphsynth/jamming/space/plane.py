@@ -91,7 +91,7 @@ def in_space(given: JointProblem, box: ParameterBox | None = None) -> SpaceModel
             seats.append(seat)
         own_driven = joint.pair in driven
         turns = not isinstance(joint, Prismatic)
-        joints.append(SpaceJoint(links[0], links[1], seats[0], seats[1], limits, 0.0, own_driven, guide, turns))
+        joints.append(SpaceJoint(links[0], links[1], seats[0], seats[1], limits, own_driven, guide, turns))
     count = mechanism.graph.links + len(mounts)
     return SpaceModel((*joints, *mounts), count, mechanism.frame, 0 if box is None else box.size)
 

@@ -155,7 +155,9 @@ def compare_sensitivities(
             now = along.allowed_at(inputs[near], poses[near], _loosened(along, joint, what, 1.0 + by))[0]
             least = int(np.nanargmin(now))
             gain = (float(now[least]) / scale - 1.0) / by
-            without = float(np.nanmin(along.allowed_at(inputs, poses, _loosened(along, joint, what, math.inf))[0]))
+            without = math.nan  # of a shift: links without that limit are not joined
+            if what != "shift":
+                without = float(np.nanmin(along.allowed_at(inputs, poses, _loosened(along, joint, what, math.inf))[0]))
             own = float(now[least]), gain if gain > _NOTHING else 0.0, promised, float(inputs[near[least]]), without
             row = LimitSensitivity(pair, what, *own)
         rows.append(row)
@@ -173,6 +175,6 @@ def _promises(along: Along, least: Least) -> Iterator[tuple[int, str, float]]:
 def _loosened(along: Along, joint: int, what: str, factor: float) -> Change:
     """Return the change of one limit by a factor."""
     own = along.given.limits[joint]
-    name = "axial_clearance" if what == "play" else what
+    name = {"play": "axial_clearance", "shift": "radial_clearance"}.get(what, what)
     more: dict[str, Any] = {name: getattr(own, name) * factor, f"{name}_range": None}
     return Change(other=((joint, replace(own, **more)),))

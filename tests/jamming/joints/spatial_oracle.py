@@ -1,8 +1,9 @@
 """Exact tilts by brute force: links as rotation matrices in space, the least factor on all limits by optimization.
 
 Nothing of graphsynth is used but the plane poses to start from.  Of every moving link the rotation vector and the
-displacement are unknown; a joint keeps its centres on one axis of its seat, at most the play apart, and the angle
-between its axes within the limit.  What comes out is feasible, so it bounds the least factor from above.
+displacement are unknown; a joint keeps its centres on one axis of its seat, at most the play apart (and across it
+within a radial clearance, where it has one), and the angle between its axes within the limit.  What comes out is
+feasible, so it bounds the least factor from above.
 """
 
 import numpy as np
@@ -40,13 +41,16 @@ class Spatial:
     def gaps(self, x):
         """Distances of the centres across the axis (must vanish), and tilts and slips over their limits."""
         links, across, ratios = self.links(x), [], []
-        for joint, (tilt, play) in zip(self.joints, self.limits):
+        for joint, (tilt, play, *radial) in zip(self.joints, self.limits):
             if joint["driven"]:
                 continue
             (Ra, pa), (Rb, pb) = links[joint["a"]], links[joint["b"]]
             axis = Ra.apply(Z)
             d = pb + Rb.apply([*joint["at_b"], 0.0]) - pa - Ra.apply([*joint["at_a"], 0.0])
-            across += (Ra.inv().apply(d)[:2] / self.unit).tolist()
+            if radial:
+                ratios.append(np.linalg.norm(Ra.inv().apply(d)[:2]) / radial[0])
+            else:
+                across += (Ra.inv().apply(d)[:2] / self.unit).tolist()
             for limit, own in ((tilt, Rb.apply(Z) - (Rb.apply(Z) @ axis) * axis), (play, np.array([d @ axis]))):
                 if limit == 0.0:
                     across += ((Ra.inv().apply(own)[:2] if own.size > 1 else own) / self.unit).tolist()
@@ -58,13 +62,13 @@ class Spatial:
     def least_factor(self, starts=1):
         """Least factor on all limits that was found, and by how much the centres miss their axes."""
         x, least = self.solve(starts)
-        return least, float(np.abs(self.gaps(x)[0]).max())
+        return least, float(np.abs(self.gaps(x)[0]).max(initial=0.0))
 
     def solve(self, starts=1):
         """Return the best of local searches that close the loops, the first of them from the plane poses."""
         rng = np.random.default_rng(1)
         found = [self._search(0.5 * rng.standard_normal(6 * len(self.free)) * (k > 0)) for k in range(starts)]
-        missed = [float(np.abs(self.gaps(x)[0]).max()) for x in found]
+        missed = [float(np.abs(self.gaps(x)[0]).max(initial=0.0)) for x in found]
         least = [float(max(self.gaps(x)[1])) for x in found]
         best = min(range(starts), key=lambda k: (max(missed[k], 1e-7), least[k]))
         return found[best], least[best]
@@ -87,7 +91,7 @@ class Spatial:
 
 
 def spatial(mechanism, poses, tilt, limits):
-    """Set one pose of a mechanism up; ``limits`` (tilt, play) by pair."""
+    """Set one pose of a mechanism up; ``limits`` (tilt, play) or (tilt, play, radial clearance) by pair."""
     joints = []
     for joint in mechanism.joints:
         driven = joint.pair == (tilt.base, tilt.link)

@@ -42,10 +42,10 @@ def posed(limits, tilt, u=0.7):
 
 def models():
     """A tilted motor that is rigid, or tilts and shifts; a misaligned joint between moving links; a rigid rocker."""
-    loose = JointLimits(0.1, 0.05)
+    loose, shifting = JointLimits(0.1, 0.05), JointLimits(0.1, 0.05, radial_clearance=0.01)
     model, q = posed(loose, Misalignment(0, 1, 0.1, 0.3))
     yield model, q
-    joints = [replace(j, limits=loose, radial=0.01) for j in model.joints]
+    joints = [replace(j, limits=shifting) for j in model.joints]
     model = SpaceModel(tuple(joints), 4)
     mechanism = four_bar(2.0, 1.0, 2.5, 2.5)
     yield model, start(model, mechanism, simulate(mechanism, [0.7, 0.71]).poses[0])
