@@ -111,17 +111,14 @@ class SlideLimits:
     axial_clearance_range: Range | None = None
     tilts: ClassVar[tuple[str, ...]] = ("roll", "pitch")
     names: ClassVar[tuple[str, ...]] = (*tilts, "axial_clearance")
+    radial_clearance: ClassVar[float] = 0.0
+    radial_clearance_range: ClassVar[Range] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         _fill(self, _limit, *self.names)
 
 
 Limits: TypeAlias = JointLimits | SlideLimits
-
-
-def shift_range(own: Limits) -> Range:
-    """Return the tolerance box of the largest shift across the axis of a joint; a guide has none."""
-    return bounds(own, "radial_clearance") if isinstance(own, JointLimits) else (0.0, 0.0)
 
 
 def chosen(own: Limits, value: Callable[[Limits, str], float]) -> Limits:

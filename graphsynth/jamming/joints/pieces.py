@@ -25,7 +25,7 @@ from graphsynth.jamming.assembly.tubes import Tubes, columns_of, middles, prove_
 from graphsynth.jamming.joints.closure import Layout, leaning_points, leans, shifts_enclosed
 from graphsynth.jamming.joints.enclosure import Moving, Pieces, Rule, factor_range, lower_bounds, rule_of, upper_bounds
 from graphsynth.jamming.joints.exact import Neglected, neglected
-from graphsynth.jamming.joints.limits import Misalignment, bounds, shift_range
+from graphsynth.jamming.joints.limits import Misalignment, bounds
 from graphsynth.jamming.joints.program import JointProblem, PoseSolution, check_motion, solve_poses
 from graphsynth.tolerances.box import ParameterBox
 
@@ -198,11 +198,9 @@ class Work:
     ) -> None:
         self.given, self.motion, self.exact = given, motion, exact
         for joint, own in zip(motion.mechanism.joints, given.limits):
-            if shift_range(own)[1] > 0.0:
-                raise GeometryError(
-                    f"joint {joint.a}-{joint.b} has a radial clearance of {shift_range(own)[1]:g}, which proofs about "
-                    'small tilts do not count; ask model="exact", or leave it out'
-                )
+            if (most := bounds(own, "radial_clearance")[1]) > 0.0:
+                name = f"joint {joint.a}-{joint.b} has a radial clearance of {most:g}"
+                raise GeometryError(f'{name}, which small tilts do not count; ask model="exact", or leave it out')
         keep = np.flatnonzero(motion.assembled)
         ends = motion.inputs[keep]
         self.low, self.high = float(ends.min()), float(ends.max())

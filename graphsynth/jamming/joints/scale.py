@@ -256,8 +256,7 @@ class LimitSensitivity(NamedTuple):
     ``scale`` is the smallest allowed scale over the range then, and ``binds_at`` the input where it is reached;
     ``gain`` its relative growth per relative growth of the limit (0.4: ten percent more limit, four percent more
     misalignment); ``promised`` the same from the shadow price at the worst input, never less; ``without`` the smallest
-    scale if the joint had no such limit at all: no more can be had from this joint alone (NaN for a shift across the
-    axis, without whose limit the links are not joined).
+    scale if the joint had no such limit at all: no more can be had from this joint alone (of a shift it is NaN).
     """
 
     joint: tuple[int, int]

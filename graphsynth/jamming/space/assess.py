@@ -122,13 +122,11 @@ def _used(tables: dict[str, Array], row: int, given: JointProblem, along: Along,
     for bound, price in zip(model.bounds, share.tolist()):
         pair = given.mechanism.joints[bound.joint].pair
         size = _size(bound, found.q)
-        if bound.kind == "shift":
-            continue
         if bound.kind == "play":
             column = given.pairs.index(pair)
             tables["axial_clearance_used"][row, column] = size / bound.limit
             tables["axial_shadow_price"][row, column] = price
-        else:
+        elif bound.kind != "shift":
             column = given.names.index((pair, bound.kind))
             tables["consumption"][row, column] = size / (found.scale * bound.limit)
             tables["shadow_price"][row, column] = price

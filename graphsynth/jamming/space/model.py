@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval, cos, sin, tan
-from graphsynth.jamming.joints.limits import Limits, bounds, shift_range
+from graphsynth.jamming.joints.limits import Limits, bounds
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -162,12 +162,13 @@ class SpaceModel:
         found, count = np.full((len(self.joints), 6), -1), 0
         for k, joint in enumerate(self.joints):
             tilts = [bounds(joint.limits, name)[1] > 0.0 for name in joint.limits.tilts]
+            shifts = bounds(joint.limits, "radial_clearance")[1] > 0.0
             sizes = {
                 TURN: joint.turns and joint.parameter < 0 and not (joint.driven and not joint.guide),
                 TILT_X: tilts[0],
                 TILT_Y: tilts[-1],
-                SHIFT_X: not joint.driven if joint.guide else shift_range(joint.limits)[1] > 0.0,
-                SHIFT_Y: shift_range(joint.limits)[1] > 0.0,
+                SHIFT_X: not joint.driven if joint.guide else shifts,
+                SHIFT_Y: shifts,
                 SLIDE: bounds(joint.limits, "axial_clearance")[1] > 0.0,
             }
             for place, wanted in sizes.items():
@@ -204,14 +205,11 @@ class SpaceModel:
                 if 0.0 < box[1] < _FREE:
                     found.append(Bound(k, name, tuple(own), getattr(joint.limits, name), True, box))
             across = columns[SHIFT_Y:SLIDE] if joint.guide else columns[SHIFT_X:SLIDE]
-            size = getattr(joint.limits, "radial_clearance", 0.0)
-            for kind, own, limit, box in (
-                ("shift", across, size, shift_range(joint.limits)),
-                ("play", columns[SLIDE:], joint.limits.axial_clearance, bounds(joint.limits, "axial_clearance")),
-            ):
-                if 0.0 < box[1] < math.inf:
-                    low, high = (end / self.unit for end in box)
-                    found.append(Bound(k, kind, tuple(own), limit / self.unit, False, (low, high)))
+            for kind, name, own in (("shift", "radial", across), ("play", "axial", columns[SLIDE:])):
+                low, high = (end / self.unit for end in bounds(joint.limits, f"{name}_clearance"))
+                if 0.0 < high < math.inf:
+                    size = getattr(joint.limits, f"{name}_clearance") / self.unit
+                    found.append(Bound(k, kind, tuple(own), size, False, (low, high)))
         return tuple(found)
 
     @cached_property
