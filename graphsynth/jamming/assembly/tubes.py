@@ -286,8 +286,8 @@ def places(system: Positions, joints: tuple[int, ...], at: Placement, read: Call
     def full(pair: Pair) -> Interval:
         return Interval.stack([read(pair.x), read(pair.y)], axis=-1)
 
-    r, e, base = [], [], []
-    rails: dict[int, Interval] = {}
+    r: list[Interval] = []
+    e, base, rails = list(r), list(r), dict[int, Interval]()
     for k in joints:
         joint = system.mechanism.joints[k]
         A, B = system.ends(k, at)

@@ -51,7 +51,7 @@ class Moving(NamedTuple):
     def take(self, rows: NDArray[np.intp]) -> Moving:
         """Return some of the pieces."""
         here, slopes = (part[rows] for part in self[:4]), (part[:, rows] for part in self[4:9])
-        return Moving(*here, *slopes, self.sound[rows])
+        return Moving._make([*here, *slopes, self.sound[rows]])
 
 
 class Pieces(NamedTuple):
@@ -80,7 +80,7 @@ def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglect
     length = found.units.length
     if exact is not None:
         radii = exact.r, exact.e, exact.d, exact.about
-        at = Pieces(*(_around(part, radius) for part, radius in zip(at[:4], radii)))
+        at = Pieces._make([*(_around(part, radius) for part, radius in zip(at[:4], radii)), None])
     r, about = ((part - Interval(found.units.centre)) / length for part in (at.r, at.about))
     y, fine = _without_forbidden(layout, r, at.e, found.y)
     # sum of the loop wrenches through every joint, (N, joints, 3)

@@ -140,7 +140,7 @@ def neglected(
         rest[:, place] += sizes.way[:, kept[place]] * _rise(angles, kept[place])
     lift = rest @ np.abs(layout.incidence).T
     changes = (value * _ROUNDING for value in (moved_r, along, shift, moved_about, lift, wide))
-    return Neglected(*changes, narrow, play, np.asarray(sound & small))
+    return Neglected._make([*changes, narrow, play, np.asarray(sound & small)])
 
 
 def _shift(angles: _Angles, k: int) -> Array:

@@ -275,7 +275,7 @@ class Work:
         steps = steps - points(steps.mid)
         sound = middle.proved & fine
         wanted = zip(Places._fields, tubes.places, middle.places, rates)
-        narrow = {
+        narrow: dict[str, Any] = {
             name: _straight(whole, here, rate, steps, sound)
             for name, whole, here, rate in wanted
             if name != "rail" or layout.rails
