@@ -173,3 +173,25 @@ def test_an_impossible_task_gives_a_report_that_says_why() -> None:
 def test_shipped_tasks_are_done(name: str) -> None:
     report = execute(load_scene(name))
     assert any(record.good for record in report["records"])
+
+
+def test_verdicts_of_answers_that_fail_say_what_tells_against_them() -> None:
+    from types import SimpleNamespace
+
+    from graphsynth.pipeline.design.stages import _verdicts
+
+    failed = SimpleNamespace(
+        certificate=None, accepted=False, jam_margin=math.nan, reasons=("the range is not completed",)
+    )
+    changed = SimpleNamespace(
+        certificate=None,
+        accepted=False,
+        jam_margin=math.nan,
+        reasons=("an assembly mode changes", "the path is missed"),
+    )
+    task = scene(paths=[SEGMENT]).mechanism.task()
+    table = _verdicts(SimpleNamespace(task=task, answers=(failed, changed)))  # type: ignore[arg-type]
+    assert [row[1:3] for row in table.rows] == [
+        ("the range is not completed", "the range is not completed"),
+        ("turns fully, estimated", "an assembly mode changes"),
+    ]

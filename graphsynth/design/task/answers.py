@@ -198,7 +198,7 @@ def judged(task: DesignTask, found: Candidate) -> DesignedMechanism:
         **_bounds(task, motion, places, found.plan),
     }
     for target, error in zip(task.targets, errors):
-        name = type(target).__name__.removesuffix("Target").lower()
+        name = type(target).__name__.removesuffix("Target").lower().replace("poses", "motion")
         wrong[f"the {name}{_MISSED}"] = wrong.get(f"the {name}{_MISSED}", False) or not error <= target.tolerance
     margin = math.nan
     if task.misalignment is not None and not any(wrong.values()):

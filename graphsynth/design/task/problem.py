@@ -42,6 +42,8 @@ class Exact(NamedTuple):
     times: list[Array] | None
 
 
+#: Part of a range within which a time is at its end.
+_END = 1e-9
 #: Rounds in which samples come nearer to where bounds are worst; samples on either side, over the step before.
 _PASSES, _AROUND = 3, np.linspace(-1.0, 1.0, 17)
 
@@ -148,6 +150,9 @@ class TaskProblem:
                 J[..., rows.start] += along
             if rows.free:
                 unit = along / np.maximum(np.sqrt((along**2).sum(axis=1, keepdims=True)), 1e-300)
+                if model.task.drive != "rotation":  # what is nearest to an end of the range cannot slide beyond it
+                    part = rows.times / model.task.span
+                    unit = unit * ((part > _END) & (part < 1.0 - _END))[:, None]
                 J = J - unit[..., None] * (unit[..., None] * J).sum(axis=1, keepdims=True)
             if rows.picks is not None:
                 J = rows.picks.of(J)

@@ -318,7 +318,10 @@ def _screened(
     n, sets = len(wanted.points), len(moved.frames)
     few = np.unique(np.linspace(0, n - 1, min(n, _COMPARED)).round().astype(int))
     best, times, c = np.full(sets, np.inf), np.zeros((sets, n)), np.zeros((sets, 3), dtype=np.complex128)
-    joints = model.plan.design.joints_of(aim.link)
+    joints, sides = model.plan.design.joints_of(aim.link), model.plan.design.sides
+    assert model.task.lengths is not None
+    spread = np.hypot(*np.moveaxis(u.places[:, sides[:, 0]] - u.places[:, sides[:, 1]], 2, 0))
+    long = spread.max(axis=1, initial=1e-300) / model.task.lengths[1]
     for again in range(1 if aim.inputs is not None else _TRIED):
         point = u.places[:, joints].mean(axis=1) + random.normal(0.0, 0.8, (sets, 2))
         guess = point[:, :1] + 1j * point[:, 1:] if again or not wanted.closed else aim.place(u)
@@ -326,6 +329,8 @@ def _screened(
             some = own._replace(frames=own.frames[at], rates=own.rates[at])
             tried = _guesses(model, aim, some, guess[at], wanted)  # (sets, guesses, n)
             error, placement = _fitted(some, tried[:, :, few], wanted, few, held[at], goals)
+            # a small part of a curve is near to any line, but of a mechanism that is too large
+            error += np.maximum(np.log(np.abs(placement[..., 0]) * long[at, None]), 0.0)
             row, k = np.arange(len(error)), error.argmin(axis=1)
             better = error[row, k] < best[at]
             best[at] = np.where(better, error[row, k], best[at])

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 #: Frames of a picture in motion; answers in one chart.
 _FRAMES, _CURVES = 90, 3
 _WIDE, _HIGH = 460.0, 400.0
+#: Reasons, of `faults`, against a motion over the whole range, and against one branch.
+_STOPS = ("the range is not completed", "not closed after the turn")
+_CHANGES = ("the range is not completed", "two assembly modes meet or nearly meet", "an assembly mode changes")
 #: Distance of the bounds of the misalignment that is forgiven, and the time of its proof.
 _GAP, _SECONDS = 0.02, 5.0
 
@@ -128,8 +131,8 @@ def _verdicts(designs: Designs) -> Table:
         proved = proof is not None and proof.certified
         whole = task.drive == "rotation"
         turns = proved and (not whole or (proof is not None and proof.closed))
-        moves = "turns fully" if whole else "moves over its range"
-        row: list[object] = [str(place), f"{moves}, {_known(turns)}", f"one branch, {_known(proved)}"]
+        drive = _known("turns fully" if whole else "moves over its range", turns, answer, _STOPS)
+        row: list[object] = [str(place), drive, _known("one branch", proved, answer, _CHANGES)]
         rows.append([*row, _forgiven(designs, answer)] if not task.linear else row)
     columns = ["place", "drive", "branch"] + (["forgives a tilted axis [°] | .2f"] if not task.linear else [])
     note = "Proved: over the whole range, between the samples too, for the dimensions as they are. "
@@ -139,8 +142,10 @@ def _verdicts(designs: Designs) -> Table:
     return table("Verdicts", columns, rows, note.strip())
 
 
-def _known(proved: bool) -> str:
-    return "proved" if proved else "estimated"
+def _known(what: str, proved: bool, answer: DesignedMechanism, against: tuple[str, ...]) -> str:
+    """Say that something holds, and how that is known; or what tells against it."""
+    wrong = next((reason for reason in answer.reasons if reason in against), "")
+    return wrong or f"{what}, {'proved' if proved else 'estimated'}"
 
 
 def _forgiven(designs: Designs, answer: DesignedMechanism) -> float | None:
