@@ -234,7 +234,20 @@ def test_every_word_is_asked_for_and_every_word_asked_for_is_there():
     names = page_file("order.txt").split()
     text = page_file("index.html") + "".join(page_file(f"{name}.js") for name in names)
     known = languages()["en"]
-    built = {"tool.", "hint.", "template.", "name.", "pair.", "mode.", "do.", "language.", "said.", "fault.file."}
+    built = {
+        "tool.",
+        "hint.",
+        "template.",
+        "name.",
+        "pair.",
+        "mode.",
+        "do.",
+        "language.",
+        "said.",
+        "fault.file.",
+        "event.",
+        "know.",
+    }
     for key in known:
         assert f'"{key}"' in text or f"'{key}'" in text or any(key.startswith(start) for start in built), key
     for key in re.findall(
@@ -274,3 +287,76 @@ def test_nothing_is_parsed_as_markup_or_run_and_files_are_small(name):
     )
     assert not re.search(r"fetch\(|XMLHttpRequest|WebSocket|import\(|https?://(?!www\.w3\.org/2000/svg)", text)
     assert len(text.splitlines()) <= 400
+
+
+# --- Python, DXF, GIF, other frames
+
+
+@pytest.mark.parametrize("name", sorted(CASES))
+def test_the_python_text_makes_the_mechanism(scripts, name):
+    """What the page shows as Python is run, and its mechanism moves as the one on the page."""
+    data = to_dict(assembled(CASES[name]()))
+    again, text = scripts(
+        "const s = Bench.opened(Bench.checked(args[0])); return [Bench.written(s), Bench.toPython(s)]", data
+    )
+    making = text.partition("motion = ")[0]
+    space = {}
+    exec(making, space)
+    made, mine = space["mechanism"], Mechanism.from_json(json.dumps(again))
+    assert made.graph == mine.graph and made.joints == mine.joints and made.drivers == mine.drivers
+    assert set(mine.points) <= set(made.points)
+    assert text.endswith('motion.animate("mechanism.html")\n')
+
+
+def test_a_plain_drawing_is_short_python(scripts):
+    text = scripts(FOUR_BAR + "return Bench.toPython(s)")
+    assert "from_points" in text and text.count("\n") < 14
+
+
+def test_the_dxf_holds_links_and_joints(scripts, tmp_path):
+    ezdxf = pytest.importorskip("ezdxf")
+    text = scripts(FOUR_BAR + "return Bench.toDxf(s, [{points: [[0, 0], [1, 2], [3, 3]], closed: true}])")
+    path = tmp_path / "mechanism.dxf"
+    path.write_text(text)
+    found = ezdxf.readfile(path)
+    assert not found.audit().has_errors
+    lines = {(e.dxf.layer, len(e.vertices), e.is_closed) for e in found.modelspace().query("POLYLINE")}
+    links = {("LINK_1", 2, False), ("LINK_2", 3, True), ("LINK_3", 2, False)}
+    assert lines == links | {("PATHS", 3, True)}
+    centres = {tuple(round(c, 9) for c in e.dxf.center)[:2] for e in found.modelspace().query("CIRCLE")}
+    assert centres == {(-40, 0), (-40, 20), (30, 60), (-10, 80), (40, 0)}
+
+
+def test_a_gif_is_read_by_others(scripts, tmp_path):
+    """Three pictures with noise, so that the codes fill their table and it is begun anew."""
+    image = pytest.importorskip("PIL.Image")
+    found = scripts(
+        """let seed = 1; const lot = () => (seed = (seed * 48271) % 2147483647);
+           const pictures = [0, 1, 2].map(n => Uint8ClampedArray.from({length: 4 * 120 * 90},
+             (_, k) => (k % 4 === 3 ? 255 : ((lot() >> 5) % 8) * 32 + n)));
+           return [Array.from(Bench.toGif(120, 90, pictures, 5)), pictures.map(p => Array.from(p))];"""
+    )
+    path = tmp_path / "x.gif"
+    path.write_bytes(bytes(found[0]))
+    with image.open(path) as read:
+        assert (read.n_frames, read.size, read.info["duration"], read.info["loop"]) == (3, (120, 90), 50, 0)
+        for n, pixels in enumerate(found[1]):
+            read.seek(n)
+            ours = np.array(pixels).reshape(90, 120, 4)[..., :3]
+            theirs = np.array(read.convert("RGB")).astype(int)
+            assert np.median(np.abs(ours - theirs)) <= 32 and theirs.shape == ours.shape
+    flat = scripts(
+        """const p = Uint8ClampedArray.from({length: 4 * 50 * 40}, (_, k) => [200, 10, 40, 255][k % 4]);
+           return Array.from(Bench.toGif(50, 40, [p], 5));"""
+    )
+    path.write_bytes(bytes(flat))
+    with image.open(path) as read:
+        assert np.unique(np.array(read.convert("RGB")).reshape(-1, 3), axis=0).tolist() == [[200, 10, 40]]
+
+
+def test_the_picture_is_scaled_about_the_first_place(scripts):
+    found = scripts(
+        """return Bench.scaledPicture({x: 10, y: 50, width: 200, height: 100, href: ""},
+             [{x: 20, y: 30}, {x: 60, y: 30}], 10);"""
+    )
+    assert (found["x"], found["y"], found["width"], found["height"]) == (17.5, 35, 50, 25)

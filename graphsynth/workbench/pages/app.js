@@ -14,6 +14,8 @@
       this.mode = "draw";       // "draw" changes the drawing, "run" moves the mechanism
       this.pose = null;
       this.options = { grid: true, snap: true, names: true };
+      this.motion = null;       // what moves it, once the kernels are loaded
+      this.faulty = [];         // links that are too much
       this.measured = null;
       this.background = null;
     }
@@ -27,6 +29,7 @@
     take(sheet, { select, say } = {}) {
       this.draft = null;
       this.pose = null;
+      if (this.motion) this.motion.pause();
       this.history.push(sheet);
       this.selection = (select || this.selection).filter(id => this.has(id));
       this.changed("sheet");
@@ -37,7 +40,7 @@
     /** Try a change of the drawing; what cannot be done is said and leaves it as it was. */
     attempt(change) {
       try {
-        const found = change(this.sheet);
+        const found = change(this.posed());
         if (found) this.take(found.sheet, found);
         return true;
       } catch (fault) {
@@ -50,11 +53,17 @@
     /** Draw on what is seen: the pose that is shown becomes the drawn position. */
     rebase() {
       if (!this.pose) return;
-      const rows = Object.keys(this.sheet.links).map((id, k) => Array.from(this.pose.subarray(3 * k, 3 * k + 3)));
-      const sheet = Bench.rebased(this.sheet, rows);
+      const sheet = this.posed();
       this.pose = null;
       this.history.push(sheet);
       this.changed("sheet");
+    }
+
+    /** What is shown as a drawing: the pose that is seen is the drawn position. */
+    posed() {
+      if (!this.pose) return this.sheet;
+      const rows = Object.keys(this.sheet.links).map((id, k) => Array.from(this.pose.subarray(3 * k, 3 * k + 3)));
+      return Bench.rebased(this.sheet, rows);
     }
 
     undo() { this.step("undo", this.history.canUndo); }
@@ -83,11 +92,15 @@
       this.picks = [];
       if (this.mode === "run" && tool !== "select") this.setMode("draw");
       this.changed("tool");
+      if (tool === "picture" && !this.background) Bench.do.picture(this);
       this.say(`hint.${tool}`);
     }
     setMode(mode) {
       if (mode === this.mode) return;
-      if (mode === "draw") this.rebase();
+      if (mode === "draw") {
+        if (this.motion) this.motion.pause();
+        this.rebase();
+      }
       this.mode = mode;
       this.picks = [];
       this.changed("tool");

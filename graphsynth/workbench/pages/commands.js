@@ -2,7 +2,7 @@
 "use strict";
 
 (function () {
-  Bench.do = {
+  Object.assign(Bench.do, {
     undo: app => app.undo(),
     redo: app => app.redo(),
     delete: app => app.attempt(sheet => {
@@ -40,7 +40,7 @@
       if (app.picks.length || app.measured) { app.picks = []; app.measured = null; app.changed("view"); } else if (app.tool !== "select") app.pick("select");
       else app.select([]);
     },
-  };
+  });
 
   /** Keys: with Ctrl (or the command key) written "^". */
   Bench.KEYS = {

@@ -15,13 +15,6 @@
   const KEPT = "workbench-drawing";
   const whole = app => Bench.written(app.posed());
 
-  /** What is shown as a drawing: the pose that is seen is the drawn position. */
-  Bench.App.prototype.posed = function () {
-    if (!this.pose) return this.sheet;
-    const rows = Object.keys(this.sheet.links).map((id, k) => Array.from(this.pose.subarray(3 * k, 3 * k + 3)));
-    return Bench.rebased(this.sheet, rows);
-  };
-
   Bench.do.save = app => {
     Bench.download("mechanism.toml", Bench.toToml(whole(app), app.sheet.unit), "application/toml");
     app.say("said.saved", { file: "mechanism.toml" });

@@ -15,6 +15,7 @@
     gears: "M8 13m-5.5 0a5.5 5.5 0 1 0 11 0a5.5 5.5 0 1 0 -11 0M17.5 8m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0M8 13h.1M17.5 8h.1",
     driver: "M17 7A7 7 0 1 0 19 12M19 12L21.5 9M19 12L16 10M12 12h.1",
     trace: "M3 17C7 3 12 3 13 10C14 18 19 18 21 9M13 10m-2 0a2 2 0 1 0 4 0a2 2 0 1 0 -4 0",
+    picture: "M3 5H21V19H3ZM3 16L8 11L12 15L15 12L21 17M15.5 8.5m-1.5 0a1.5 1.5 0 1 0 3 0a1.5 1.5 0 1 0 -3 0",
     measure: "M3 15L15 3L21 9L9 21ZM7 11L9 13M10 8L13 11M13 5L15 7",
   };
   const icon = name => Bench.svg("svg", { viewBox: "0 0 24 24", width: 22, height: 22, "aria-hidden": "true" }, Bench.svg("path", { d: ICONS[name] }));
@@ -128,14 +129,22 @@
     const paint = () => {
       asked = false;
       const { options } = app;
-      app.view.build(app.sheet, { selection: app.selection, names: options.names, grid: options.grid });
+      app.view.build(app.sheet, { selection: app.selection, names: options.names, grid: options.grid, faulty: app.faulty });
+      Bench.paintPicture(app);
+      Bench.paintCurves(app, app.motion);
+      Bench.paintPose(app, app.motion);
       stage.over();
     };
     const soon = () => { if (!asked) { asked = true; requestAnimationFrame(paint); } };
     app.on("sheet view tool draft", soon);
-    app.on("pose", () => app.view.show(app.sheet));
-    app.on("sheet view tool draft pose", () => { app.view.pose = app.pose; });
-    app.on("sheet view tool", kind => {
+    app.on("sheet view tool draft pose rest", () => { app.view.pose = app.pose; });
+    app.on("pose", () => {
+      app.view.show(app.sheet);
+      Bench.paintPose(app, app.motion);
+    });
+    app.on("rest", soon);
+    app.on("sheet rest", () => { if (!app.motion || !app.motion.playing) Bench.showKnown(app, $("known")); });
+    app.on("sheet view tool rest", kind => {
       Bench.showPanel(app, $("chosen"));
       $("undo").disabled = !app.history.canUndo;
       $("redo").disabled = !app.history.canRedo;
@@ -163,7 +172,11 @@
     menus(app);
     Bench.listen(app);
     for (const element of document.querySelectorAll("[data-mode]")) if (element !== document.body) element.addEventListener("click", () => app.setMode(element.dataset.mode));
-    if (Bench.begin) Bench.begin(app);
+    Bench.charts(app, $("charts"));
+    if (typeof Engine !== "undefined") try {
+      app.motion = new Bench.Motion(app, await Kernels.load("motion"));
+      Bench.player(app);
+    } catch (error) { app.fault(new Bench.Fault("fault.kernels", { error: String(error.message).slice(0, 80) })); }
     speak(app);
     if (!(await Bench.openAddress(app))) {
       const first = Bench.given ? Bench.fromText(Bench.given) : location.hash ? null : await Bench.kept();

@@ -25,7 +25,7 @@
   }
 
   function pointPanel(app, id) {
-    const { sheet } = app, point = sheet.points[id], links = Bench.linksAt(sheet, id), { unit } = sheet;
+    const sheet = app.posed(), point = sheet.points[id], links = Bench.linksAt(sheet, id), { unit } = sheet;
     const others = Object.keys(sheet.points).filter(own => own !== id).map(own => sheet.points[own].name);
     const put = change => take(app, s => Bench.placed(s, { [id]: change(s.points[id]) }));
     const set = more => take(app, s => ({ ...s, points: { ...s.points, [id]: { ...s.points[id], ...more } } }));
@@ -45,7 +45,7 @@
   /** The driver of a joint: there or not, its speed, where it begins. */
   function driverPart(app, links) {
     if (!links) return [];
-    const { sheet } = app, own = sheet.drivers.find(d => links.includes(d.base) && links.includes(d.link));
+    const sheet = app.posed(), own = sheet.drivers.find(d => links.includes(d.base) && links.includes(d.link));
     const box = check("panel.driven", Boolean(own), () => take(app, s => Bench.toggleDriver(s, ...links)));
     if (!own || own.law.kind !== "linear") return [box];
     const set = law => take(app, s => ({ ...s, drivers: s.drivers.map(d => (d === own ? { ...d, law: { ...d.law, ...law } } : d)), range: null }));
@@ -58,7 +58,7 @@
   }
 
   function linkPanel(app, id) {
-    const { sheet } = app, link = sheet.links[id], { unit } = sheet;
+    const sheet = app.posed(), link = sheet.links[id], { unit } = sheet;
     const others = Object.keys(sheet.links).filter(own => own !== id).map(own => sheet.links[own].name);
     const name = field(app, "panel.name", link.name, text => take(app, s => ({
       ...s, links: { ...s.links, [id]: { ...s.links[id], name: text.trim() ? named(text, others) : "" } } })));
@@ -96,7 +96,7 @@
   }
 
   function pairPanel(app, id) {
-    const { sheet } = app, pair = sheet.pairs[id];
+    const sheet = app.posed(), pair = sheet.pairs[id];
     const set = more => take(app, s => ({ ...s, pairs: { ...s.pairs, [id]: { ...s.pairs[id], ...more } } }));
     const parts = [make("h3", {}, Bench.word(`pair.${pair.kind}`)),
       make("p", { class: "soft" }, Bench.word("panel.pair", { a: Bench.linkName(sheet, pair.a), b: Bench.linkName(sheet, pair.b) }))];
@@ -110,7 +110,7 @@
     }
     if (pair.kind === "gear") {
       const teeth = k => text => {
-        const own = app.sheet.pairs[id], radii = [...own.radii];
+        const own = app.posed().pairs[id], radii = [...own.radii];
         radii[k] = number(text, sheet.unit);
         take(app, s => Bench.withTeeth(s, id, ...radii, own.internal));
       };

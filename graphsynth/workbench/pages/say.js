@@ -6,6 +6,9 @@ var Bench = globalThis.Bench = globalThis.Bench || {};
   const tables = {};
   let language = "en";
 
+  /** What menus, buttons and keys do, by name. */
+  Bench.do = {};
+
   /** Take the words of a language; the page and its tests hand them in. */
   Bench.words = (name, table) => { tables[name] = table; };
   Bench.languages = () => Object.keys(tables);

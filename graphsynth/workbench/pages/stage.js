@@ -120,7 +120,8 @@
       const { app } = this, { picks } = app, tool = Bench.TOOLS[app.tool];
       if (app.mode !== "draw" || !picks.length || picks.length < Math.min(tool.picks, 2)) return;
       app.picks = [];
-      if (app.tool === "measure") { app.measured = picks; app.changed("view"); this.sayMeasure(picks); }
+      if (app.tool === "picture") Bench.askScale(app, picks);
+      else if (app.tool === "measure") { app.measured = picks; app.changed("view"); this.sayMeasure(picks); }
       else app.attempt(sheet => tool.apply(sheet, picks));
       this.over();
     }
@@ -241,7 +242,13 @@
     key(event) {
       const { app, view } = this;
       const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
-      if (event.ctrlKey || event.metaKey || event.altKey || app.mode === "run") return;
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (app.mode === "run") {
+        if (!way) return;
+        Bench.stepInput(app, way[0] + way[1]);
+        event.preventDefault();
+        return;
+      }
       const step = Bench.gridStep(view.camera.scale) * (event.shiftKey ? 5 : 1);
       if (way && app.tool === "select" && app.selection.length) {
         const ids = Bench.pointsOf(app.sheet, app.selection);

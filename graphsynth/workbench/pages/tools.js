@@ -79,6 +79,7 @@
     driver: { key: "d", picks: 1, apply: driver },
     trace: { key: "k", picks: 1, apply: trace },
     measure: { key: "m", picks: 2 },
+    picture: { key: "i", picks: 2 },
   };
 
   /** Where a place snaps to: {x, y, kind}.  Points first, then the angle from where a line begins, then the grid. */

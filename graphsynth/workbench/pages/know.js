@@ -1,0 +1,92 @@
+// What is known of the drawing: mobility, what is too much or loose, structural groups, how far it turns, other drivers
+// and other frames.
+"use strict";
+
+(function () {
+  const { make } = Bench;
+
+  /** The sheet with another link as the frame. */
+  Bench.inverted = (sheet, id) => {
+    if (id === Bench.GROUND) return sheet;
+    const swap = own => (own === id ? Bench.GROUND : own === Bench.GROUND ? id : own);
+    const links = Object.fromEntries(Object.keys(sheet.links).map(own => [own, { ...sheet.links[swap(own)], name: "" }]));
+    const pairs = Object.fromEntries(Object.entries(sheet.pairs).map(([key, pair]) => [key, { ...pair, a: swap(pair.a), b: swap(pair.b) }]));
+    const points = Object.fromEntries(Object.entries(sheet.points).map(([key, point]) =>
+      [key, point.tree ? { ...point, tree: point.tree.map(pair => pair.map(swap)) } : point]));
+    const drivers = sheet.drivers.map(d => ({ ...d, base: swap(d.base), link: swap(d.link) }));
+    return Bench.settled({ ...sheet, links, pairs, points, drivers, range: null });
+  };
+
+  const idsOf = (app, numbers) => numbers.map(k => Object.keys(app.sheet.links)[k]);
+  const named = (app, numbers) => idsOf(app, numbers).map(id => Bench.linkName(app.sheet, id)).join(", ");
+
+  function fault(app, { kind, tooMany, loose, link }) {
+    if (kind === "over-constrained") return Bench.word("know.over", { links: named(app, tooMany), loose: named(app, loose) || "–" });
+    if (kind === "drivers") return Bench.word("know.drivers", { n: app.motion.engine.mobility, have: app.sheet.drivers.length });
+    return Bench.word(`know.${kind}`, { links: link === null ? "–" : named(app, [Number(link)]) });
+  }
+
+  /** A row of buttons, one for each entry. */
+  const buttons = entries => make("div", { class: "acts" }, ...entries.map(([text, act, more = {}]) => make("button", { type: "button", on: { click: act }, ...more }, text)));
+
+  function rotation(app, motion) {
+    const swept = motion.sweep();
+    if (!swept) return [];
+    const first = swept.inputs[0], last = swept.inputs[swept.inputs.length - 1];
+    const text = swept.full ? Bench.word("know.full") : Bench.word("know.range", { from: Bench.shownInput(motion, first), to: Bench.shownInput(motion, last) });
+    const angles = [];
+    const steps = swept.margins.length / swept.inputs.length;
+    for (let i = 0; i < swept.inputs.length; i++) {
+      for (const { angle } of motion.engine.transmission(swept.margins.subarray(i * steps, (i + 1) * steps))) if (Number.isFinite(angle)) angles.push(angle);
+    }
+    const rows = [[Bench.word("know.rotation"), text]];
+    if (angles.length) rows.push([Bench.word("know.transmission"), `${Bench.shown((Math.min(...angles) * 180) / Math.PI, 3)}°`]);
+    const events = swept.events.map(event => [motion.told(event), () => { motion.to(event.input); app.changed("rest"); }]);
+    return [Bench.rows(rows), events.length ? buttons(events) : null];
+  }
+
+  function drivers(app, motion) {
+    const { sheet } = app, data = Bench.written(sheet), ids = Object.keys(sheet.links);
+    const free = motion.engine.drivers().map(k => data.joints[k]).filter(j =>
+      !sheet.drivers.some(d => [d.base, d.link].includes(ids[j.a]) && [d.base, d.link].includes(ids[j.b])));
+    if (!free.length) return [];
+    return [make("h3", {}, Bench.word("know.others")), buttons(free.slice(0, 12).map(j => {
+      const [base, link] = j.b === ids.indexOf(Bench.GROUND) ? [j.b, j.a] : [j.a, j.b];
+      const text = Bench.word("know.drive", { a: Bench.linkName(sheet, ids[link]), b: Bench.linkName(sheet, ids[base]) });
+      return [text, () => app.attempt(s => ({
+        sheet: { ...s, range: null, drivers: [{ base: ids[base], link: ids[link], law: { kind: "linear", rate: 1, offset: 0 } }, ...s.drivers.slice(1)] },
+        say: ["said.driven", { a: Bench.linkName(s, ids[link]), b: Bench.linkName(s, ids[base]) }],
+      }))];
+    }))];
+  }
+
+  function frames(app) {
+    const { sheet } = app, others = Object.keys(sheet.links).filter(id => id !== Bench.GROUND);
+    return [make("h3", {}, Bench.word("know.frames")), buttons(others.map(id => [Bench.linkName(sheet, id), () =>
+      app.attempt(s => ({ sheet: Bench.inverted(s, id), select: [], say: ["said.inverted", { a: Bench.linkName(s, id) }] }))]))];
+  }
+
+  /** The section "Known". */
+  Bench.showKnown = (app, place) => {
+    const { motion } = app, engine = motion && motion.current();
+    app.faulty = [];
+    place.closest("section").hidden = !motion;
+    if (!engine) { place.replaceChildren(make("p", { class: "soft" }, Bench.word("know.nothing"))); return; }
+    const rows = [[Bench.word("know.mobility"), String(engine.mobility)]], parts = [];
+    if (engine.fault) {
+      app.faulty = idsOf(app, engine.fault.tooMany || []);
+      parts.push(make("p", { class: "warn" }, fault(app, engine.fault)));
+    } else {
+      const groups = engine.groups.map(({ kind, links }) => `${Bench.word("know.group", { kind: Bench.groupName(kind) })} (${named(app, links)})`).join("; ");
+      rows.push([Bench.word("know.groups"), groups || "–"]);
+    }
+    place.replaceChildren(...[Bench.rows(rows), ...parts, ...(motion.driven ? rotation(app, motion) : []),
+      ...(engine.mobility > 0 ? drivers(app, motion) : []), ...frames(app)].filter(Boolean));
+  };
+
+  /** The name of a group in the reader's language: dyads by their joints, larger ones by their links. */
+  Bench.groupName = kind => {
+    const many = /^group of (\d+) links$/.exec(kind);
+    return many ? Bench.word("know.many", { n: many[1] }) : kind;
+  };
+})();

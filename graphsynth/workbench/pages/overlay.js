@@ -1,0 +1,116 @@
+// What is drawn over the moving mechanism: paths of points, limits and dead centres, arrows, instant centres.
+"use strict";
+
+(function () {
+  const svg = Bench.svg;
+
+  /** Points whose paths are shown: [id, number of the link, place]. */
+  Bench.tracedPoints = sheet => Object.entries(sheet.points).filter(([, point]) => point.trace).map(([id, point]) => {
+    const links = Bench.linksAt(sheet, id), link = links.find(own => own !== Bench.GROUND) || Bench.GROUND;
+    return [id, Bench.linkNumber(sheet, link), [point.x, point.y]];
+  });
+
+  const rowOf = (poses, links, i, k) => Array.from(poses.subarray(3 * (i * links + k), 3 * (i * links + k) + 3));
+
+  /** Places of a point over a sweep. */
+  Bench.pathOver = (swept, links, k, at) =>
+    Array.from(swept.inputs, (_, i) => Bench.carried(rowOf(swept.poses, links, i, k), at));
+
+  /** Paths and marked places: after a change of the drawing, the branch or the view. */
+  Bench.paintCurves = (app, motion) => {
+    const { view, sheet } = app, layer = view.layers.curves, parts = [];
+    const swept = motion && app.options.curves && motion.driven ? motion.sweep() : null;
+    if (swept) {
+      const links = Object.keys(sheet.links).length;
+      Bench.tracedPoints(sheet).forEach(([id, k, at], n) => {
+        const path = Bench.pathOver(swept, links, k, at).map(place => view.px(place));
+        parts.push(svg("path", { class: `curve c${n % 4}`, "data-curve": id, d: Bench.pathOf(path.filter(p => p.every(Number.isFinite)), swept.full) }));
+        for (const event of swept.events) {
+          const pose = rowOf(swept.poses, links, motion.nearest(event.input), k), [cx, cy] = view.px(Bench.carried(pose, at));
+          if (Number.isFinite(cx)) parts.push(svg("circle", { class: `mark ${event.kind.replace(" ", "-")}`, cx, cy, r: 5 }, svg("title", {}, motion.told(event))));
+        }
+      });
+    }
+    layer.replaceChildren(...parts);
+  };
+
+  function arrow(from, by, kind) {
+    const length = Math.hypot(...by);
+    if (!(length > 3)) return [];
+    const [ux, uy] = [by[0] / length, by[1] / length], to = [from[0] + by[0], from[1] + by[1]], head = Math.min(9, length / 2);
+    const side = t => [to[0] - head * ux + t * head * 0.45 * uy, to[1] - head * uy - t * head * 0.45 * ux];
+    return [svg("path", { class: `arrow ${kind}`, d: Bench.pathOf([from, [to[0] - head * 0.6 * ux, to[1] - head * 0.6 * uy]]) }),
+      svg("path", { class: `head ${kind}`, d: Bench.pathOf([to, side(1), side(-1)], true) })];
+  }
+
+  /** Arrows of all joints and traced points: the longest over the sweep is a sixth of the view. */
+  function arrows(app, motion, parts) {
+    const { view, sheet } = app, { engine } = motion, { pose, velocities, accelerations } = engine;
+    for (const kind of ["velocity", "acceleration"]) {
+      if (!app.options[kind]) continue;
+      const found = Object.entries(sheet.points).map(([id, point]) => {
+        const link = Bench.linksAt(sheet, id).find(own => own !== Bench.GROUND);
+        return link ? Bench.pointMotion(pose, velocities, accelerations, Bench.linkNumber(sheet, link), [point.x, point.y]) : null;
+      }).filter(Boolean);
+      const longest = motion.longest(kind), room = Math.min(view.width, view.height) / 5;
+      for (const own of found) {
+        const by = own[kind].map((value, c) => ((c ? -value : value) / (longest || 1)) * room);
+        parts.push(...arrow(view.px(own.place), by, kind));
+      }
+    }
+  }
+
+  /** Instant centres of the links against the frame, and among each other. */
+  function centres(app, motion, parts) {
+    const ids = Object.keys(app.sheet.links), n = ids.length, found = motion.engine.instantCentres();
+    const seen = [];
+    for (let a = 0; a < n; a++) {
+      for (let b = a + 1; b < n; b++) {
+        const [x, y] = app.view.px([found[2 * (a * n + b)], found[2 * (a * n + b) + 1]]);
+        if (!Number.isFinite(x) || Math.abs(x) > 1e5 || Math.abs(y) > 1e5) continue;
+        const lift = seen.filter(([u, v]) => Math.hypot(u - x, v - y) < 12).length;
+        seen.push([x, y]);
+        parts.push(svg("path", { class: "centre", d: `M${x - 5} ${y - 5}L${x + 5} ${y + 5}M${x - 5} ${y + 5}L${x + 5} ${y - 5}` }),
+          svg("text", { class: "letter", x: x + 8, y: y + 14 + 13 * lift }, `${a}${n > 10 ? "," : ""}${b}`));
+      }
+    }
+  }
+
+  /** What changes with the pose. */
+  Bench.paintPose = (app, motion) => {
+    const parts = [];
+    if (motion && motion.ready && app.mode === "run") {
+      if (motion.driven) {
+        arrows(app, motion, parts);
+        if (app.options.centres) centres(app, motion, parts);
+      }
+      if (motion.pulled) {
+        parts.push(svg("path", { class: "pull", d: Bench.pathOf([motion.pulled.from, motion.pulled.to].map(at => app.view.px(at))) }));
+      }
+    }
+    app.view.layers.motion.replaceChildren(...parts);
+  };
+
+  /** The longest arrow over a sweep, so that arrows grow and shrink with the motion. */
+  Bench.Motion.prototype.longest = function (kind) {
+    const swept = this.sweep();
+    if (!swept) return 1;
+    if (!swept.longest) {
+      const { sheet } = this.app, links = Object.keys(sheet.links).length;
+      swept.longest = { velocity: 0, acceleration: 0 };
+      for (let i = 0; i < swept.inputs.length; i += 4) {
+        const part = all => all.subarray(3 * i * links, 3 * (i + 1) * links);
+        for (const [id, point] of Object.entries(sheet.points)) {
+          const link = Bench.linksAt(sheet, id).find(own => own !== Bench.GROUND);
+          if (!link) continue;
+          const own = Bench.pointMotion(part(swept.poses), part(swept.velocities), part(swept.accelerations), Bench.linkNumber(sheet, link), [point.x, point.y]);
+          for (const name of ["velocity", "acceleration"]) {
+            const length = Math.hypot(...own[name]);
+            if (Number.isFinite(length)) swept.longest[name] = Math.max(swept.longest[name], length);
+          }
+        }
+      }
+    }
+    return swept.longest[kind];
+  };
+})();
