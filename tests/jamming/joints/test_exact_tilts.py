@@ -239,7 +239,7 @@ def slider_and_four_bar():
     yield Mechanism(graph, joints, [Driver(0, 1)]), pins, Misalignment(0, 1, 0.03, 0.8)
     bearings = {(1, 2): JointLimits(0.02, 0.01), (2, 3): JointLimits(0.01), (0, 3): JointLimits(0.015, 0.02)}
     yield four_bar(), bearings, Misalignment(0, 1, 0.03, 0.3)
-    yield Mechanism(graph, joints, [Driver(0, 1)]), pins, Misalignment(0, 3, 0.02, 1.8, rigid=False)
+    yield Mechanism(graph, joints, [Driver(0, 1)]), {**pins, (0, 1): RIGID}, Misalignment(0, 3, 0.02, 1.8, rigid=False)
 
 
 @pytest.mark.long
