@@ -48,7 +48,7 @@
   /** The mechanism in the form of files: every link's own frame is the fixed one at the drawn position. */
   Bench.written = sheet => {
     const ids = Object.keys(sheet.links), joints = jointsOf(sheet), number = id => ids.indexOf(id);
-    const points = {}, inPairs = new Set(Object.values(sheet.pairs).flatMap(pair => [pair.at, pair.on]));
+    const points = Object.create(null), inPairs = new Set(Object.values(sheet.pairs).flatMap(pair => [pair.at, pair.on]));
     for (const [id, point] of Object.entries(sheet.points)) {
       const links = Bench.linksAt(sheet, id), alone = links.length === 1 && !inPairs.has(id);
       const moving = links.filter(link => link !== GROUND);
