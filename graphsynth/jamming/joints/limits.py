@@ -69,8 +69,8 @@ class JointLimits:
         Axial clearance (end float): largest slip to either side, in the length unit of the mechanism; ``math.inf`` for
         a joint that floats.
     radial_clearance : float
-        Largest shift across the axis, any tilt beside it, in the same unit.  Only exact closure counts it: to first
-        order it changes nothing (theory/what-binding-costs 9), and proofs about small tilts refuse it.
+        Largest shift across the axis (of a guide in the plane), beside any tilt, in the same unit.  Only exact closure
+        counts it: to first order it changes nothing (theory/what-binding-costs 9), proofs about small tilts refuse it.
     tilt_range, axial_clearance_range, radial_clearance_range : (float, float), optional
         Tolerance boxes; the value itself by default.
 

@@ -219,8 +219,8 @@ class MemberWitness:
         """Plain values."""
         limits = []
         for joint, own in zip(self.mechanism.joints, self.limits):
-            tilts = {name: getattr(own, name) for name in own.tilts}
-            limits.append({"joint": list(joint.pair), **tilts, "play": own.axial_clearance})
+            names = {name: "play" if name == "axial_clearance" else name for name in own.names}
+            limits.append({"joint": list(joint.pair), **{names[name]: getattr(own, name) for name in names}})
         return {
             **{name: getattr(self, name) for name in ("input", "factor", "exact")},
             "misalignments": [
