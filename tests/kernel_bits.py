@@ -17,6 +17,7 @@ from .kernel_calls import duplicate, flattened, size_of
 
 #: Kernels whose results hold memory as it was found.
 UNSET = {"graphsynth.structure.kernels.canon_workspace"}
+SPECIAL = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 5e-324, -5e-324, 2.2e-308, 1.8e308, -1.8e308, 1.0, -1.0])
 MOST, LEAST = 1_000_000, 50  # calls of a kernel
 CHUNK, CHUNK_BYTES, CHUNK_SECONDS = 4096, 16_000_000, 1.0  # of calls that are made one after another
 
@@ -172,6 +173,29 @@ def agree_on(kernel: Any, args: tuple[Any, ...]) -> bool:
         return flattened(copy), [copy]
 
     return agree(kernel, copies)
+
+
+# -- any numbers -----------------------------------------------------------------------------------------------------
+
+
+def interval_numbers(signature: Signature, each: int, rng: np.random.Generator) -> tuple[Any, ...]:
+    """Arguments of a loop over intervals: any bits, usual numbers and special ones."""
+    types = signature.types.split(", ")
+    inputs = sum(kind == "f8[1Cr]" for kind in types)
+    values = any_numbers((inputs, each), rng)
+    for k in range(0, inputs, 2):  # bounds in order, mostly
+        values[k : k + 2] = np.sort(values[k : k + 2], axis=0)
+    arrays = iter(values)
+    args = [int(rng.integers(-5, 9)) if kind == "i8" else next(arrays, None) for kind in types]
+    return tuple(np.zeros(each) if value is None else value for value in args)
+
+
+def any_numbers(shape: tuple[int, ...], rng: np.random.Generator) -> np.ndarray:
+    """Any bits, usual numbers and special ones."""
+    any_bits = rng.integers(-(2**63), 2**63 - 1, shape).view(np.float64)
+    usual = rng.standard_normal(shape) * 10.0 ** rng.integers(-3, 4, shape)
+    values = np.where(rng.random(shape) < 0.4, any_bits, usual)
+    return np.where(rng.random(shape) < 0.2, rng.choice(SPECIAL, shape), values)
 
 
 # -- other whole numbers ---------------------------------------------------------------------------------------------

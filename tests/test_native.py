@@ -22,7 +22,18 @@ from graphsynth.core.native import library
 from graphsynth.core.native.record import united
 from graphsynth.core.native.signatures import Signature, parse, read_list, text_of, write_list
 
-from .kernel_bits import LEAST, Compared, agree_on, calls_of, kernel_of, same_bits, same_results, table
+from .kernel_bits import (
+    LEAST,
+    SPECIAL,
+    Compared,
+    agree_on,
+    calls_of,
+    interval_numbers,
+    kernel_of,
+    same_bits,
+    same_results,
+    table,
+)
 
 needs_library = pytest.mark.skipif(not library.contents(), reason=library.reason)
 ROOT = Path(__file__).parents[1]
@@ -295,7 +306,6 @@ def test_many_threads_call_at_once() -> None:
 
 #: Kernels of one operation after another on flat arrays: any number may come.
 FLAT = ("graphsynth.intervals.kernels.loops.",)
-SPECIAL = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 5e-324, -5e-324, 2.2e-308, 1.8e308, -1.8e308, 1.0, -1.0])
 
 
 @pytest.fixture(scope="session")
@@ -316,21 +326,6 @@ def loop(signature: Signature) -> Any:
     """One loop over intervals as a case; most are for the slow run, since numba compiles each for a second or two."""
     name = signature.kernel.removeprefix(FLAT[0])
     return pytest.param(signature, id=name, marks=() if name in ("add", "sin") else pytest.mark.long)
-
-
-def interval_numbers(signature: Signature, each: int, rng: np.random.Generator) -> tuple[Any, ...]:
-    """Arguments of a loop over intervals: any bits, usual numbers and special ones."""
-    types = signature.types.split(", ")
-    inputs = sum(kind == "f8[1Cr]" for kind in types)
-    any_bits = rng.integers(-(2**63), 2**63 - 1, (inputs, each)).view(np.float64)
-    usual = rng.standard_normal((inputs, each)) * 10.0 ** rng.integers(-3, 4, (inputs, each))
-    values = np.where(rng.random((inputs, each)) < 0.4, any_bits, usual)
-    values = np.where(rng.random((inputs, each)) < 0.2, rng.choice(SPECIAL, (inputs, each)), values)
-    for k in range(0, inputs, 2):  # bounds in order, mostly
-        values[k : k + 2] = np.sort(values[k : k + 2], axis=0)
-    arrays = iter(values)
-    args = [int(rng.integers(-5, 9)) if kind == "i8" else next(arrays, None) for kind in types]
-    return tuple(np.zeros(each) if value is None else value for value in args)
 
 
 @pytest.mark.long

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,15 +18,19 @@ from graphsynth.core.native.signatures import Signature
 from graphsynth.core.native.wasm import MODULES, read_modules
 from graphsynth.workbench import modules
 
-from .kernel_bits import kernel_of, same_bits, same_results
-from .test_native import interval_numbers
+from .kernel_bits import kernel_of
+from .wasm_bits import Bits, Recorded, computations
 from .wasm_calls import Remote, node, tables
 
 ROOT = Path(__file__).parents[1]
 needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
 LISTED = [(module, signature) for module, signatures in read_modules().items() for signature in signatures]
 
-LOOPS = [signature for _, signature in LISTED if ".loops." in signature.kernel and ".exp" not in signature.kernel]
+
+def case(module: str, signature: Signature) -> Any:
+    """One kernel as a case; those with the workspace of enumeration, twenty megabytes, are for the long run."""
+    marks = [pytest.mark.long] if ".synthesis." in signature.kernel else []
+    return pytest.param(module, signature, id=signature.kernel.removeprefix("graphsynth."), marks=marks)
 
 
 @pytest.fixture(scope="module")
@@ -60,14 +65,30 @@ def test_the_same_sources_give_the_same_bytes(tmp_path: Path) -> None:
     assert made == shipped
 
 
+@pytest.fixture(scope="module")
+def recorded() -> Recorded:
+    return computations(many=False)
+
+
 @needs_node
-@pytest.mark.parametrize("signature", LOOPS, ids=lambda signature: signature.kernel.rpartition(".")[2])
-def test_interval_loops_give_the_bits_of_native_code_for_any_numbers(remote: Remote, signature: Signature) -> None:
-    args = interval_numbers(signature, 300, np.random.default_rng(7))
-    kernel = kernel_of(signature.kernel)
-    copies = tuple(arg.copy() if isinstance(arg, np.ndarray) else arg for arg in args)
-    blocks = [arg[None] if isinstance(arg, np.ndarray) else arg for arg in args]
-    found, arrays = remote.call("binding", signature.kernel.removeprefix("graphsynth."), args, blocks, 1)
-    assert same_results(found, [kernel(*copies)])
-    ours = [arg for arg in copies if isinstance(arg, np.ndarray)]
-    assert all(same_bits(a, b[0]) for a, b in zip(ours, arrays, strict=True))
+@pytest.mark.parametrize(("module", "signature"), [case(*listed) for listed in LISTED])
+def test_some_calls_give_the_bits_of_native_code(
+    remote: Remote, recorded: Recorded, module: str, signature: Signature
+) -> None:
+    bits = Bits(remote, module, signature)
+    done, wrong = bits.run(recorded.get(signature.kernel, []), 200, 0.2, np.random.default_rng(7))
+    assert done and not wrong
+
+
+@pytest.mark.slow  # minutes
+@needs_node
+def test_many_calls_give_the_bits_of_native_code(remote: Remote) -> None:
+    kept, wrong = computations(many=True), []
+    for module, signature in LISTED:
+        most = int(os.environ.get("GRAPHSYNTH_BITS_CALLS_EACH", "1000000"))
+        done, bad = Bits(remote, module, signature).run(
+            kept.get(signature.kernel, []), most, 60.0, np.random.default_rng(9)
+        )
+        print(f"{done:>9}  {signature.kernel}", flush=True)
+        wrong += [signature.kernel] * (bad > 0)
+    assert not wrong

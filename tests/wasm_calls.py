@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from queue import Queue
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -183,5 +184,28 @@ def node() -> Remote:
         assert program is not None
         process = subprocess.Popen([program, str(RUNNER), str(LOADER), address])
         return lambda: process.wait(30) and None
+
+    return Remote(start)
+
+
+def browser() -> Remote:
+    """Kernels in a headless Chromium."""
+
+    def start(address: str) -> Callable[[], None]:
+        program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+        assert program is not None
+        folder = TemporaryDirectory()
+        flags = (
+            "--headless=new --no-sandbox --disable-gpu --no-first-run --disable-background-networking --disable-sync"
+        )
+        command = [program, *flags.split(), f"--user-data-dir={folder.name}", "--remote-debugging-port=0", address]
+        process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+
+        def stop() -> None:
+            process.terminate()
+            process.wait(30)
+            folder.cleanup()
+
+        return stop
 
     return Remote(start)

@@ -21,7 +21,8 @@ from graphsynth.core.native.lowering import ENVIRONMENT, Lowered, lower, optimis
 from graphsynth.core.native.signatures import Signature, read_list
 
 MODULES = FOLDER.parents[1] / "workbench" / "modules"
-#: What code of kernels may call: no elementary function, for those of a C library have bits of their own.
+#: What code of kernels may call: no elementary function, for those of a C library have bits of their own.  One that
+#: LLVM would take from there is missed by the linker.
 _CALLED = (
     "NRT_Allocate NRT_Free NRT_MemInfo_alloc NRT_MemInfo_alloc_aligned NRT_MemInfo_alloc_safe_aligned "
     "NRT_MemInfo_call_dtor numba_frexp numba_ldexp numba_nextafter memcpy memmove memset fma sqrt floor ceil trunc "

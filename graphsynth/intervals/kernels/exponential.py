@@ -25,6 +25,8 @@ def exp_at(x):
     """Bounds of the exponential; infinities allowed."""
     if x == 0.0:
         return 1.0, 1.0
+    if x != x:
+        return x, x
     if x > 709.8:
         return MAX, INF
     if x < -745.2:

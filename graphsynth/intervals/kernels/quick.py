@@ -24,7 +24,7 @@ _LOG2_H, _LOG2_L = tables.pieces(_LOG2, 42)
 #: log(2)/128 and pi/256: pieces whose products with the integers that come are exact, and the rest.
 _EXP_STEP, _EXP_SECOND, _EXP_THIRD = tables.pieces(_LOG2 / 128, 42, 77)
 _SIN_STEP, _SIN_SECOND, _SIN_THIRD = tables.pieces(Fraction(dd.pi_fixed(256), 2**264), 39, 72)
-_EXP_LEAST, _EXP_MOST, _SIN_MOST, _ATAN_MOST = -690.0, 709.0, 12000.0, 2.0**900
+_EXP_LEAST, _EXP_MOST, SINE_MOST, _ATAN_MOST = -690.0, 709.0, 12000.0, 2.0**900
 _NORMAL_MIN = 2.0**-1022
 #: Bits of a number, with an exponent that is larger by 1024 and counts from 0.6875; parts of them.
 _BIAS, _PAST_FIRST = np.uint64(1024 << 52), np.uint64((1024 << 52) - tables.FIRST_BITS)
@@ -160,7 +160,7 @@ def atan(al, ah):
 @kernel(forceinline=True)
 def sine_pair(x, turn):
     """Pair of ``sin(x + turn pi/2)`` and the integer ``floor(x 2/pi)``; ``l = 0`` where that is not certain."""
-    fine = abs(x) < _SIN_MOST
+    fine = abs(x) < SINE_MOST
     x = x if fine else 0.0
     n = (x * 81.48733086305042 + _SHIFT) - _SHIFT
     k = np.int64(np.int32(n))

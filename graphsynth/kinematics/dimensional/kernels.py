@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from graphsynth.core.compilation import kernel
+from graphsynth.intervals.kernels.nearest import hypot
 
 
 @kernel
@@ -37,7 +38,7 @@ def _springs(x, y, fx, fy, joints, sides, stiffness, apart):
     for s in range(len(sides)):
         i, j = sides[s, 0], sides[s, 1]
         dx, dy = x[j] - x[i], y[j] - y[i]
-        pull = stiffness[s] * (1.0 - 1.0 / max(np.hypot(dx, dy), 1e-9))
+        pull = stiffness[s] * (1.0 - 1.0 / max(hypot(dx, dy), 1e-9))
         fx[i] += pull * dx
         fy[i] += pull * dy
         fx[j] -= pull * dx
@@ -57,7 +58,7 @@ def _clearing(x, y, fx, fy, joints, sides, clear, strength):
             wx, wy = x[k] - x[p], y[k] - y[p]
             at = min(max((wx * sx + wy * sy) / square, 0.0), 1.0)
             gx, gy = wx - at * sx, wy - at * sy
-            distance = max(np.hypot(gx, gy), 1e-9)
+            distance = max(hypot(gx, gy), 1e-9)
             if distance >= clear:
                 continue
             push = strength * (clear - distance) / distance
@@ -89,7 +90,7 @@ def _raise_corners(x, y, fx, fy, corners, turned, height):
     for t in range(len(corners)):
         a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
         sx, sy = x[c] - x[a], y[c] - y[a]
-        length = max(np.hypot(sx, sy), 1e-9)
+        length = max(hypot(sx, sy), 1e-9)
         push = -4.0 * max(0.0, height - _doubled_area(x, y, a, b, c) * turned[t] / length) * turned[t] / length
         px, py = -push * sy, push * sx
         fx[a] -= 0.5 * px
@@ -107,8 +108,8 @@ def _limit(x, y, fx, fy, step):
         near = np.inf
         for j in range(x.size):
             if j != i:
-                near = min(near, np.hypot(x[i] - x[j], y[i] - y[j]))
-        share = min(step, 0.2 * min(near, 1.0) / max(np.hypot(fx[i], fy[i]), 1e-9))
+                near = min(near, hypot(x[i] - x[j], y[i] - y[j]))
+        share = min(step, 0.2 * min(near, 1.0) / max(hypot(fx[i], fy[i]), 1e-9))
         fx[i] *= share
         fy[i] *= share
 

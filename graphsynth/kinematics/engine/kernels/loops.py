@@ -7,6 +7,7 @@ instructions.  ``X[link]`` has the rows x, y, cos theta, sin theta; ``V`` and ``
 import math
 
 from graphsynth.core.compilation import kernel
+from graphsynth.intervals.kernels.nearest import cos, sin
 from graphsynth.kinematics.engine.codes import DRIVE_R, H
 from graphsynth.kinematics.engine.kernels.rows import ends
 
@@ -103,7 +104,7 @@ def drive_loop(d, p, r, q, state, T, i0, i1, derivs, angles):
     X, TH, V, W = state.X, state.TH, state.V, state.W
     base, link, k = d[r, 1], d[r, 2], d[r, 3]
     px, py, sign, angle = p[r, 0], p[r, 1], p[r, 6], p[r, 7]
-    ca, sa = math.cos(angle), math.sin(angle)
+    ca, sa = cos(angle), sin(angle)
     Q, L, turning = q[k], X[link], d[r, 0] == DRIVE_R
     B = X[base]
     if turning:

@@ -3,6 +3,7 @@
 import math
 
 from graphsynth.core.compilation import kernel
+from graphsynth.intervals.kernels.nearest import cos, sin
 from graphsynth.kinematics.engine.codes import CAM, DRIVE_ANGLE, GEAR, INVERSE, PAX, PAY, PBX, PBY, SIGN, SLOT, H
 from graphsynth.kinematics.engine.kernels.rows import ends, gamma, row, world
 
@@ -181,7 +182,7 @@ def newton(group, x, phi, q, room, Lc):
 @kernel
 def turned_back(x, link, angle):
     """Turn cosine and sine of a link by a small angle backwards; their length is set to 1 to first order."""
-    c, s = math.cos(angle), math.sin(angle)
+    c, s = cos(angle), sin(angle)
     xc, xs = x[link, 2] * c + x[link, 3] * s, x[link, 3] * c - x[link, 2] * s
     inv = 1.5 - 0.5 * (xc * xc + xs * xs)
     x[link, 2], x[link, 3] = xc * inv, xs * inv
@@ -235,7 +236,7 @@ def predict(group, x, h, Lc, out):
         x[link, 0] += ax + bx
         x[link, 1] += ay + by
         x[link, 4] += at + bt
-        c, s = math.cos(at + bt), math.sin(at + bt)
+        c, s = cos(at + bt), sin(at + bt)
         x[link, 2], x[link, 3] = x[link, 2] * c - x[link, 3] * s, x[link, 3] * c + x[link, 2] * s
     return math.sqrt(travel) / Lc
 

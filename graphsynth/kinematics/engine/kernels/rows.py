@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from graphsynth.core.compilation import kernel
+from graphsynth.intervals.kernels.nearest import atan2, cos, sin
 from graphsynth.kinematics.engine.codes import (
     ANGLE,
     CAM,
@@ -93,7 +94,7 @@ def nearest_turn(raw, near):
 @kernel
 def follow_angle(link, x, near):
     """Unwrapped angle of a link, nearest to ``near``."""
-    raw = math.atan2(x[link, 3], x[link, 2])
+    raw = atan2(x[link, 3], x[link, 2])
     x[link, 4] = nearest_turn(raw, near)
 
 
@@ -101,7 +102,7 @@ def follow_angle(link, x, near):
 def pitch(p, k, psi):
     """Pitch radius of a cam and its first two derivatives by psi."""
     value, first, second = p[k, H], 0.0, 0.0
-    c1, s1 = math.cos(psi), math.sin(psi)
+    c1, s1 = cos(psi), sin(psi)
     c, s, order = c1, s1, 1.0
     for column in range(CAM_WIDTH, p.shape[1] - 1, 2):
         even, odd = p[k, column] * c + p[k, column + 1] * s, p[k, column + 1] * c - p[k, column] * s
@@ -149,13 +150,13 @@ def row(kind, p, k, a, b, x, phi, q, g):
     if kind in (ANGLE, DRIVE_ANGLE):  # from cosines and sines: no turns are counted
         h = p[k, H] if kind == ANGLE else p[k, SIGN] * q[int(p[k, SLOT]), 0]
         g[2], g[5] = -1.0, 1.0
-        ch, sh = math.cos(h), math.sin(h)
+        ch, sh = cos(h), sin(h)
         re, im = cb * ca + sb * sa, sb * ca - cb * sa
-        return math.atan2(im * ch - re * sh, re * ch + im * sh)
+        return atan2(im * ch - re * sh, re * ch + im * sh)
     if kind == CAM:
         square = dx * dx + dy * dy
         far = math.sqrt(square)
-        rho, first, _ = pitch(p, k, math.atan2(dy, dx) - math.atan2(sa, ca) - p[k, RA])
+        rho, first, _ = pitch(p, k, atan2(dy, dx) - atan2(sa, ca) - p[k, RA])
         ex, ey = dx / far + first * dy / square, dy / far - first * dx / square
         g[0], g[1], g[2] = -ex, -ey, first - (ux * ey - uy * ex)
         g[3], g[4], g[5] = ex, ey, wx * ey - wy * ex
@@ -165,7 +166,7 @@ def row(kind, p, k, a, b, x, phi, q, g):
     square = dx * dx + dy * dy
     nx, ny = -dy / square, dx / square
     slot = int(p[k, SLOT])
-    raw = math.atan2(dy, dx)
+    raw = atan2(dy, dx)
     here = nearest_turn(raw, phi[slot])
     scale = 1.0 / (p[k, RA] + p[k, RB])
     g[0], g[1], g[2] = scale * total * nx, scale * total * ny, scale * (p[k, RA] + total * (ux * ny - uy * nx))
@@ -202,7 +203,7 @@ def gamma(kind, p, k, a, b, x, q):
         return along - p[k, SIGN] * q[int(p[k, SLOT]), 2]
     square = dx * dx + dy * dy
     if kind == CAM:
-        _, first, second = pitch(p, k, math.atan2(dy, dx) - math.atan2(sa, ca) - p[k, RA])
+        _, first, second = pitch(p, k, atan2(dy, dx) - atan2(sa, ca) - p[k, RA])
         far, along, across = math.sqrt(square), dx * ex + dy * ey, dx * ey - dy * ex
         rate = across / square - oa
         curved = (dx * cy - dy * cx) / square - 2.0 * along * across / (square * square)
@@ -243,7 +244,7 @@ def orient(rows, rp, k, x, own):
     """Orient link ``own`` by the ANGLE row k."""
     a, b, h = rows[k, 1], rows[k, 2], rp[k, H]
     other, sign = (a, 1.0) if own == b else (b, -1.0)
-    c, s = math.cos(h), sign * math.sin(h)
+    c, s = cos(h), sign * sin(h)
     x[own, 2], x[own, 3] = x[other, 2] * c - x[other, 3] * s, x[other, 3] * c + x[other, 2] * s
     x[own, 4] = x[other, 4] + sign * h
 
@@ -332,13 +333,13 @@ def turned_form(code, group, sign, x, phi):
         dx, dy = (ox - ax, oy - ay) if own == a else (ax - ox, ay - oy)
         if dx == 0.0 and dy == 0.0:  # no line of centres
             return -5e-324
-        here = nearest_turn(math.atan2(dy, dx), phi[int(rp[k, SLOT])])
+        here = nearest_turn(atan2(dy, dx), phi[int(rp[k, SLOT])])
         ra, rb = rp[k, RA], rp[k, SIGN] * rp[k, RB]
         if own == a:
             x[own, 4] = here - rb * (x[far, 4] - here - rp[k, H]) / ra
         else:
             x[own, 4] = here + rp[k, H] - ra * (x[far, 4] - here) / rb
-        x[own, 2], x[own, 3] = math.cos(x[own, 4]), math.sin(x[own, 4])
+        x[own, 2], x[own, 3] = cos(x[own, 4]), sin(x[own, 4])
     pin_to(x, own, hx, hy, ax, ay)
     return margin
 
@@ -349,7 +350,7 @@ def place_eliminated(kind, e, a, b, p, r, x, derivs):
     ax, ay = world(x, a, p[r, 0], p[r, 1])
     bx, by = world(x, b, p[r, 4], p[r, 5])
     base = b if kind == E_RP else a
-    c, s = math.cos(p[r, 12]), math.sin(p[r, 12])
+    c, s = cos(p[r, 12]), sin(p[r, 12])
     x[e, 2], x[e, 3] = x[base, 2] * c - x[base, 3] * s, x[base, 3] * c + x[base, 2] * s
     x[e, 4] = x[base, 4] + p[r, 12]
     if kind == E_RP:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from graphsynth.core.compilation import kernel
+from graphsynth.intervals.kernels.nearest import atan2, cos, sin
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.kernels.loops import bar_loop, drive_loop, rrr_loop
 from graphsynth.kinematics.engine.kernels.newton import (
@@ -84,7 +85,7 @@ def unwrap(link, u, state, i0, i1, derivs):
         near = TH[link, i]
         if i > 0:
             near = TH[link, i - 1] + ((u[i] - u[i - 1]) * state.V[link, 2, i - 1] if derivs else 0.0)
-        raw = math.atan2(X[link, 3, i], X[link, 2, i])
+        raw = atan2(X[link, 3, i], X[link, 2, i])
         TH[link, i] = nearest_turn(raw, near)
 
 
@@ -104,7 +105,7 @@ def centres_pass(group, x, phi, h, derivs):
         bx, by = world(x, b, rp[k, 2], rp[k, 3])
         dx, dy = bx - ax, by - ay
         slot = int(rp[k, codes.SLOT])
-        turn = nearest_turn(math.atan2(dy, dx), phi[slot]) - phi[slot]
+        turn = nearest_turn(atan2(dy, dx), phi[slot]) - phi[slot]
         if not derivs:
             if abs(turn) > BACKWARD:
                 return True
@@ -195,7 +196,10 @@ def solved(code, group, room, need, s, at, sizes):
             return codes.STEP_TOO_LONG
     # does the determinant keep its sign and half of its size?
     if code == codes.NEWTON:
-        m[s] = rates(group, x, phi, ql, room) / Lc**nc
+        unit = 1.0
+        for _ in range(nc):
+            unit *= Lc
+        m[s] = rates(group, x, phi, ql, room) / unit
     if m[s] == 0.0:
         return codes.SINGULAR
     if warm and not (m[s] * at.before > 0.0 and abs(m[s]) > 0.5 * abs(at.before)):
@@ -270,7 +274,7 @@ def walk(tables, ep, group, s, q, u, sign, room, state, span, sizes, derivs):
                 slot = int(rp[k, codes.SLOT])
                 ax, ay = world(x, rows[k, 1], rp[k, 0], rp[k, 1])
                 bx, by = world(x, rows[k, 2], rp[k, 2], rp[k, 3])
-                phi[slot] = nearest_turn(math.atan2(by - ay, bx - ax), phi[slot])
+                phi[slot] = nearest_turn(atan2(by - ay, bx - ax), phi[slot])
                 state.PHI[slot, i] = phi[slot]
     return stop, 0
 
@@ -348,7 +352,7 @@ def run(tables, wanted, q, u, modes, state, out, done, why, first, sizes, derivs
             for k in range(out.poses.shape[1]):
                 x, y, theta = out.poses[b, k, 0], out.poses[b, k, 1], out.poses[b, k, 2]
                 state.X[k, 0, 0], state.X[k, 1, 0], state.TH[k, 0] = x, y, theta
-                state.X[k, 2, 0], state.X[k, 3, 0] = math.cos(theta), math.sin(theta)
+                state.X[k, 2, 0], state.X[k, 3, 0] = cos(theta), sin(theta)
             for k in range(state.PHI.shape[0]):
                 state.PHI[k, 0] = out.centres[b, k]
         done[b], why[b, 0], why[b, 1] = run_set(

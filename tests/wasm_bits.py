@@ -1,0 +1,153 @@
+"""The same bits from WebAssembly and from native code: ``python -m tests.wasm_bits CALLS node|browser [KERNEL ...]``.
+
+Real calls are recorded from a few computations, then changed many times over, as `kernel_bits` does.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from graphsynth.core.compilation import Deferred, Kernel
+from graphsynth.core.native import library
+from graphsynth.core.native.signatures import Signature
+from graphsynth.core.native.wasm import read_modules
+
+from .kernel_bits import (
+    OTHERS,
+    any_numbers,
+    changed,
+    interval_numbers,
+    kernel_of,
+    leaves,
+    results,
+    rows_of,
+    same_bits,
+    same_results,
+)
+from .kernel_calls import duplicate, size_of
+from .wasm_calls import Remote, browser, node
+
+_KEPT, _CHUNK, _BYTES = 12, 4096, 8_000_000
+Recorded = dict[str, list[tuple[Any, ...]]]
+
+
+@contextmanager
+def recording(kept: Recorded) -> Iterator[None]:
+    """Keep copies of the arguments of calls from Python, by kernel: the first ones, and then ever rarer ones."""
+    seen: dict[str, int] = {}
+
+    def call(own: Any, *args: Any) -> Any:
+        name = own.entry()[0] if own.entry() else ""
+        count = seen[name] = seen.get(name, 0) + 1
+        if len(kept.setdefault(name, [])) < _KEPT and count & (count - 1) == 0:
+            kept[name].append(duplicate(args))
+        return library.Native.__call__(own, *args)
+
+    Kernel.__call__ = Deferred.__call__ = call  # type: ignore[attr-defined]
+    try:
+        yield
+    finally:
+        del Kernel.__call__, Deferred.__call__  # type: ignore[attr-defined]
+
+
+def computations(*, many: bool) -> Recorded:
+    """Record the calls of computations that use the kernels of all modules."""
+    import graphsynth as gs
+    from graphsynth.kinematics.dimensional.sketch import layout
+    from graphsynth.mechanism import gallery
+    from graphsynth.structure.canonical import _label
+    from graphsynth.synthesis.problem import EnumerationProblem
+    from graphsynth.synthesis.sampling import sample
+
+    kept: Recorded = {}
+    turn = np.linspace(0.0, 2.0 * np.pi, 361 if many else 25)
+    with recording(kept):
+        gs.simulate(gs.Mechanism.four_bar(4.0, 1.2, 3.5, 3.0, coupler_point=(1.8, 1.4)), turn)
+        gs.simulate(gs.Mechanism.slider_crank(1.0, 3.0), turn)
+        for name in gallery.__all__ if many else ():
+            gs.simulate(getattr(gallery, name)(), turn)
+        gs.count_chains(10 if many else 6)
+        for chain in list(gs.enumerate_chains(10 if many else 6))[:40]:
+            layout(chain)
+            _label(chain, [0] * chain.links, compiled=True)
+        sample(EnumerationProblem.chains(8, 1, 3, None, False, None, framed=True), 6, 1)
+    return kept
+
+
+# -- comparing ---------------------------------------------------------------------------------------------------------
+
+
+class Bits:
+    """One kernel of a module, in both forms."""
+
+    def __init__(self, remote: Remote, module: str, signature: Signature) -> None:
+        self.remote, self.module, self.signature = remote, module, signature
+        self.kernel = kernel_of(signature.kernel)
+        self.name = signature.kernel.removeprefix("graphsynth.")
+
+    def agree(self, args: tuple[Any, ...], blocks: list[Any], count: int) -> bool:
+        """Make the same calls in both: whether all results and all arrays have the same bits."""
+        copies, calls = rows_of(args, blocks)
+        wanted = [found.__name__ if isinstance(found, type) else found for found in results(self.kernel, calls)]
+        found, arrays = self.remote.call(self.module, self.name, args, blocks, count)
+        return same_results(found, wanted) and all(map(same_bits, arrays, copies))
+
+    def agree_on(self, args: tuple[Any, ...]) -> bool:
+        """Compare one call."""
+        blocks = [np.asarray(leaf)[None] if isinstance(leaf, np.ndarray | float) else leaf for leaf in leaves(args)]
+        return self.agree(args, blocks, 1)
+
+    def run(self, kept: list[tuple[Any, ...]], most: int, seconds: float, rng: np.random.Generator) -> tuple[int, int]:
+        """Compare up to ``most`` calls, as long as time allows; how many, and how many chunks were wrong."""
+        types = self.signature.types
+        if ".loops." in self.name:
+            return most, int(not self.agree_on(interval_numbers(self.signature, most, rng)))
+        if set(types.split(", ")) == {"f8"}:
+            kept = [(1.0,) * len(types.split(", "))]
+        other = OTHERS.get(self.name)
+        done = wrong = chunk = 0
+        count = 1
+        start = perf_counter()
+        while done < most and (done < len(kept) or perf_counter() - start < seconds):
+            args = kept[chunk % len(kept)]
+            chunk += 1
+            if done < len(kept) or other:
+                wrong += not self.agree_on(args if done < len(kept) or other is None else other(args, rng))
+                done += 1
+                continue
+            began = perf_counter()
+            size = max(1, min(count, most - done, _BYTES // (1 + size_of(args))))
+            plain = set(types.split(", ")) == {"f8"}
+            blocks = [any_numbers((size,), rng) for _ in args] if plain else changed(args, size, rng)
+            wrong += not self.agree(args, blocks, size)
+            done += size
+            if perf_counter() - began < 1.0:
+                count = min(2 * count, _CHUNK)
+        return done, wrong
+
+
+def main(most: int, place: str, *wanted: str) -> None:
+    """Compare kernels of all modules, or those whose names hold a text; print how many calls."""
+    kept = computations(many=True)
+    remote = {"node": node, "browser": browser}[place]()
+    bad = 0
+    for module, signatures in read_modules().items():
+        for signature in signatures:
+            if wanted and not any(text in signature.kernel for text in wanted):
+                continue
+            bits = Bits(remote, module, signature)
+            calls, wrong = bits.run(kept.get(signature.kernel, []), most, 300.0, np.random.default_rng(20))
+            bad += wrong
+            print(f"{calls:>9} calls, {wrong} chunks differ  {module}: {bits.name}", flush=True)
+    remote.close()
+    sys.exit(bad > 0)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), *sys.argv[2:])
