@@ -33,6 +33,8 @@ def place(name: str, given: Place) -> Place:
     """
     if isinstance(given, Sequence) and len(given) == 4:
         return box(name, given)
+    if isinstance(given, Sequence) and len(given) == 3:
+        raise GeometryError(f"{name} has three numbers; give two, a place, or four, two corners of a region")
     return point(name, given)
 
 
@@ -40,7 +42,7 @@ def limits(name: str, given: tuple[float, float]) -> tuple[float, float]:
     """Read the least and the largest of positive numbers."""
     least, most = (positive(f"{name}[{k}]", value) for k, value in enumerate(given))
     if least > most:
-        raise GeometryError(f"{name} = ({least:g}, {most:g}): the first must not be larger than the second")
+        raise GeometryError(f"{name} = ({least:g}, {most:g}): the first must not be larger than the second; exchange them")
     return least, most
 
 
