@@ -134,7 +134,12 @@ def _row(
     if not found.completed:
         return row(math.nan, why=found.message)
     error = _away(found, truth.q, turns=False)
-    why = f"more than {_MISSED:g} times the tolerance" if error > _MISSED * rtol else ""
+    largest = max(_away(found, 0.0 * truth.q, turns=False), 1.0)  # the tolerance is a part of each coordinate
+    why = (
+        f"more than {_MISSED:g} times the tolerance of the largest coordinate"
+        if error > _MISSED * rtol * largest
+        else ""
+    )
     return row(error, why=why, status=RowStatus.UNRELIABLE)
 
 
