@@ -14,8 +14,8 @@ def run(options: argparse.Namespace) -> int:
     """Search, write the report and the mechanisms, print the ranked answers; Ctrl-C ends the search, not the report."""
     from graphsynth.core.checks import positive
     from graphsynth.core.ordered import processes
-    from graphsynth.formats.registry import write
     from graphsynth.mechanism.model import Mechanism
+    from graphsynth.pipeline.design.stages import write_mechanisms
     from graphsynth.pipeline.design.tables import DesignTable
     from graphsynth.pipeline.report import print_summary
     from graphsynth.pipeline.runner import run as run_scene
@@ -36,12 +36,10 @@ def run(options: argparse.Namespace) -> int:
     if options.go_on:
         last = sorted(str(file.resolve()) for file in folder.glob("mechanism-*.toml"))
         scene = replace(scene, mechanism=replace(scene.mechanism, begin=(*scene.mechanism.begin, *last)))
+    scene = replace(scene, mechanism=replace(scene.mechanism, kept=str(folder.resolve())))
     with console.counting() as progress, processes(console.workers_for(options.workers, True)) as executor:
         report = run_scene(scene, folder, executor, progress)
-    files = []
-    for place, text in enumerate(report["mechanisms"].columns["mechanism"], 1):
-        files.append(folder / f"mechanism-{place}.toml")
-        write(Mechanism.from_json(text), files[-1])
+    files = write_mechanisms([Mechanism.from_json(text) for text in report["mechanisms"].columns["mechanism"]], folder)
     good = sum(record.good is True for record in report["records"])
     if options.json:
         answers = [

@@ -175,6 +175,26 @@ def test_shipped_tasks_are_done(name: str) -> None:
     assert any(record.good for record in report["records"])
 
 
+@pytest.mark.long
+def test_the_best_so_far_are_kept_while_it_searches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As when the process is killed in the middle: what was found is on the disk, older files are gone."""
+    import graphsynth.design.task.search as search
+
+    (tmp_path / "mechanism-7.toml").write_text("of an earlier search")
+    real = search._Run._enough
+
+    def killed(run: Any) -> bool:
+        if real(run):
+            raise MemoryError
+        return False
+
+    monkeypatch.setattr(search._Run, "_enough", killed)
+    with pytest.raises(MemoryError):
+        execute(scene(("records",), paths=[SEGMENT], kept=str(tmp_path)))
+    (file,) = tmp_path.glob("mechanism-*.toml")
+    assert file.name == "mechanism-1.toml" and "P" in gs.Mechanism.from_toml(file.read_text()).points
+
+
 def test_verdicts_of_answers_that_fail_say_what_tells_against_them() -> None:
     from types import SimpleNamespace
 

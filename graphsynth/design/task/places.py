@@ -42,7 +42,9 @@ def limits(name: str, given: tuple[float, float]) -> tuple[float, float]:
     """Read the least and the largest of positive numbers."""
     least, most = (positive(f"{name}[{k}]", value) for k, value in enumerate(given))
     if least > most:
-        raise GeometryError(f"{name} = ({least:g}, {most:g}): the first must not be larger than the second; exchange them")
+        raise GeometryError(
+            f"{name} = ({least:g}, {most:g}): the first must not be larger than the second; exchange them"
+        )
     return least, most
 
 

@@ -83,12 +83,13 @@ class Piece(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """How far a search is: pieces done, the best error in tolerances, mechanisms accepted, seconds."""
+    """How far a search is: pieces done, the best error in tolerances, mechanisms accepted, seconds, the best so far."""
 
     pieces: int
     error: float
     accepted: int
     seconds: float
+    answers: tuple[DesignedMechanism, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -293,7 +294,8 @@ class _Run:
                 if progress is not None:
                     least = min((c.error for c in self.found), default=math.inf)
                     good = sum(answer.accepted for _, answer in self.judged.values())
-                    progress(Progress(self.pieces, least, good, self.clock.passed))
+                    best = tuple(self._ranked()[: self.count])
+                    progress(Progress(self.pieces, least, good, self.clock.passed, best))
                 if limit := self.clock.over:
                     self.stopped = f"{limit} was reached"
                 if self.stopped or self._enough():

@@ -329,8 +329,8 @@ def _screened(
             some = own._replace(frames=own.frames[at], rates=own.rates[at])
             tried = _guesses(model, aim, some, guess[at], wanted)  # (sets, guesses, n)
             error, placement = _fitted(some, tried[:, :, few], wanted, few, held[at], goals)
-            # a small part of a curve is near to any line, but of a mechanism that is too large
-            error += np.maximum(np.log(np.abs(placement[..., 0]) * long[at, None]), 0.0)
+            if aim.inputs is None:  # a small part of a curve is near to any line, but of a mechanism that is too large
+                error += np.maximum(np.log(np.abs(placement[..., 0]) * long[at, None]), 0.0)
             row, k = np.arange(len(error)), error.argmin(axis=1)
             better = error[row, k] < best[at]
             best[at] = np.where(better, error[row, k], best[at])

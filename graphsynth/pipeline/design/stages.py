@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,7 +50,12 @@ def search(context: Context) -> Designs:
     def starts(task: DesignTask) -> list[Mechanism]:
         return [*given, *(index(task) if index is not None else ())]
 
+    last: list[tuple[DesignedMechanism, ...]] = [()]
+
     def progress(p: Progress) -> None:
+        if own.kept and p.answers != last[0]:
+            last[0] = p.answers
+            write_mechanisms([answer.mechanism for answer in p.answers], context.scene.folder / own.kept)
         if told is not None:
             told(f"search: {p.pieces} pieces, best {p.error:.2g} tolerances, {p.accepted} accepted")
 
@@ -66,6 +72,19 @@ def search(context: Context) -> Designs:
         )
     except GeometryError as error:
         raise (context.scene.place / "mechanism").error(f"asks for what cannot be: {error}") from error
+
+
+def write_mechanisms(mechanisms: Sequence[Mechanism], folder: Path) -> list[Path]:
+    """Write ``mechanism-1.toml`` and so on, and remove those of an earlier search beyond; return the files."""
+    from graphsynth.formats.registry import write
+
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [folder / f"mechanism-{place}.toml" for place in range(1, len(mechanisms) + 1)]
+    for mechanism, file in zip(mechanisms, files, strict=True):
+        write(mechanism, file)
+    for old in {*folder.glob("mechanism-*.toml")} - {*files}:
+        old.unlink()
+    return files
 
 
 def records(context: Context, designs: Designs) -> tuple[Record, ...]:

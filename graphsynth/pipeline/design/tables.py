@@ -249,6 +249,7 @@ class DesignTable:
     joint_tilt: Annotated[float, In("deg", above=0)] = 0.3 * DEGREE
     rank: RankTable = field(default_factory=RankTable)
     begin: tuple[str, ...] = ()  # files of mechanisms to begin with
+    kept: str = ""  # folder for the best mechanisms so far, written while it searches
     index: str = ""  # folder of an index of curves to begin with
     seconds: Annotated[float, In(above=0)] = 60.0
     processor_seconds: Annotated[float | None, In(above=0)] = None
