@@ -14,6 +14,7 @@ import pytest
 from scipy.optimize import fsolve
 
 from graphsynth import Driver, Mechanism, MechanismGraph, Revolute
+from graphsynth.kinematics import pose_gradients
 from graphsynth.kinematics.engine.batch import simulate_batch, solve_rrr
 from graphsynth.kinematics.simulation import simulate
 
@@ -71,6 +72,25 @@ def test_four_bar_batch(benchmark, rates, keep):
     batch = timed(benchmark, run, len(sizes) * len(TURN))
     assert batch.completed.all()
     assert np.abs(batch.point(2, (5.0, 0.0))[0, 90] - (4.0, 4.0)).max() < 0.02
+
+
+def test_four_bar_gradients(benchmark):
+    """Positions of all links, and the derivatives of a point of the coupler by all dimensions and the driver."""
+    mechanism = four_bar()
+    sizes = varied(mechanism, 1000 if benchmark.enabled else 2)
+    loads = np.zeros((len(sizes), 1, 4, 3, len(TURN)))
+    loads[:, 0, 2, 0] = 1.0
+
+    def run():
+        frames = simulate_batch(mechanism, TURN, sizes, rates=False).frames
+        return pose_gradients(mechanism, sizes, frames, loads)
+
+    found = timed(benchmark, run, len(sizes) * len(TURN))
+    step = 1e-6
+    longer = np.stack([sizes[0], sizes[0]])
+    longer[:, 1, 0] += [step, -step]  # the crank
+    x = simulate_batch(mechanism, TURN, longer, rates=False).frames[:, :, 2, 0]
+    assert np.abs((x[0] - x[1]) / (2.0 * step) - found.dimensions[0, 0, 1, 0]).max() < 1e-8
 
 
 def test_rrr_dyads(benchmark):

@@ -19,7 +19,7 @@ from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, follo
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 #: Samples of a dwell; inputs next to a dead centre, and weights of the values there that give its speed (order six).
-_STILL, _NEAR = 13, 0.02
+_STILL, _NEAR = 13, 0.004
 _OFFSETS, _DIFFERENCE = (
     np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]),
     np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0,

@@ -17,9 +17,11 @@ Array = NDArray[np.float64]
 #: Damping at the start, and how often steps are refused.
 _DAMPING, _REFUSED = 1e-4, 6
 #: Steps at most, the part by which an error falls at least, and the square of one that is as good as none.
-_STEPS, _GAIN, _NONE = 25, 1e-6, 1e-24
+_STEPS, _GAIN, _NONE = 40, 1e-6, 1e-24
 #: Longest step in sizes of the task, at first; its factors; the shortest.
 _REACH, _LONGER, _SHORTER, _LEAST = 0.02, 2.0, 0.25, 1e-10
+#: A step is made longer, up to so many times twice, if the merit falls by so much more than promised.
+_DOUBLED, _SLOW = 10, 1.3
 #: Violations of bounds that count as none, beside a weight that is larger than their multipliers.
 _KEPT, _WEIGHT = 1e-8, 2.0
 
@@ -49,14 +51,7 @@ def settled(problem: TaskProblem, x: Array) -> Settled:
             break
         weight = max(weight, _WEIGHT * pull)
         before, promised = _merit(now, weight), -(2.0 * g + J.T @ (J @ step)) @ step
-        later = problem.exactly(x + step, now.times)
-        if later.times is not None:  # the same once more, with what was seen of the curvature along the step
-            bent, over = _stacked(later)[0] - r - J @ step, later.bounds - now.bounds - now.steep @ step
-            second, _ = least_squares(H, g + J.T @ bent, now.steep, -now.bounds - over)
-            if second is not None:
-                other = problem.exactly(x + second, now.times)
-                if _merit(other, weight) < _merit(later, weight):
-                    step, later = second, other
+        step, later = _bent(problem, x, now, step, H, g, weight, before - _SLOW * promised)
         after = _merit(later, weight)
         if not after < before:
             damping, worse, refused = damping * worse, 2.0 * worse, refused + 1
@@ -72,6 +67,35 @@ def settled(problem: TaskProblem, x: Array) -> Settled:
         if refused >= _REFUSED or after < _NONE:
             break
     return best
+
+
+def _bent(
+    problem: TaskProblem, x: Array, now: Exact, step: Array, H: Array, g: Array, weight: float, far: float
+) -> tuple[Array, Exact]:
+    """Return a step, or a better one that knows how errors and bounds bend along it, and what is seen at its end.
+
+    A merit below ``far`` says that they bend away from the model: the step is doubled, along its arc, while that helps.
+    """
+    later = problem.exactly(x + step, now.times)
+    if later.times is None:
+        return step, later
+    r, J = _stacked(now)
+    bent, over = _stacked(later)[0] - r - J @ step, later.bounds - now.bounds - now.steep @ step
+    second, _ = least_squares(H, g + J.T @ bent, now.steep, -now.bounds - over)
+    if second is None:
+        return step, later
+    first, other = step, problem.exactly(x + second, now.times)
+    if _merit(other, weight) < _merit(later, weight):
+        step, later = second, other
+    for k in 2.0 ** np.arange(1, _DOUBLED):
+        if not _merit(later, weight) < far:
+            break
+        long = k * first + k * k * (second - first)
+        other = problem.exactly(x + long, later.times)
+        if not _merit(other, weight) < _merit(later, weight):
+            break
+        step, later = long, other
+    return step, later
 
 
 def levelled(problem: TaskProblem, x: Array) -> Settled:

@@ -35,6 +35,8 @@ Complex = NDArray[np.complex128]
 _PARTS, _PHASES, _COMPARED = (0.12, 0.2, 0.3, 0.45, 0.65, 0.9), 32, 14
 #: Weight of given pivots when a start is placed; points tried on each link; sets looked at together.
 _HELD, _TRIED, _TOGETHER = 30.0, 2, 128
+#: One of so many random candidates has one joint far away, up to so many times: long links are nearly guides.
+_STRETCHED, _FAR = 3, 30.0
 #: Matches of an index for every one that is wanted within a range; by how much the range may be too short; samples.
 _RANGES, _SLACK, _STEPS = 3, 0.03, 60
 
@@ -129,7 +131,7 @@ def planned(task: DesignTask, starts: Starts | None, seconds: float) -> Iterator
 
 
 def random_starts(model: Model, count: int, random: np.random.Generator) -> Unknowns:
-    """Return candidates near the sketch and far from it, with driven links of many sizes."""
+    """Return candidates near the sketch and far from it, driven links of many sizes, some with a joint far away."""
     design = model.plan.design
     wide = random.choice([0.0, 0.0, 1.0], (count, 1, 1))
     places = model.sketch + random.normal(0.0, 1.0, (count, *model.sketch.shape)) * (
@@ -138,6 +140,10 @@ def random_starts(model: Model, count: int, random: np.random.Generator) -> Unkn
     if model.task.drive == "rotation":
         sizes = random.uniform(math.log(0.12), math.log(2.0), (len(design.cranks), count))
         places = design.with_cranks(places, np.exp(sizes))
+    some, away = np.arange(count // _STRETCHED), random.integers(model.joints, size=count // _STRETCHED)
+    middle = places[some].mean(axis=1)
+    factor = np.exp(random.uniform(0.0, math.log(_FAR), (len(some), 1)))
+    places[some, away] = middle + factor * (places[some, away] - middle)
     numbers = random.uniform(0.0, math.pi, (count, len(design.numbers)))
     stroke = np.exp(random.uniform(math.log(0.3), math.log(2.0), count)) if model.task.linear else np.ones(count)
     points = np.zeros((count, sum(model.task.names.values()), 2))

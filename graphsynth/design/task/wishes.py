@@ -16,8 +16,9 @@ from graphsynth.design.task.places import Box
 Array = NDArray[np.float64]
 #: How much of a bound is asked beyond by a penalty, and the violation that counts like a tolerance.
 _BEYOND, _SPARE, _UNIT = 1.03, 0.003, 0.01
-#: What is asked beyond where bounds are kept exactly; the least sine of a transmission angle while they are not.
-_HAIR, _LEAST = 1e-7, 0.02
+#: What is asked beyond where bounds are kept exactly; the least sine of a transmission angle while they are not, and
+#: where they are: a mechanism beyond could not be assembled, so that no step would know how to come back.
+_HAIR, _LEAST, _VERGE = 1e-7, 0.02, 0.004
 
 
 def sampled_wishes(model: Model, moved: Moved, u: Unknowns, strict: float) -> list[Rows]:
@@ -47,7 +48,8 @@ def _transmission(model: Model, moved: Moved, u: Unknowns, corner: Corner, stric
     mu = two * np.conj(one) / np.maximum(np.abs(two * one), 1e-300)
     peaks, near, share = _peaks(moved, np.abs(mu.real))
     row, least = np.arange(len(mu))[:, None], math.sin(model.task.transmission)
-    most = math.sqrt(1.0 - (least if exact else max(_BEYOND * least, _LEAST)) ** 2) - exact * _HAIR
+    floor = max(least, _VERGE) if exact else max(_BEYOND * least, _LEAST)
+    most = math.sqrt(1.0 - floor**2) - exact * _HAIR
     mu, one, two = mu[row, near], one[row, near], two[row, near]
     unit = 1.0 if exact else 1.0 - most
     over = (peaks - most) / unit

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Curve = Callable[[Array], Complex]
 #: Samples of a turn in which points are looked for, and steps that refine their places.
-_SAMPLES, _STEPS = 2880, 6
+_SAMPLES, _STEPS = 2880, 8
 
 
 def timed(places: Complex, goals: Complex) -> float:
@@ -79,17 +79,17 @@ def passed(curve: Curve, goals: Complex, span: float = 2.0 * np.pi) -> tuple[flo
 
 def _refined(curve: Curve, goals: Complex, u: Array, step: float) -> Array:
     """Take inputs to the nearest points of the curve by parabolas through three neighbours, never uphill."""
-    best, least = u, np.abs(curve(u) - goals) ** 2
+    best, least, reach = u, np.abs(curve(u) - goals) ** 2, step
     for _ in range(_STEPS):
         low, high = (np.abs(curve(best + side * step) - goals) ** 2 for side in (-1.0, 1.0))
         bend = low - 2.0 * least + high
         with np.errstate(all="ignore"):
             shift = np.where(bend > 0.0, 0.5 * step * (low - high) / bend, 0.0)
-        new = best + np.clip(np.nan_to_num(shift), -step, step)
+        new = best + np.clip(np.nan_to_num(shift), -reach, reach)
         value = np.abs(curve(new) - goals) ** 2
         better = value < least
         best, least = np.where(better, new, best), np.where(better, value, least)
-        step *= 0.1
+        step *= 0.3
     return best
 
 

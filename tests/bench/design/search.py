@@ -28,7 +28,7 @@ from tests.bench.design.four_bars import FourBar, of_mechanism
 from tests.bench.design.tasks import Trial
 
 #: Answers of one search; by how much the tolerance falls from one search to the next; samples of a turn that is proved.
-_COUNT, _TIGHTER, _PROVED = 3, 0.5, 181
+_COUNT, _TIGHTER, _PROVED = 1, 0.5, 181
 #: Curves of an index to begin with, for a second of the processor.
 _STARTS = 12
 _FOREVER = 1e6

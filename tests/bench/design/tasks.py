@@ -24,6 +24,8 @@ Complex = NDArray[np.complex128]
 _FREE: dict[str, Any] = {"transmission": 0.0, "length_ratio": 300.0}
 #: The crank of the literature begins at 30 degrees from the frame and turns counter-clockwise.
 _CRANK: dict[str, Any] = {"crank_start": "30 deg", "crank_from": "frame", "turning": "counter-clockwise"}
+#: Positions of a function that are asked; it is measured at more.
+_ASKED = 91
 _HERE = Path(__file__).parent
 PUBLISHED: dict[str, list[dict[str, Any]]] = tomllib.loads((_HERE / "published.toml").read_text("utf-8"))
 
@@ -113,7 +115,9 @@ def _function(name: str, title: str, source: str, of: Any, between: Any, spans: 
     span, reach = (float(text.split()[0]) for text in spans)
 
     def task(tolerance: float) -> DesignTask:
-        target = FunctionTarget.of(of, between, input_range=spans[0], output_range=spans[1], tolerance=tolerance)
+        target = FunctionTarget.of(
+            of, between, input_range=spans[0], output_range=spans[1], count=_ASKED, tolerance=tolerance
+        )
         return DesignTask(targets=[target], drive="rocking", span=spans[0], links=[4], **_FREE)
 
     x = np.linspace(*between, 181)

@@ -86,6 +86,11 @@ def test_points_of_a_curve_are_found_in_order_and_only_in_order():
     assert measure.passed(BAR.curve, goals[[0, 3, 1, 4, 2]])[0] > 0.1
 
 
+def test_a_closed_path_may_begin_and_end_at_the_same_point():
+    goals = BAR.curve(np.array([0.4007, 1.3, 2.9, 4.4, 0.4007]))
+    assert measure.passed(BAR.curve, goals)[0] < 1e-16 and measure.passed(BAR.curve, goals[::-1])[0] < 1e-16
+
+
 def test_the_best_order_is_that_of_all_orders():
     random = np.random.default_rng(0)
     for _ in range(20):

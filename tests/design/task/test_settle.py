@@ -15,7 +15,7 @@ from graphsynth.design.task.answers import built
 from graphsynth.design.task.descend import descend
 from graphsynth.design.task.model import Model
 from graphsynth.design.task.plans import plans
-from graphsynth.design.task.problem import TaskProblem
+from graphsynth.design.task.problem import Exact, TaskProblem
 from graphsynth.design.task.settle import least_squares, levelled, settled
 from graphsynth.design.task.starts import from_mechanism, placed_starts, random_starts, shaken
 
@@ -46,6 +46,22 @@ def test_bounded_least_squares_are_those_of_all_sets_of_active_bounds() -> None:
         assert step is not None and (A @ step <= b + 1e-9).all() and pull >= 0.0
         assert 0.5 * step @ H @ step + g @ step == pytest.approx(least, abs=1e-9)
     assert least_squares(np.eye(1), np.zeros(1), np.array([[1.0], [-1.0]]), np.array([-1.0, -1.0]))[0] is None
+
+
+class Flat:
+    """Two errors whose sum of squares is 10 - 0.02 x + 0.01 x^2, though each of them is a hundred times as steep."""
+
+    def exactly(self, x: Any, before: Any) -> Exact:
+        (own,) = x
+        rest = math.sqrt(10.0 - 0.02 * own - 0.99 * own**2)
+        slopes = np.array([[[1.0], [-(0.01 + 0.99 * own) / rest]]])
+        return Exact([(np.array([[own, rest]]), slopes)], np.zeros(0), np.zeros((0, 1)), [])
+
+
+def test_steps_grow_where_errors_bend_away_from_their_model() -> None:
+    """Steps of Gauss and Newton are a hundredth of the way each: forty of them come to 0.33."""
+    found = settled(Flat(), np.zeros(1))  # type: ignore[arg-type]
+    assert found.x == pytest.approx([1.0], abs=1e-3) and found.error == pytest.approx(math.sqrt(9.99))
 
 
 @pytest.mark.long
