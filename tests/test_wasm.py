@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -20,7 +21,7 @@ from graphsynth.workbench import modules
 
 from .kernel_bits import kernel_of
 from .wasm_bits import Bits, Recorded, computations
-from .wasm_calls import Remote, node, tables
+from .wasm_calls import LOADER, Remote, node, tables
 
 ROOT = Path(__file__).parents[1]
 needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
@@ -84,11 +85,72 @@ def test_some_calls_give_the_bits_of_native_code(
 @needs_node
 def test_many_calls_give_the_bits_of_native_code(remote: Remote) -> None:
     kept, wrong = computations(many=True), []
+    seconds = float(os.environ.get("GRAPHSYNTH_BITS_SECONDS", "20"))
     for module, signature in LISTED:
-        most = int(os.environ.get("GRAPHSYNTH_BITS_CALLS_EACH", "1000000"))
-        done, bad = Bits(remote, module, signature).run(
-            kept.get(signature.kernel, []), most, 60.0, np.random.default_rng(9)
-        )
+        bits, calls = Bits(remote, module, signature), kept.get(signature.kernel, [])
+        done, bad = bits.run(calls, 1_000_000, seconds, np.random.default_rng(9))
         print(f"{done:>9}  {signature.kernel}", flush=True)
         wrong += [signature.kernel] * (bad > 0)
     assert not wrong
+
+
+# -- the loader --------------------------------------------------------------------------------------------------------
+
+LOADER_TESTS = """
+const fs = require("fs"), [loader, modules] = process.argv.slice(2), Kernels = require(loader);
+const said = (action) => { try { return action(); } catch (error) { return [error.name, error.kind, error.message]; } };
+async function main() {
+  const table = (name) => JSON.parse(fs.readFileSync(`${modules}/${name}.json`));
+  const open = (name) => Kernels.open(name, fs.readFileSync(`${modules}/${name}.wasm`), table(name));
+  const binding = await open("binding"), chains = await open("chains");
+  const add = "intervals.kernels.loops.add", found = {};
+  const low = new Float64Array(1), high = new Float64Array(1), given = [1];
+  binding.call(add, given, Float64Array.of(1), { data: [2], shape: [1] }, [2], low, high);
+  found.sum = [low[0], high[0], given[0]];
+  found.unknown = said(() => binding.call("no.kernel"));
+  found.few = said(() => binding.call(add, [1]));
+  found.shape = said(() => binding.call(add, 1, [1], [2], [2], low, high));
+  found.flat = said(() => binding.call(add, { data: [1, 2], shape: [2, 1] }, [1], [2], [2], low, high));
+  found.short = said(() => binding.call(add, { data: [1], shape: [2] }, [1], [2], [2], low, high));
+  found.raised = said(() => chains.call("structure.kernels.canon_packed", -1, [], []));
+  const kept = binding.array("f8", [2, 3]);
+  kept.data.set([1, 2, 3, 4, 5, 6]);
+  const before = kept.data, bytes = binding.memory.buffer.byteLength;
+  binding.free(binding.array("u1", bytes));
+  found.moved = [before.length, [...kept.data], binding.memory.buffer.byteLength > bytes];
+  const size = binding.memory.buffer.byteLength;
+  for (let k = 0; k < 1000; k++) binding.free(binding.array("f8", [100, 1000]), binding.array("i2", 7));
+  for (let k = 0; k < 1000; k++) chains.call("structure.kernels.canon_packed", 2, [0, 1, 1], [0, 0]);
+  found.kept = binding.memory.buffer.byteLength - size;
+  found.chains = chains.memory.buffer.byteLength;
+  found.places = [kept.place % 16, binding.array("u1", 3).place % 16];
+  new Function("Kernels", fs.readFileSync(process.argv[4], "utf8"))(Kernels);
+  const motion = await Kernels.load("motion");
+  found.registered = [motion === (await Kernels.load("motion")), motion.call("intervals.kernels.nearest.hypot", 3, 4)];
+  found.absent = await Kernels.load("nothing").catch((error) => error.message);
+  console.log(JSON.stringify(found));
+}
+main();
+"""
+
+
+@needs_node
+def test_the_loader_takes_what_fits_says_what_does_not_and_loses_no_memory(tmp_path: Path) -> None:
+    program, script = tmp_path / "program.js", tmp_path / "motion.js"
+    program.write_text(LOADER_TESTS)
+    script.write_text(modules.script("motion"))
+    command = ["node", str(program), str(LOADER), str(MODULES), str(script)]
+    found = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    assert found["sum"] == [3, 3, 1]
+    assert found["unknown"][2] == "module binding has no kernel no.kernel"
+    assert found["few"][2] == "intervals.kernels.loops.add takes 6 arguments, not 1"
+    assert found["shape"][2] == "argument 1 of intervals.kernels.loops.add must be an array"
+    assert found["flat"][2] == "argument 1 of intervals.kernels.loops.add must have 1 dimensions"
+    assert found["short"][2] == "argument 1 of intervals.kernels.loops.add has 1 numbers, not 2"
+    with pytest.raises(ValueError) as native:
+        kernel_of("graphsynth.structure.kernels.canon_packed")(-1, np.zeros(0, np.uint8), np.zeros(0, np.int64))
+    assert found["raised"] == ["Error", "ValueError", str(native.value)]
+    assert found["moved"] == [0, [1, 2, 3, 4, 5, 6], True]  # the old view is empty, the new one holds all
+    assert found["kept"] <= 1 << 20  # one array, not a thousand
+    assert found["chains"] < 4_000_000 and found["places"] == [0, 0]
+    assert found["registered"] == [True, 5] and found["absent"] == "the script of module nothing was not read"

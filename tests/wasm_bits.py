@@ -1,10 +1,12 @@
 """The same bits from WebAssembly and from native code: ``python -m tests.wasm_bits CALLS node|browser [KERNEL ...]``.
 
-Real calls are recorded from a few computations, then changed many times over, as `kernel_bits` does.
+Real calls are recorded from a few computations, then changed many times over, as `kernel_bits` does, for
+GRAPHSYNTH_BITS_SECONDS each.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -38,15 +40,15 @@ Recorded = dict[str, list[tuple[Any, ...]]]
 
 
 @contextmanager
-def recording(kept: Recorded) -> Iterator[None]:
-    """Keep copies of the arguments of calls from Python, by kernel: the first ones, and then ever rarer ones."""
+def recording(kept: Recorded, *, all_calls: bool = False) -> Iterator[None]:
+    """Keep copies of the arguments of calls from Python, by kernel: all, or the first ones and then ever rarer ones."""
     seen: dict[str, int] = {}
 
     def call(own: Any, *args: Any) -> Any:
         name = own.entry()[0] if own.entry() else ""
         count = seen[name] = seen.get(name, 0) + 1
-        if len(kept.setdefault(name, [])) < _KEPT and count & (count - 1) == 0:
-            kept[name].append(duplicate(args))
+        if all_calls or (len(kept.get(name, [])) < _KEPT and count & (count - 1) == 0):
+            kept.setdefault(name, []).append(duplicate(args))
         return library.Native.__call__(own, *args)
 
     Kernel.__call__ = Deferred.__call__ = call  # type: ignore[attr-defined]
@@ -134,6 +136,7 @@ class Bits:
 
 def main(most: int, place: str, *wanted: str) -> None:
     """Compare kernels of all modules, or those whose names hold a text; print how many calls."""
+    seconds = float(os.environ.get("GRAPHSYNTH_BITS_SECONDS", "300"))
     kept = computations(many=True)
     remote = {"node": node, "browser": browser}[place]()
     bad = 0
@@ -142,7 +145,7 @@ def main(most: int, place: str, *wanted: str) -> None:
             if wanted and not any(text in signature.kernel for text in wanted):
                 continue
             bits = Bits(remote, module, signature)
-            calls, wrong = bits.run(kept.get(signature.kernel, []), most, 300.0, np.random.default_rng(20))
+            calls, wrong = bits.run(kept.get(signature.kernel, []), most, seconds, np.random.default_rng(20))
             bad += wrong
             print(f"{calls:>9} calls, {wrong} chunks differ  {module}: {bits.name}", flush=True)
     remote.close()

@@ -89,6 +89,28 @@ class Remote:
 
         Returned are the results, of a call that raises the name of the error's class, and the arrays afterwards.
         """
+        found = self._ask(module, kernel, args, blocks, count, 0.0)
+        calls = self._tables[module]["kernels"][kernel]["calls"]
+        assert len({result for _, _, result, *_ in calls}) == 1
+        reader = _Reader(found)
+        results = [reader.result(calls[0][2]) for _ in range(count)]
+        arrays = [
+            reader.array(block.dtype, block.shape)
+            for leaf, block in zip(leaves(args), blocks, strict=True)
+            if isinstance(leaf, np.ndarray)
+        ]
+        assert reader.at == len(found)
+        return results, arrays
+
+    def seconds(self, module: str, kernel: str, args: tuple[Any, ...], seconds: float) -> float:
+        """Return how long one call takes, by calls for some seconds."""
+        blocks = [np.asarray(leaf)[None] if isinstance(leaf, np.ndarray | float) else leaf for leaf in leaves(args)]
+        return float(np.frombuffer(self._ask(module, kernel, args, blocks, 1, seconds))[0])
+
+    def _ask(
+        self, module: str, kernel: str, args: tuple[Any, ...], blocks: list[Any], count: int, seconds: float
+    ) -> bytes:
+        """Send a chunk, and wait for what comes back."""
         numbers = iter(range(len(blocks)))
         described, data, at = [], [], 0
         for leaf, block in zip(leaves(args), blocks, strict=True):
@@ -105,22 +127,22 @@ class Remote:
                 described.append({"kind": "whole", "value": str(int(leaf))})
         tree = _tree(args, numbers)
         self._chunks.put(
-            _packed({"module": module, "kernel": kernel, "count": count, "tree": tree, "leaves": described}, data)
+            _packed(
+                {
+                    "module": module,
+                    "kernel": kernel,
+                    "count": count,
+                    "tree": tree,
+                    "leaves": described,
+                    "seconds": seconds,
+                },
+                data,
+            )
         )
         found = self._found.get(timeout=self._seconds)
         if isinstance(found, str):
             raise RuntimeError(found)
-        calls = self._tables[module]["kernels"][kernel]["calls"]
-        assert len({result for _, _, result, *_ in calls}) == 1
-        reader = _Reader(found)
-        results = [reader.result(calls[0][2]) for _ in range(count)]
-        arrays = [
-            reader.array(block.dtype, block.shape)
-            for leaf, block in zip(leaves(args), blocks, strict=True)
-            if isinstance(leaf, np.ndarray)
-        ]
-        assert reader.at == len(found)
-        return results, arrays
+        return found
 
 
 def _tree(args: tuple[Any, ...], numbers: Iterator[int]) -> list[Any]:
