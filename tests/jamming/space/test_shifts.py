@@ -91,10 +91,10 @@ def test_verdicts_prices_and_ranges_of_a_motion():
     assert factor.low < 1.0 < factor.high and factor.high - factor.low < 2e-3
 
 
-def searched(seed, links=4):
-    """A random mechanism whose joints shift, and the least factor that a search with rotation matrices finds."""
+def searched(seed):
+    """A random four-bar whose joints shift, and the least factor that a search with rotation matrices finds."""
     rng = np.random.default_rng([seed, 12])
-    mechanism, motion, tilt, limits, _ = case(rng, links)
+    mechanism, motion, tilt, limits, _ = case(rng, 4)
     more = {pair: (t, s, float(rng.uniform(0.02, 0.4) * tilt.alpha)) for pair, (t, s) in limits.items()}
     least, missed = spatial(mechanism, motion.poses[0], tilt, more).least_factor(3)
     assert missed < 1e-9
@@ -108,9 +108,9 @@ def searched(seed, links=4):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "links"), [*((k, 4) for k in range(6)), (6, 6), (7, 6)])
-def test_a_search_finds_the_same_factor_and_contradicts_no_proof(seed, links):
-    model, q, least = searched(seed, links)
+@pytest.mark.parametrize("seed", range(6))
+def test_a_search_finds_the_same_factor_and_contradicts_no_proof(seed):
+    model, q, least = searched(seed)
     found = least_scale(Closure(model(1.0), False), q)
     assert found.missed < 1e-12 and found.scale == pytest.approx(least, rel=1e-6)
     for side in (1.0, -1.0):
