@@ -23,6 +23,7 @@ from graphsynth.kinematics.engine.gradients import revolute_dyads
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.laws import Driver, Linear
 from graphsynth.mechanism.model import Mechanism
+from graphsynth.structure.assur import decompose
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -34,6 +35,16 @@ _REST, _SLOW = np.array([0.0, 0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.1])
 
 #: Three joints, each on a link, with the angle in the middle.
 Corner = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
+
+
+class Rod(NamedTuple):
+    """A link between two revolute joints, the second that of a block which slides along a guide on another link."""
+
+    link: int
+    far: int
+    near: int
+    guide: int
+    slide: int
 
 
 class Unknowns(NamedTuple):
@@ -144,6 +155,7 @@ class Model:
         signs = random.choice([-1, 1], len(own)) if given is None else rest.modes[0, own]
         self.modes = {group: int(sign) for group, sign in zip(own, signs)}
         self.forms = [form for form in group_forms(self.base, rest.steps) if form.bars]
+        self.rods = _rods(plan)
         self.corners = _corners(self.base, plan, [set(step.links) for step in rest.steps])
         # the vector of unknowns: places, directions, points, what targets add, stroke
         self.points_at = 2 * len(self.free) + len(self.angles)
@@ -284,6 +296,25 @@ class Model:
         margins = np.zeros((*frames.shape[:2], len(forms)))
         sines = transmission_sines(forms, table, ends, frames, margins).min(axis=(1, 2))
         return np.asarray(100.0 * np.maximum(least - np.nan_to_num(sines), 0.0))
+
+
+def _rods(plan: Plan) -> list[Rod]:
+    """Return the rods of dyads with a slide that is guided by a link before them."""
+    design, found = plan.design, []
+    placed = {design.graph.frame or 0}.union(*design.drivers)
+    for group in decompose(design.graph, design.drivers).groups:
+        own = {*group.links}
+        joints = [
+            (k, {a, b}) for k, (a, b, _) in enumerate(design.graph.joints) if {a, b} & own and {a, b} <= own | placed
+        ]
+        placed |= own
+        inner = [k for k, pair in joints if pair == own]
+        turning = [(k, pair) for k, pair in joints if pair != own and design.kinds[k] == "R"]
+        sliding = [(k, pair) for k, pair in joints if pair != own and design.kinds[k] == "P"]
+        if len(own) == 2 and len(joints) == 3 and len(sliding) == 1 and design.kinds[inner[0]] == "R":
+            ((far, ends),), ((slide, pair),) = turning, sliding
+            found.append(Rod(*(ends & own), far, inner[0], *(pair - own), slide))
+    return found
 
 
 def _corners(base: Mechanism, plan: Plan, groups: list[set[int]]) -> list[Corner]:

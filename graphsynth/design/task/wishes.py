@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.design.task.model import Corner, Model, Moved, Rows, Unknowns
+from graphsynth.design.task.model import Corner, Model, Moved, Rod, Rows, Unknowns
 from graphsynth.design.task.places import Box
 
 Array = NDArray[np.float64]
@@ -22,12 +22,13 @@ _HAIR, _LEAST, _VERGE = 1e-7, 0.02, 0.004
 
 
 def sampled_wishes(model: Model, moved: Moved, u: Unknowns, strict: float) -> list[Rows]:
-    """Return transmission angles of dyads and cylinders, and the box.
+    """Return transmission angles of dyads, rods of sliders and cylinders, and the box.
 
     ``strict``: weight of the penalties; infinite for the numbers themselves, which then are negative where a bound is
     kept.
     """
     found = [_transmission(model, moved, u, corner, strict) for corner in model.corners]
+    found += [_sliding(model, moved, u, rod, strict) for rod in model.rods]
     if model.task.box is not None:
         found.append(_box(model, moved, u, model.task.box, strict))
     return found
@@ -65,6 +66,34 @@ def _transmission(model: Model, moved: Moved, u: Unknowns, corner: Corner, stric
             own = np.conj(by) * motions[row, near, link, 1]
             direct[:, 0, :, column] += own.real
             direct[:, 0, :, column + 1] -= own.imag
+    values = (over if exact else np.maximum(over, 0.0))[:, None, None]
+    return Rows(moved.inputs[near], values, loads, direct, 1.0 if exact else strict / _UNIT, mix=np.ones((1, 3)))
+
+
+def _sliding(model: Model, moved: Moved, u: Unknowns, rod: Rod, strict: float) -> Rows:
+    """Return by how much the sine of the angle between a rod and the guide of its slider is too large, at most."""
+    exact, row = strict == math.inf, np.arange(len(u.places))[:, None]
+    way = (u.places[:, rod.near] - u.places[:, rod.far]) @ [1.0, 1.0j]  # on the rod, at the start
+    angle = u.numbers[:, model.plan.design.numbers.index((rod.slide, "angle"))]
+    motions = moved.frames.view(np.complex128)
+    turned = motions[:, :, rod.link, 1] * np.conj(motions[:, :, rod.guide, 1])
+    own = turned * (way / np.maximum(np.abs(way), 1e-300) * np.exp(-1j * angle))[:, None]
+    peaks, near, share = _peaks(moved, np.abs(own.imag))
+    least = math.sin(model.task.transmission)
+    most = math.sqrt(1.0 - (least if exact else max(_BEYOND * least, _LEAST)) ** 2) - exact * _HAIR
+    unit = 1.0 if exact else 1.0 - most
+    over = (peaks - most) / unit
+    at = own[row, near]
+    slope = np.where(exact | (over > 0.0)[:, None], share * np.sign(at.imag) * at.real / unit, 0.0)
+    loads, direct = np.zeros((len(at), 1, model.links, 3, 3)), np.zeros((len(at), 1, 3, model.size))
+    loads[:, 0, rod.link, 2] += slope
+    loads[:, 0, rod.guide, 2] -= slope
+    direct[:, 0, :, model.angle_at(rod.slide)] = -slope
+    by = 1.0 / np.where(way == 0.0, 1.0, way)  # how the direction of the rod changes: the imaginary part of by dz
+    for joint, sign in ((rod.near, 1.0), (rod.far, -1.0)):
+        if (column := model.column(joint)) >= 0:
+            direct[:, 0, :, column] += sign * slope * by.imag[:, None]
+            direct[:, 0, :, column + 1] += sign * slope * by.real[:, None]
     values = (over if exact else np.maximum(over, 0.0))[:, None, None]
     return Rows(moved.inputs[near], values, loads, direct, 1.0 if exact else strict / _UNIT, mix=np.ones((1, 3)))
 

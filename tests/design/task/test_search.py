@@ -81,6 +81,14 @@ TASKS = {
         ),
         6,
     ),
+    "transmission angles of rods": (
+        DesignTask(
+            targets=[FunctionTarget(inputs=even(5, 2.0), outputs=[0, 0.1, 0.3, 0.4, 0.5], slides=True)],
+            sliders=1,
+            transmission="75 deg",
+        ),
+        6,
+    ),
     "function of a slider": (
         DesignTask(
             targets=[FunctionTarget(inputs=even(5, 2.0), outputs=[0, 0.1, 0.3, 0.4, 0.5], slides=True)], sliders=1
@@ -489,3 +497,26 @@ def test_a_cylinder_drives_a_point_along_a_line_at_any_speed() -> None:
     motion = gs.simulate(found[0].mechanism, np.linspace(0.0, 1.0, 20001))
     z = motion.point("P").position @ [1.0, 1.0j]
     assert max(float(np.abs(z - p).min()) for p in line.goal) < 0.03 * line.size
+
+
+@pytest.mark.slow
+def test_a_slider_moves_evenly_for_a_quarter_of_a_turn_and_its_rod_keeps_the_transmission_angle() -> None:
+    even_way = FunctionTarget(
+        inputs=[0, math.pi / 6, math.pi / 3, math.pi / 2], outputs=[0, 1, 2, 3], slides=True, tolerance=0.05
+    )
+    stroke = SwingTarget(least=3, most=8, slides=True, tolerance=0.05)
+    task = DesignTask(targets=[even_way, stroke], links=[4, 6], sliders=1, transmission="25 deg")
+    found = design(task, count=1, seconds=600, processor_seconds=40)
+    assert found.accepted
+    mechanism = found[0].mechanism
+    motion = gs.simulate(mechanism, np.linspace(0.0, math.tau, 2001))
+    slide = next(j for j in mechanism.joints if j.kind == "P")
+    block = slide.a if slide.b == mechanism.frame else slide.b
+    (rod,) = (j.a if j.b == block else j.b for j in mechanism.joints if block in j.pair and j is not slide)
+    ends = [motion.point(j.a, j.at_a).position @ [1.0, 1.0j] for j in mechanism.joints if rod in j.pair]
+    guide = motion.poses[-1, block, :2] - motion.poses[500, block, :2]
+    if (
+        len(ends) == 2 and np.hypot(*guide) > 0.0
+    ):  # a rod of two joints: the angle between it and the normal of its guide
+        along = (ends[1] - ends[0]) / np.abs(ends[1] - ends[0]) * np.conj(complex(*guide) / np.hypot(*guide))
+        assert np.degrees(np.arccos(np.abs(along.imag).max())) > 25 - 0.01
