@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binomtest
 
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.design import CurveIndex, DesignTask, FunctionTarget, PathTarget, design, index_starts
@@ -238,15 +239,14 @@ def add(path: Path, row: Row) -> None:
         writer.writerow([f"{value:.4g}" if isinstance(value, float) else value for value in asdict(row).values()])
 
 
-def share(found: int, count: int, z: float = 1.96) -> tuple[float, float]:
-    """Bounds of a share with 95 % confidence, by Wilson's formula.
+def share(found: int, count: int) -> tuple[float, float]:
+    """Bounds of a share with 95 % confidence, exact (Clopper and Pearson).
 
     >>> [round(bound, 3) for bound in share(9, 10)]
-    [0.596, 0.982]
+    [0.555, 0.997]
     """
-    p, n = found / count, float(count)
-    middle, half = p + z * z / (2 * n), z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-    return (middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n)
+    low, high = binomtest(found, count).proportion_ci(0.95, method="exact")
+    return float(low), float(high)
 
 
 def table(rows: list[Row]) -> str:

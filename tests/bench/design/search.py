@@ -27,8 +27,9 @@ from tests.bench.design import measure
 from tests.bench.design.four_bars import FourBar, of_mechanism
 from tests.bench.design.tasks import Trial
 
-#: Answers of one search; by how much the tolerance falls from one search to the next; samples of a turn that is proved.
-_COUNT, _TIGHTER, _PROVED = 1, 0.5, 181
+#: Answers of one search, of four-bars and of longer chains, of which there are many; by how much the tolerance falls
+#: from one search to the next; samples of a turn that is proved.
+_COUNT, _TIGHTER, _PROVED = (1, 3), 0.5, 181
 #: Curves of an index to begin with, for a second of the processor.
 _STARTS = 12
 _FOREVER = 1e6
@@ -88,8 +89,9 @@ def ours(trial: Trial, seconds: float, *, only_dyads: bool = False, index: Curve
         def starts(task: DesignTask, given: Any = given, more: Any = more) -> list[Mechanism]:
             return [*given, *(more(task) if more is not None else ())]
 
+        count = _COUNT[max(task.links) > 4]
         try:
-            found = design(task, seconds=_FOREVER, processor_seconds=left, seed=seed, count=_COUNT, starts=starts)
+            found = design(task, seconds=_FOREVER, processor_seconds=left, seed=seed, count=count, starts=starts)
         except GeometryError as fault:  # no chain fits
             return Result(float("inf"), seconds=process_time() - begin, note=str(fault).partition(":")[0])
         for answer in found.answers:

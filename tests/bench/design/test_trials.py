@@ -176,11 +176,16 @@ def test_hidden_mechanisms_are_drawn_alike_and_measured_by_the_whole_motion():
     assert task.targets[0].closed and task.targets[0].size == pytest.approx(curve.size, rel=1e-3)
 
 
-def test_shares_have_the_bounds_of_wilson():
-    """They solve (p - k / n)^2 = z^2 p (1 - p) / n."""
-    for k, n in ((0, 10), (9, 10), (170, 200)):
-        for p in hidden.share(k, n):
-            assert (p - k / n) ** 2 == pytest.approx(1.96**2 * p * (1.0 - p) / n, abs=1e-12)
+def test_shares_have_the_bounds_of_clopper_and_pearson():
+    """At either bound what was found, or more of it, has a probability of 2.5 %: sums of the binomial distribution."""
+    for k, n in ((0, 10), (9, 10), (10, 10), (170, 200)):
+        low, high = hidden.share(k, n)
+
+        def part(p, counts, n=n):
+            return sum(math.comb(n, j) * p**j * (1.0 - p) ** (n - j) for j in counts)
+
+        assert low == 0.0 if k == 0 else part(low, range(k, n + 1)) == pytest.approx(0.025)
+        assert high == 1.0 if k == n else part(high, range(k + 1)) == pytest.approx(0.025)
 
 
 @pytest.mark.slow
