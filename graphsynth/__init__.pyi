@@ -70,3 +70,4 @@ from .systems.piston.machine import PistonMachine as PistonMachine
 from .systems.piston.model import FloatingPiston as FloatingPiston
 from .systems.platform.parallel_platform import ParallelPlatform as ParallelPlatform
 from .systems.platform.single_motor_platform import SingleMotorPlatform as SingleMotorPlatform
+from .workbench.opening import OpenedWorkbench as OpenedWorkbench

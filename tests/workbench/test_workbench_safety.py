@@ -70,6 +70,7 @@ def told(count, least):
     assert count["read"] + count["refused"] == least and min(count["read"], count["refused"]) > least / 50
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", ["json", "toml"])
 def test_damaged_files_are_one_sentence(scripts, form):
     """2500 of each form, from every kind of joint and law."""
@@ -80,6 +81,7 @@ def test_damaged_files_are_one_sentence(scripts, form):
     told(scripts(f"{DAMAGE}{each} return count;", texts, 7), 2500)
 
 
+@pytest.mark.long
 def test_damaged_addresses_are_one_sentence(scripts):
     """2500 damaged as they stand, 2500 packed anew after their inside was damaged."""
     given = [to_dict(assembled(make())) for make in CASES.values()]
@@ -98,6 +100,7 @@ def test_damaged_addresses_are_one_sentence(scripts):
     told(scripts(body, given, 11), 5000)
 
 
+@pytest.mark.long
 def test_what_is_too_much_is_refused_at_once(scripts):
     bomb = compressobj(9, wbits=-15)
     packed = urlsafe_b64encode(bomb.compress(b" " * 30_000_000) + bomb.flush()).decode().rstrip("=")

@@ -275,7 +275,7 @@ def test_no_script_holds_a_sentence(name):
 ALLOWED = {
     "sheet view tool draft", "sheet view tool draft pose", "sheet view tool", "use strict", "graphsynth mechanism",
     "input:not([type=range]):not([type=checkbox]), select, textarea, dialog", "button, summary, a, [type=checkbox]",
-    "input,select,button", "snap point",
+    "input,select,button", "snap point", "change point", "dead centre", "input time",
 }  # fmt: skip
 
 

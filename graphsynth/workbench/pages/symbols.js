@@ -37,7 +37,8 @@
   Bench.shapeOf = (sheet, id) => {
     const ids = new Set(sheet.links[id].points);
     for (const pair of Object.values(sheet.pairs)) {
-      if (pair.a === id && pair.kind !== "P" && pair.kind !== "pin-slot") ids.add(pair.at);
+      const guiding = pair.kind === "P" || pair.kind === "pin-slot";
+      if (pair.a === id && (!guiding || (id !== Bench.GROUND && sheet.links[id].points.length === 1))) ids.add(pair.at);
       if (pair.b === id) ids.add(pair.on || pair.at);
     }
     return [...ids].map(point => [sheet.points[point].x, sheet.points[point].y]);
