@@ -15,7 +15,7 @@ from graphsynth.mechanism.model import Mechanism
 from graphsynth.workbench.modules import names, script
 
 #: Modules of kernels that the page loads at once.
-_FIRST = ("motion",)
+_FIRST = ("motion", "chains")
 _FOLDER = PageFolder("workbench-page.txt", {".": (".html", ".css", ".js")})
 
 

@@ -8,6 +8,7 @@ import subprocess
 
 import pytest
 
+from graphsynth.workbench.modules import script
 from graphsynth.workbench.writing import languages, page_file, write_workbench
 
 FLAGS = (
@@ -25,7 +26,7 @@ def scripts():
     if not node:
         pytest.skip("no Node on this machine")
     words = "".join(f"Bench.words({json.dumps(k)}, {json.dumps(table)});" for k, table in languages().items())
-    base = "".join(page_file(f"{name}.js") for name in PURE) + words
+    base = "".join(page_file(f"{name}.js") for name in PURE) + words + script("chains")
 
     def run(body, *arguments):
         asked = f"(async (...args) => {{ {body} }})(...{json.dumps(arguments)})"

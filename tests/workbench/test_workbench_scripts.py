@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from graphsynth import Driver, Gear, Mechanism, MechanismGraph, PinSlot, Prismatic, Revolute
+from graphsynth import Driver, Gear, Mechanism, MechanismGraph, PinSlot, Prismatic, Revolute, enumerate_chains
 from graphsynth.mechanism import gallery
 from graphsynth.mechanism.constraints import residual
 from graphsynth.mechanism.files import to_dict
@@ -234,20 +234,8 @@ def test_every_word_is_asked_for_and_every_word_asked_for_is_there():
     names = page_file("order.txt").split()
     text = page_file("index.html") + "".join(page_file(f"{name}.js") for name in names)
     known = languages()["en"]
-    built = {
-        "tool.",
-        "hint.",
-        "template.",
-        "name.",
-        "pair.",
-        "mode.",
-        "do.",
-        "language.",
-        "said.",
-        "fault.file.",
-        "event.",
-        "know.",
-    }
+    groups = "tool hint template name pair mode do language said fault.file event know chain"
+    built = [f"{group}." for group in groups.split()]
     for key in known:
         assert f'"{key}"' in text or f"'{key}'" in text or any(key.startswith(start) for start in built), key
     for key in re.findall(
@@ -360,3 +348,19 @@ def test_the_picture_is_scaled_about_the_first_place(scripts):
              [{x: 20, y: 30}, {x: 60, y: 30}], 10);"""
     )
     assert (found["x"], found["y"], found["width"], found["height"]) == (17.5, 35, 50, 25)
+
+
+def test_the_key_of_the_chain_is_that_of_the_library(scripts):
+    """Every chain of four to eight links in shuffled numbers, and mechanisms with joints of mobility 2."""
+    lots = np.random.default_rng(5)
+    graphs = []
+    for chain in [chain for links in (4, 6, 8) for chain in enumerate_chains(links)]:
+        to = lots.permutation(chain.links).tolist()
+        graphs.append(chain.relabelled(to))
+    graphs += [geared().graph.without_frame(), slotted().graph.without_frame()]
+    joints = [[{"kind": ("R", "gear")[m - 1], "a": b, "b": a} for a, b, m in graph.joints] for graph in graphs]
+    given = [{"pose": [[0, 0, 0]] * graph.links, "joints": own} for graph, own in zip(graphs, joints)]
+    found = scripts(
+        "const chains = await Kernels.load('chains'); return args[0].map(data => Bench.chainKey(chains, data))", given
+    )
+    assert found == [graph.key for graph in graphs]

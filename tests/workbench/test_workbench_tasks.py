@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from graphsynth import Mechanism
-from graphsynth.workbench.modules import names
+from graphsynth.workbench.writing import page_file
 from tests.workbench.person import Person, four_bar
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif("motion" not in names(), reason="the module of the planar engine is not built"),
+    pytest.mark.skipif("engine" not in page_file("order.txt").split(), reason="the page has no planar engine"),
 ]
 
 

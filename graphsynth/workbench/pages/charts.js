@@ -79,9 +79,10 @@
     let move = null, shown = null;
     const build = () => {
       const { motion } = app, swept = motion && motion.driven ? motion.sweep() : null;
-      place.closest("section").hidden = !swept;
+      const span = swept ? swept.inputs[swept.inputs.length - 1] - swept.inputs[0] : 0;
+      place.closest("section").hidden = !(span > 0);
       move = null;
-      if (!swept) { place.replaceChildren(); return; }
+      if (!(span > 0)) { place.replaceChildren(); return; }
       const all = quantities(app, motion, swept), own = all.find(([key]) => key === shown) || all[0];
       if (!own) { place.replaceChildren(); return; }
       const select = make("select", { "aria-label": Bench.word("chart.choose"), on: { change: () => { shown = select.value; build(); } } },

@@ -26,6 +26,13 @@
     return Bench.word(`know.${kind}`, { links: link === null ? "–" : named(app, [Number(link)]) });
   }
 
+  /** The chain: its key in the atlas and in the library, and its name if it has one. */
+  function chain(app) {
+    if (!app.chains) return [];
+    const key = Bench.chainKey(app.chains, Bench.written(app.sheet)), named = `chain.${key}`, name = Bench.word(named);
+    return [[Bench.word("know.chain"), name === named ? key : `${name} (${key})`]];
+  }
+
   /** A row of buttons, one for each entry. */
   const buttons = entries => make("div", { class: "acts" }, ...entries.map(([text, act, more = {}]) => make("button", { type: "button", on: { click: act }, ...more }, text)));
 
@@ -70,9 +77,10 @@
   Bench.showKnown = (app, place) => {
     const { motion } = app, engine = motion && motion.current();
     app.faulty = [];
-    place.closest("section").hidden = !motion;
+    place.closest("section").hidden = !app.chains && !motion;
+    if (!motion && Object.keys(app.sheet.links).length > 1) { place.replaceChildren(Bench.rows(chain(app))); return; }
     if (!engine) { place.replaceChildren(make("p", { class: "soft" }, Bench.word("know.nothing"))); return; }
-    const rows = [[Bench.word("know.mobility"), String(engine.mobility)]], parts = [];
+    const rows = [[Bench.word("know.mobility"), String(engine.mobility)], ...chain(app)], parts = [];
     if (engine.fault) {
       app.faulty = idsOf(app, engine.fault.tooMany || []);
       parts.push(make("p", { class: "warn" }, fault(app, engine.fault)));

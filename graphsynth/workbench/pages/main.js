@@ -173,9 +173,12 @@
     Bench.listen(app);
     for (const element of document.querySelectorAll("[data-mode]")) if (element !== document.body) element.addEventListener("click", () => app.setMode(element.dataset.mode));
     Bench.charts(app, $("charts"));
-    if (typeof Engine !== "undefined") try {
-      app.motion = new Bench.Motion(app, await Kernels.load("motion"));
-      Bench.player(app);
+    try {
+      app.chains = await Kernels.load("chains");
+      if (typeof Engine !== "undefined") {
+        app.motion = new Bench.Motion(app, await Kernels.load("motion"));
+        Bench.player(app);
+      }
     } catch (error) { app.fault(new Bench.Fault("fault.kernels", { error: String(error.message).slice(0, 80) })); }
     speak(app);
     if (!(await Bench.openAddress(app))) {

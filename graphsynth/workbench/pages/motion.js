@@ -24,6 +24,7 @@
       if (Object.keys(app.sheet.links).length < 2) return null;
       const data = Bench.written(app.sheet);
       if (data.joints.length) this.engine = Engine.open(this.kernels, data);
+      this.way = 1;
       return this.engine;
     }
     get ready() { const engine = this.current(); return Boolean(engine && !engine.open); }
@@ -34,6 +35,8 @@
       const own = this.app.sheet.drivers[this.driver], joint = own && Bench.drivable(this.app.sheet, own.base, own.link);
       return !joint || joint.turns;
     }
+    /** Whether the driver cannot move at all from here. */
+    get stands() { const swept = this.sweep(); return !swept || !(swept.inputs[swept.inputs.length - 1] > swept.inputs[0]); }
     /** Why nothing moves, as the key of a sentence. */
     get why() {
       const engine = this.current();
@@ -108,7 +111,7 @@
 
     toggle() { if (this.playing) this.pause(); else this.play(); }
     play() {
-      if (!this.driven) { this.app.say(this.why); return; }
+      if (!this.driven || this.stands) { this.app.say(this.why); return; }
       if (this.app.mode !== "run") this.app.setMode("run");
       this.playing = true;
       let before = performance.now();

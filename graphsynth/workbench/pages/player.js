@@ -25,7 +25,7 @@
 
   function refresh(app) {
     const { motion } = app, bar = $("player");
-    bar.hidden = !motion || !motion.driven;
+    bar.hidden = !motion || !motion.driven || motion.stands;
     if (bar.hidden) return;
     const swept = motion.sweep(), time = $("time"), low = swept.inputs[0], high = swept.inputs[swept.inputs.length - 1];
     let value = motion.input;
