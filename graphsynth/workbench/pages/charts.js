@@ -53,7 +53,7 @@
     const x = input => LEFT + ((input - first) / (last - first)) * (WIDE - LEFT - 6), y = value => HIGH - BOTTOM - ((value - low) / (high - low)) * (HIGH - BOTTOM - TOP);
     const root = svg("svg", { class: "chart", viewBox: `0 0 ${WIDE} ${HIGH}`, role: "img", "aria-label": Bench.word("chart.label", { name, low: Bench.shown(low, 4), high: Bench.shown(high, 4), unit }) });
     for (const at of ticks(low, high, 4)) {
-      root.append(svg("path", { class: "rule", d: `M${LEFT} ${y(at)}H${WIDE - 6}` }), svg("text", { class: "tick end", x: LEFT - 4, y: y(at) + 4 }, Bench.shown(at, 4)));
+      root.append(svg("path", { class: "rule", d: `M${LEFT} ${y(at)}H${WIDE - 6}` }), svg("text", { class: "tick left", x: LEFT - 4, y: y(at) + 4 }, Bench.shown(at, 4)));
     }
     for (const at of ticks(first * turn, last * turn, 5)) root.append(svg("text", { class: "tick middle", x: x(at / turn), y: HIGH - 4 }, Bench.shown(at, 4)));
     for (const event of swept.events) root.append(svg("path", { class: `moment ${event.kind.replace(" ", "-")}`, d: `M${x(event.input)} ${TOP}V${HIGH - BOTTOM}` }, svg("title", {}, motion.told(event))));

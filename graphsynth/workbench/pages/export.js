@@ -16,7 +16,7 @@
     root.dataset.theme = "light";
     const copy = Bench.svg("svg", { xmlns: "http://www.w3.org/2000/svg", viewBox: `0 0 ${view.width} ${view.height}`, width: view.width, height: view.height, "font-family": "sans-serif" });
     copy.append(Bench.svg("rect", { width: view.width, height: view.height, fill: "#ffffff" }));
-    for (const name of ["under", "curves", "links", "marks", "points", "motion"]) {
+    for (const name of ["under", "links", "curves", "marks", "points", "motion"]) {
       const live = view.layers[name], made = live.cloneNode(true), from = [...live.querySelectorAll("*")];
       [...made.querySelectorAll("*")].forEach((element, k) => {
         const own = getComputedStyle(from[k]);

@@ -109,13 +109,19 @@
       parts.push(...driverPart(app, [pair.a, pair.b]));
     }
     if (pair.kind === "gear") {
-      const teeth = k => text => {
-        const own = app.posed().pairs[id], radii = [...own.radii];
-        radii[k] = number(text, sheet.unit);
-        take(app, s => Bench.withTeeth(s, id, ...radii, own.internal));
+      // the wheels stay in mesh: one radius gives the other
+      const radius = k => text => {
+        const own = number(text, sheet.unit), length = Bench.distance(sheet, pair.at, pair.on);
+        const other = pair.internal ? Math.abs(own + (k ? -length : length)) : length - own;
+        take(app, s => Bench.withTeeth(s, id, ...(k ? [other, own] : [own, other]), pair.internal));
       };
-      parts.push(field(app, "panel.first", tidy(pair.radii[0]), teeth(0), { unit: sheet.unit }),
-        field(app, "panel.second", tidy(pair.radii[1]), teeth(1), { unit: sheet.unit }),
+      const ratio = text => {
+        const own = number(text, sheet.unit);
+        take(app, s => Bench.withTeeth(s, id, 1, own, pair.internal));
+      };
+      parts.push(field(app, "panel.first", tidy(pair.radii[0]), radius(0), { unit: sheet.unit }),
+        field(app, "panel.second", tidy(pair.radii[1]), radius(1), { unit: sheet.unit }),
+        field(app, "panel.ratio", tidy(pair.radii[1] / pair.radii[0]), ratio),
         check("panel.internal", pair.internal, on => take(app, s => Bench.withTeeth(s, id, pair.radii[0],
           on && pair.radii[0] === pair.radii[1] ? 2 * pair.radii[1] : pair.radii[1], on))));
     }
