@@ -36,6 +36,7 @@ from .kernel_calls import duplicate, size_of
 from .wasm_calls import Remote, browser, node
 
 _KEPT, _CHUNK, _BYTES = 12, 4096, 8_000_000
+RUN = "kinematics.engine.kernels.running.run"
 Recorded = dict[str, list[tuple[Any, ...]]]
 
 
@@ -85,6 +86,16 @@ def computations(*, many: bool) -> Recorded:
 # -- comparing ---------------------------------------------------------------------------------------------------------
 
 
+def _without_margins(args: tuple[Any, ...], arrays: list[np.ndarray]) -> list[np.ndarray]:
+    """Drop margins of the engine's state from the sample on that was not reached: there is memory as it was found."""
+    given = [id(leaf) for leaf in leaves(args) if isinstance(leaf, np.ndarray)]
+    margins, done = given.index(id(args[5].M)), given.index(id(args[7]))
+    found = arrays[margins].copy()
+    for k, reached in enumerate(arrays[done][:, -1].tolist()):
+        found[k, :, reached:] = 0.0
+    return [*arrays[:margins], found, *arrays[margins + 1 :]]
+
+
 class Bits:
     """One kernel of a module, in both forms."""
 
@@ -98,6 +109,9 @@ class Bits:
         copies, calls = rows_of(args, blocks)
         wanted = [found.__name__ if isinstance(found, type) else found for found in results(self.kernel, calls)]
         found, arrays = self.remote.call(self.module, self.name, args, blocks, count)
+        if self.name == RUN:
+            arrays, ours = _without_margins(args, arrays), _without_margins(args, list(copies))
+            return same_results(found, wanted) and all(map(same_bits, arrays, ours))
         return same_results(found, wanted) and all(map(same_bits, arrays, copies))
 
     def agree_on(self, args: tuple[Any, ...]) -> bool:

@@ -119,7 +119,7 @@ def main() -> None:
     options = parser.parse_args()
     names = options.modules or list(read_modules())
     if len(names) == 1 and all(os.environ.get(name) == value for name, value in ENVIRONMENT.items()):
-        build(*names, options.output)
+        build(names[0], options.output)
         return
     for name in names:  # each in a process of its own, so that it does not depend on the others
         subprocess.run([*_WASM, "--output", str(options.output), name], env=os.environ | ENVIRONMENT, check=True)
