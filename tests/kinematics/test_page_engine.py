@@ -1,0 +1,159 @@
+"""The engine of the page in Node, with kernels in WebAssembly, beside the library."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from graphsynth.atlas.catalogue import Catalogue
+from graphsynth.atlas.stored import stored_mechanisms
+from graphsynth.core.errors import GeometryError
+from graphsynth.core.native.wasm import MODULES
+from graphsynth.kinematics.engine.program import compile_program
+from graphsynth.kinematics.simulation import simulate
+from graphsynth.mechanism.files import to_dict
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
+from graphsynth.structure.assur import find_fault
+from graphsynth.structure.graph import MechanismGraph
+from graphsynth.workbench import __file__ as _workbench
+
+from .random_mechanisms import random_mechanism
+
+pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
+RUNNER, PAGES = Path(__file__).parents[1] / "workbench_runner.js", Path(_workbench).with_name("pages")
+
+
+def in_page(folder: Path, jobs: list[tuple[Mechanism, list[list[Any]]]]) -> list[dict[str, Any]]:
+    """Let the page's engine do calls with mechanisms; its results, and pose and inputs after each."""
+    given, found = folder / "jobs.json", folder / "results.json"
+    given.write_text(json.dumps([{"drawn": to_dict(mechanism), "calls": calls} for mechanism, calls in jobs]))
+    subprocess.run(["node", str(RUNNER), str(PAGES), str(MODULES), str(given), str(found)], check=True)
+    results: list[dict[str, Any]] = json.loads(found.read_text())
+    return results
+
+
+def array(values: list[Any], *shape: int) -> np.ndarray:
+    return np.array([math.nan if value is None else value for value in values]).reshape(shape)
+
+
+def inversion(mechanism: Mechanism, frame: int, link: int) -> Mechanism | None:
+    """The same links and joints on another frame, driven there; None if that cannot be decomposed."""
+    graph = MechanismGraph(mechanism.graph.links, mechanism.graph.joints, frame=frame)
+    if find_fault(graph, [(frame, link)]) is not None:
+        return None
+    pose = np.array(mechanism.pose)
+    z = np.exp(-1j * pose[frame, 2]) * (pose[:, 0] + 1j * pose[:, 1] - complex(*pose[frame, :2]))
+    turned = np.column_stack([z.real, z.imag, pose[:, 2] - pose[frame, 2]])
+    turned[frame] = 0.0
+    return Mechanism(graph, mechanism.joints, [Driver(frame, link)], pose=tuple(map(tuple, turned.tolist())))
+
+
+def stored() -> list[Mechanism]:
+    """One mechanism with dimensions of every chain of the shipped catalogue that has them."""
+    with Catalogue.shipped() as shipped, shipped.reading():
+        chains = [row[0] for row in shipped.connection.execute("select distinct chain_id from evaluations")]
+        return [
+            Mechanism.from_json(own.text)
+            for chain in chains
+            for own in list(stored_mechanisms(shipped.connection, chain))[:1]
+        ]
+
+
+def turning(mechanisms: list[Mechanism]) -> list[tuple[Mechanism, Any]]:
+    """Every frame and driver with which a mechanism makes a full turn, and that motion."""
+    found = []
+    for mechanism in mechanisms:
+        base = simulate(mechanism, [0.0], events=False)
+        if not base.completed:
+            continue
+        posed = Mechanism(mechanism.graph, mechanism.joints, mechanism.drivers, pose=tuple(map(tuple, base.poses[0])))
+        for frame in range(mechanism.graph.links):
+            for joint in mechanism.graph.joints:
+                if frame not in (joint.a, joint.b):
+                    continue
+                link = joint.a + joint.b - frame
+                own = inversion(posed, frame, link)
+                if own is None:
+                    continue
+                first = own.pose[link][2]
+                motion = simulate(own, np.linspace(first, first + math.tau, 121))
+                if motion.completed:
+                    found.append((own, motion))
+    return found
+
+
+def check_turns(folder: Path, turns: list[tuple[Mechanism, Any]]) -> None:
+    """Poses, rates and dead centres over whole turns are those of the library."""
+    results = in_page(folder, [(mechanism, [["sweep", 121]]) for mechanism, _ in turns])
+    for (mechanism, motion), result in zip(turns, results, strict=True):
+        links, swept = mechanism.graph.links, result["done"][0]["result"]
+        assert result["known"]["fault"] is None and swept["full"], (mechanism.graph, swept["stop"])
+        poses, rates = array(swept["poses"], 121, links, 3), array(swept["velocities"], 121, links, 3)
+        assert np.abs(array(swept["inputs"], 121) - motion.inputs).max() < 1e-14
+        assert np.abs(poses[..., :2] - motion.poses[..., :2]).max() < 1e-9 * motion.Lc
+        assert np.abs(np.exp(1j * poses[..., 2]) - np.exp(1j * motion.poses[..., 2])).max() < 1e-9
+        fastest = np.abs(motion.velocities).max()
+        assert np.abs(rates - motion.velocities).max() < 1e-6 * fastest
+        own = sorted(event["input"] for event in swept["events"] if event["kind"] == "dead centre")
+        known = [event.input for event in motion.events if event.kind == "dead centre"]
+        assert len(own) >= 0.9 * len(known) and all(min(abs(np.array(known) - at)) < 1e-6 for at in own)
+
+
+@pytest.mark.long
+def test_turns_of_chains_are_those_of_the_library(tmp_path: Path) -> None:
+    mechanisms = stored()
+    turns = turning([one for one in mechanisms if one.graph.links <= 6])
+    assert len(turns) >= 10
+    check_turns(tmp_path, turns)
+
+
+@pytest.mark.slow
+def test_turns_of_all_chains_are_those_of_the_library(tmp_path: Path) -> None:
+    turns = turning(stored())
+    assert len(turns) > 500
+    check_turns(tmp_path, turns)
+
+
+def test_ranges_between_limits_are_those_of_the_library(tmp_path: Path) -> None:
+    rocker = Mechanism.four_bar(4.0, 3.0, 2.0, 2.5)  # nothing turns fully
+    posed = simulate(rocker, [0.7], events=False)
+    mechanism = Mechanism(rocker.graph, rocker.joints, rocker.drivers, pose=tuple(map(tuple, posed.poses[0])))
+    (result,) = in_page(tmp_path, [(mechanism, [["sweep", 181], ["advance", 3.0], ["advance", 0.7]])])
+    swept, away, home = (done["result"] for done in result["done"])
+    reach = math.acos((4.0**2 + 3.0**2 - 4.5**2) / 24.0)  # coupler and rocker stretched
+    limits = [event["input"] for event in swept["events"] if event["kind"] == "limit"]
+    assert np.allclose(sorted(limits), [-reach, reach], atol=1e-12, rtol=0.0)
+    assert not away["reached"] and abs(away["input"] - reach) < 1e-12 and away["stop"]["kind"] == "limit"
+    assert home["reached"]
+    assert np.abs(np.reshape(result["done"][2]["pose"], (4, 3))[:, :2] - posed.poses[0][:, :2]).max() < 1e-9
+
+
+def test_faults_and_groups_are_those_of_the_library(tmp_path: Path) -> None:
+    random = np.random.default_rng(4)
+    mechanisms = [random_mechanism(random, 0.3) for _ in range(40)]
+    jobs = []
+    for mechanism in mechanisms:
+        jobs.append((mechanism, [["drivers"]]))
+        none = Mechanism(mechanism.graph, mechanism.joints, [], pose=mechanism.pose)
+        jobs.append((none, []))
+    results = in_page(tmp_path, jobs)
+    for mechanism, result, none in zip(mechanisms, results[::2], results[1::2], strict=True):
+        try:
+            steps = [step for step in compile_program(mechanism).steps if step.group >= 0]
+        except GeometryError:
+            assert result["known"]["fault"] is not None
+        else:
+            assert [(g["kind"], g["links"]) for g in result["known"]["groups"]] == [
+                (s.kind, list(s.links)) for s in steps
+            ]
+        assert none["known"]["fault"]["kind"] == "drivers" and none["known"]["mobility"] == mechanism.graph.mobility
+        fault = find_fault(mechanism.graph, [])
+        assert fault is not None and tuple(none["known"]["fault"]["loose"]) == fault.links
