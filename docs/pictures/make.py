@@ -29,7 +29,7 @@ CHOSEN = 5  # of the sixteen chains: the one that becomes a mechanism
 CELL, GAP, COLUMNS = 150, 10, 8
 #: Pages whose examples write pictures.
 WITH_EXAMPLES = ("gallery.md", "explanation/jamming-in-space.md", "how-to/build-it.md")
-#: Parts of the best answer of a task: file, millimetres of its unit, inputs (a full rotation if none).
+#: Parts of the best answer that can be built: file, millimetres of its unit, inputs (a full rotation if none).
 PARTS: dict[str, tuple[str, float, tuple[float, float] | None]] = {
     "excavator_bucket": ("design-bucket-parts", 100.0, (0.0, 1.0)),
     "walking_leg": ("design-leg-parts", 3.0, None),
@@ -104,13 +104,19 @@ def scene_pictures(scene: str, wanted: dict[str, str]) -> dict[str, str]:
         for item in product
         if isinstance(item, Picture)
     }
-    made = {f"{name}.svg": found[title] + "\n" for name, title in wanted.items()}
-    if scene in PARTS:
-        name, unit, reach = PARTS[scene]
-        best = gs.Mechanism.from_json(report["mechanisms"].columns["mechanism"][0])
-        motion = best.simulate() if reach is None else best.simulate(np.linspace(*reach, 361))
-        made[f"{name}.svg"] = gs.parts(motion, unit=unit).draw().svg + "\n"
-    return made
+    if scene not in PARTS:
+        return {f"{name}.svg": found[title] + "\n" for name, title in wanted.items()}
+    name, unit, reach = PARTS[scene]
+    for place, text in enumerate(report["mechanisms"].columns["mechanism"], 1):
+        own = gs.Mechanism.from_json(text)
+        motion = own.simulate() if reach is None else own.simulate(np.linspace(*reach, 361))
+        with contextlib.suppress(gs.GraphsynthError):  # not every answer can be built above one board
+            drawn = gs.parts(motion, unit=unit).draw().svg
+            titles = {file: title.replace("Place 1", f"Place {place}") for file, title in wanted.items()}
+            return {f"{file}.svg": found[title] + "\n" for file, title in titles.items()} | {
+                f"{name}.svg": drawn + "\n"
+            }
+    raise SystemExit(f"no answer of {scene} can be built")
 
 
 def pictures_of_examples(page: str, folder: Path) -> None:
