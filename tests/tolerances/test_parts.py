@@ -259,7 +259,7 @@ def test_three_percent_on_every_length_is_decided(seed):
     mechanism, given, tilt = turning(np.random.default_rng([15, seed]), 0.03)
     scale = worst_scale(mechanism, parameter_box(mechanism, given), tilt=tilt, count=61)
     tilt = replace(tilt, alpha=0.8e-3 * scale, alpha_range=None)
-    found = certify_coupled(simulate(mechanism, TURN), LIMITS, tilt, tolerances=given, seconds=60.0)
+    found = certify_coupled(simulate(mechanism, TURN), LIMITS, tilt, tolerances=given, seconds=600.0)
     assert found.verdict.name == "CERTIFIED_FREE" and found.one_branch and found.decided == 1.0
 
 
