@@ -20,7 +20,7 @@ from graphsynth.core.native.wasm import MODULES, read_modules
 from graphsynth.workbench import modules
 
 from .kernel_bits import kernel_of
-from .wasm_bits import Bits, Recorded, computations
+from .wasm_bits import PAGE, Bits, Recorded, computations, page_computations
 from .wasm_calls import LOADER, Remote, node, tables
 
 ROOT = Path(__file__).parents[1]
@@ -30,7 +30,8 @@ LISTED = [(module, signature) for module, signatures in read_modules().items() f
 
 def case(module: str, signature: Signature) -> Any:
     """One kernel as a case; those with the workspace of enumeration, twenty megabytes, are for the long run."""
-    marks = [pytest.mark.long] if ".synthesis." in signature.kernel else []
+    long = ".synthesis." in signature.kernel or any(part in signature.kernel for part in PAGE)
+    marks = [pytest.mark.long] if long else []
     return pytest.param(module, signature, id=signature.kernel.removeprefix("graphsynth."), marks=marks)
 
 
@@ -71,12 +72,19 @@ def recorded() -> Recorded:
     return computations(many=False)
 
 
+@pytest.fixture(scope="module")
+def paged() -> Recorded:
+    return page_computations()
+
+
 @needs_node
 @pytest.mark.parametrize(("module", "signature"), [case(*listed) for listed in LISTED])
 def test_some_calls_give_the_bits_of_native_code(
-    remote: Remote, recorded: Recorded, module: str, signature: Signature
+    request: pytest.FixtureRequest, remote: Remote, module: str, signature: Signature
 ) -> None:
     bits = Bits(remote, module, signature)
+    page = any(part in signature.kernel for part in PAGE)
+    recorded: Recorded = request.getfixturevalue("paged" if page else "recorded")
     done, wrong = bits.run(recorded.get(signature.kernel, []), 200, 0.2, np.random.default_rng(7))
     assert done and not wrong
 
@@ -84,7 +92,7 @@ def test_some_calls_give_the_bits_of_native_code(
 @pytest.mark.slow  # minutes
 @needs_node
 def test_many_calls_give_the_bits_of_native_code(remote: Remote) -> None:
-    kept, wrong = computations(many=True), []
+    kept, wrong = computations(many=True) | page_computations(), []
     seconds = float(os.environ.get("GRAPHSYNTH_BITS_SECONDS", "20"))
     for module, signature in LISTED:
         bits, calls = Bits(remote, module, signature), kept.get(signature.kernel, [])

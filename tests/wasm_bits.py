@@ -46,7 +46,7 @@ def recording(kept: Recorded, *, all_calls: bool = False) -> Iterator[None]:
     seen: dict[str, int] = {}
 
     def call(own: Any, *args: Any) -> Any:
-        name = own.entry()[0] if own.entry() else ""
+        name = own.entry()[0] if own.entry() else f"{own.__module__}.{getattr(own, '__qualname__', '')}"
         count = seen[name] = seen.get(name, 0) + 1
         if all_calls or (len(kept.get(name, [])) < _KEPT and count & (count - 1) == 0):
             kept.setdefault(name, []).append(duplicate(args))
@@ -80,6 +80,47 @@ def computations(*, many: bool) -> Recorded:
             layout(chain)
             _label(chain, [0] * chain.links, compiled=True)
         sample(EnumerationProblem.chains(8, 1, 3, None, False, None, framed=True), 6, 1)
+    return kept
+
+
+#: Kernels of the page's engine alone; natively they are compiled when a test asks for them.
+PAGE = ("engine.kernels.planning.", "engine.kernels.advancing.", "engine.kernels.dragging.")
+
+
+def page_computations() -> Recorded:
+    """Record the calls with which the page moves mechanisms: planned, settled, followed, swept and pulled."""
+    import graphsynth as gs
+    from graphsynth.kinematics.engine import codes, outlines
+    from graphsynth.kinematics.engine.kernels import advancing, dragging, planning
+
+    from .kinematics.planned import drawn, equations, program
+
+    kept: Recorded = {}
+    crank, rocker = gs.Mechanism.four_bar(2.0, 1.0, 2.5, 2.5), gs.Mechanism.four_bar(4.0, 3.0, 2.0, 2.5)
+    for mechanism in (crank, rocker, gs.Mechanism.slider_crank(1.0, 3.0)):
+        pose = gs.simulate(mechanism, [0.7]).poses[0]
+        links, sizes = mechanism.graph.links, mechanism.dimensions[None]
+        with recording(kept, all_calls=True):
+            tables = program(mechanism, sizes)[2]
+            rows, table = equations(mechanism)
+            given, q, one = drawn(mechanism, sizes), np.zeros(1), np.ones(1)
+            length = planning.sizes_of(given, links)
+            assert tables is not None
+            steps, n = len(tables.steps), advancing.SAMPLES
+            shapes = ((links, 4, n), (links, n), (links, 3, n), (links, 3, n), (1, n), (steps, n))
+            state, modes, found = codes.State(*map(np.zeros, shapes)), np.ones(steps), np.zeros(5)
+            advancing.driver_coordinates(given, pose, q)
+            advancing.settle(tables, modes, state, q, one, pose, length)
+            advancing.advance(tables, modes, state, q, q + 0.4, one, length, found[:3].copy())
+            out = outlines.Samples(*(np.zeros((9, links, 3)) for _ in range(3)), np.zeros((9, steps)), np.zeros((4, 2)))
+            watched = np.array([[links - 1.0, 0.0, 0.0]])
+            advancing.sweep(tables, modes, state, q + 0.4, q + 2.0, 1.0, watched, out, length, found)
+            advancing.instant_centres(state.X, state.V, np.zeros((links, links, 2)))
+            dragging.closed_pose(rows, table[0], 0, pose + 1e-3 * (np.arange(links) > 0)[:, None], length[0])
+            way, near = np.zeros(3 * links - 3), pose.copy()
+            for target in ([2.0, 1.0], [1.0, 2.0]):
+                at = np.array([0.3, 0.2])
+                dragging.drag(rows, table[0], 0, near, 2, at, np.array(target), way, length[0], found[:3].copy())
     return kept
 
 
@@ -127,6 +168,8 @@ class Bits:
         if set(types.split(", ")) == {"f8"}:
             kept = [(1.0,) * len(types.split(", "))]
         other = OTHERS.get(self.name)
+        if any(part in self.name for part in PAGE):
+            most = len(kept)
         done = wrong = chunk = 0
         count = 1
         start = perf_counter()
@@ -151,7 +194,7 @@ class Bits:
 def main(most: int, place: str, *wanted: str) -> None:
     """Compare kernels of all modules, or those whose names hold a text; print how many calls."""
     seconds = float(os.environ.get("GRAPHSYNTH_BITS_SECONDS", "300"))
-    kept = computations(many=True)
+    kept = computations(many=True) | page_computations()
     remote = {"node": node, "browser": browser}[place]()
     bad = 0
     for module, signatures in read_modules().items():
