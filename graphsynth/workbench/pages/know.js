@@ -47,7 +47,7 @@
       for (const { angle } of motion.engine.transmission(swept.margins.subarray(i * steps, (i + 1) * steps))) if (Number.isFinite(angle)) angles.push(angle);
     }
     const rows = [[Bench.word("know.rotation"), text]];
-    if (angles.length) rows.push([Bench.word("know.transmission"), `${Bench.shown((Math.min(...angles) * 180) / Math.PI, 3)}°`]);
+    if (angles.length) rows.push([Bench.word("know.transmission"), `${Bench.shown(Math.round((Math.min(...angles) * 1800) / Math.PI) / 10)}°`]);
     const events = swept.events.map(event => [motion.told(event), () => { motion.to(event.input); app.changed("rest"); }]);
     return [Bench.rows(rows), events.length ? buttons(events) : null];
   }
