@@ -23,7 +23,7 @@
     }),
     all: app => app.select([...Object.keys(app.sheet.points), ...Object.keys(app.sheet.links).filter(id => id !== Bench.GROUND)]),
     fit: app => {
-      app.view.fit(Bench.box(app.sheet));
+      app.view.fit(Bench.boxWithPaths(app));
       app.changed("view");
     },
     fresh: app => {

@@ -16,6 +16,18 @@
   Bench.pathOver = (swept, links, k, at) =>
     Array.from(swept.inputs, (_, i) => Bench.carried(rowOf(swept.poses, links, i, k), at));
 
+  /** The box around a drawing and the paths of its traced points. */
+  Bench.boxWithPaths = app => {
+    const box = Bench.box(app.sheet), { motion, sheet } = app, swept = box && motion && motion.driven ? motion.sweep() : null;
+    if (!swept) return box;
+    const links = Object.keys(sheet.links).length;
+    const places = Bench.tracedPoints(sheet).flatMap(([, k, at]) => Bench.pathOver(swept, links, k, at));
+    for (const [x, y] of places.filter(place => place.every(Number.isFinite))) {
+      [box[0], box[1], box[2], box[3]] = [Math.min(box[0], x), Math.min(box[1], y), Math.max(box[2], x), Math.max(box[3], y)];
+    }
+    return box;
+  };
+
   /** Paths and marked places: after a change of the drawing, the branch or the view. */
   Bench.paintCurves = (app, motion) => {
     const { view, sheet } = app, layer = view.layers.curves, parts = [];
