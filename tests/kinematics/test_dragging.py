@@ -13,7 +13,7 @@ from graphsynth.kinematics.engine.kernels.dragging import drag
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.constraints import characteristic_length, jacobian, residual
-from graphsynth.mechanism.joints import Revolute
+from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
@@ -55,6 +55,12 @@ class Curve:
         self.Lc, links = characteristic_length(mechanism), mechanism.graph.links
         self.moving = [3 * k + c for k in range(links) if k != mechanism.frame for c in range(3)]
         self.unit = np.tile([1.0, 1.0, 1.0 / self.Lc], links)[self.moving]
+        # residuals of angles are lengths, their gradients are not
+        size: list[float] = []
+        for joint in mechanism.joints:
+            own = max(abs(complex(*joint.at_a)), abs(complex(*joint.at_b))) or 1.0
+            size += [1.0, own] if isinstance(joint, Prismatic) else [1.0] * (3 - joint.mobility)
+        self.size = np.array(size)
         self.tangent = np.linalg.svd(self.matrix())[2][:, -1]
         self.step(np.zeros(len(poses)))
 
@@ -69,7 +75,7 @@ class Curve:
         """Step along the tangents by lengths (sets,), and back to the joints at right angles to them."""
         self.moved(h[:, None] * self.tangent)
         for _ in range(3):
-            f = residual(self.mechanism.joints, self.poses)
+            f = residual(self.mechanism.joints, self.poses) / self.size
             held = np.concatenate([self.matrix(), self.tangent[:, None, :]], axis=1)
             self.moved(np.linalg.solve(held, np.concatenate([-f, np.zeros((len(f), 1))], axis=1)[..., None])[..., 0])
         held = np.concatenate([self.matrix(), self.tangent[:, None, :]], axis=1)
