@@ -27,8 +27,8 @@ def run(options: argparse.Namespace) -> int:
             f"{options.scene} is a scene of module {scene.mechanism.module!r}, not 'design'; use graphsynth run"
         )
     if options.seconds is not None:
-        limits = {"seconds": positive("--seconds", options.seconds, SpecError), "processor_seconds": None}
-        scene = replace(scene, mechanism=replace(scene.mechanism, **limits))
+        seconds = positive("--seconds", options.seconds, SpecError)
+        scene = replace(scene, mechanism=replace(scene.mechanism, seconds=seconds, processor_seconds=None))
     kept = ("records", "tables", "mechanisms")
     products = (*scene.outputs.products, *(name for name in kept if name not in scene.outputs.products))
     scene = replace(scene, outputs=replace(scene.outputs, products=products))

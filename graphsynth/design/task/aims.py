@@ -360,7 +360,7 @@ class RatioAim(Aim):
 
     def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
         """Both speeds by differences, so that their derivatives are those of the poses."""
-        mix = np.kron(np.eye(2), _DIFFERENCE / _NEAR)
+        mix = np.asarray(np.kron(np.eye(2), _DIFFERENCE / _NEAR), np.float64)
         values = self.measure.values(frames, u)
         if self.measure.guide < 0:
             values = np.unwrap(values, axis=1)

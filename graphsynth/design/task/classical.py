@@ -64,7 +64,7 @@ def _found(task: DesignTask, target: object, seconds: float) -> Sequence[Mechani
     if target.inputs is not None:
         exact = len(target.points) == _POSITIONS
         return [linkage.mechanism for linkage in timed_paths(target.points, target.inputs)] if exact else []
-    pivots = task.given_pivots
-    if len(target.points) == _THROUGH.get(len(pivots)):
-        return [linkage.mechanism for linkage in four_bars_through(target.points, pivots).linkages if linkage.in_order]
+    given = task.given_pivots
+    if len(target.points) == _THROUGH.get(len(given)):
+        return [linkage.mechanism for linkage in four_bars_through(target.points, given).linkages if linkage.in_order]
     return []

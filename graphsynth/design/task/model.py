@@ -263,8 +263,8 @@ class Model:
         """Move candidates over the range, through further inputs, too, if they are given."""
         inputs = self.inputs
         if more is not None:
-            period = self.task.drive == "rotation"
-            more = np.mod(more, self.task.span) if period else np.clip(more, 0.0, self.task.span)
+            around = self.task.drive == "rotation"
+            more = np.mod(more, self.task.span) if around else np.clip(more, 0.0, self.task.span)
             inputs = np.sort(np.concatenate([inputs, more]))
             inputs = inputs[np.concatenate([[True], np.diff(inputs) > 1e-12])]
         scale = u.stroke[:, None, None]
@@ -313,7 +313,8 @@ def _rods(plan: Plan) -> list[Rod]:
         sliding = [(k, pair) for k, pair in joints if pair != own and design.kinds[k] == "P"]
         if len(own) == 2 and len(joints) == 3 and len(sliding) == 1 and design.kinds[inner[0]] == "R":
             ((far, ends),), ((slide, pair),) = turning, sliding
-            found.append(Rod(*(ends & own), far, inner[0], *(pair - own), slide))
+            (link,), (guide,) = ends & own, pair - own
+            found.append(Rod(link, far, inner[0], guide, slide))
     return found
 
 

@@ -50,7 +50,7 @@ def settled(problem: TaskProblem, x: Array) -> Settled:
         if step is None:
             break
         weight = max(weight, _WEIGHT * pull)
-        before, promised = _merit(now, weight), -(2.0 * g + J.T @ (J @ step)) @ step
+        before, promised = _merit(now, weight), -float((2.0 * g + J.T @ (J @ step)) @ step)
         step, later = _bent(problem, x, now, step, H, g, weight, before - _SLOW * promised)
         after = _merit(later, weight)
         if not after < before:
@@ -142,7 +142,7 @@ def least_squares(H: Array, g: Array, A: Array, b: Array) -> tuple[Array | None,
         L = np.linalg.cholesky(H)
     except np.linalg.LinAlgError:
         return None, 0.0
-    free = -np.linalg.solve(H, g)
+    free = np.asarray(-np.linalg.solve(H, g), np.float64)
     if not len(A) or (A @ free <= b).all():
         return free, 0.0
     size = np.maximum(np.linalg.norm(A, axis=1), 1e-300)[:, None]
@@ -158,7 +158,8 @@ def least_squares(H: Array, g: Array, A: Array, b: Array) -> tuple[Array | None,
     r[-1] -= 1.0
     if not -r[-1] > 1e-10:
         return None, 0.0
-    return free + np.linalg.solve(L.T, -r[:-1] / r[-1]), float((u / -r[-1] / size[:, 0]).max())
+    nearest = np.asarray(free + np.linalg.solve(L.T, -r[:-1] / r[-1]), np.float64)
+    return nearest, float((u / -r[-1] / size[:, 0]).max())
 
 
 def _lower(now: Exact, reach: Array) -> Array | None:

@@ -150,8 +150,8 @@ def random_starts(model: Model, count: int, random: np.random.Generator) -> Unkn
     for k, name in enumerate(name for name, of_point in model.task.names.items() if of_point):
         own = design.joints_of(model.carrier(name))
         points[:, k] = places[:, own].mean(axis=1) + random.normal(0.0, 1.0, (count, 2))
-    own = np.zeros((count, model.stroke_at - model.own_at))
-    return model.kept(Unknowns(*model.tied(places, numbers), points, own, stroke))
+    free = np.zeros((count, model.stroke_at - model.own_at))
+    return model.kept(Unknowns(*model.tied(places, numbers), points, free, stroke))
 
 
 def placed_starts(

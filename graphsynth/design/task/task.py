@@ -26,8 +26,10 @@ _SHORT, _LONG = 0.1, 6.0
 RANKED = {"error": 1.0, "links": 0.05, "size": 0.02, "transmission": 0.1, "jam": 0.05}
 
 
-def _start(name: str, given: float | str | Sequence[float | str]) -> tuple[float, float]:
-    """Read one direction, or two limits."""
+def _start(name: str, given: float | str | Sequence[float | str] | None) -> tuple[float, float] | None:
+    """Read one direction, or two limits; None is kept."""
+    if given is None:
+        return None
     limits = (given, given) if isinstance(given, float | int | str) else tuple(given)
     if len(limits) != 2:
         raise GeometryError(f"{name} = {given!r} must be one angle, or two: the limits")
@@ -115,7 +117,7 @@ class DesignTask(Shown):
     box: Box | None = None
     lengths: tuple[float, float] | None = None
     crank: float | None = None
-    crank_start: Start = Kept(optional(_start), None)
+    crank_start: Start = Kept(_start, None)
     crank_from: Literal["x", "frame"] = "x"
     turning: Turning = "either"
     symmetric: bool = False
