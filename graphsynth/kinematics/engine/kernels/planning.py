@@ -348,7 +348,7 @@ def replaced_row(joints, size, code, first, second, link, p):
 
 @kernel
 def distance(x, y):
-    """Length of a vector, corrected by what is left of its square [Borges 2019]."""
+    """Length of a vector, corrected by what is left of its square [Borges 2020]."""
     x, y = abs(x), abs(y)
     h = math.sqrt(x * x + y * y)
     if not (1e-140 < h < 1e140):
