@@ -97,7 +97,7 @@ def test_explain_for_scripts(springs: Path, tmp_path: Path, capsys: pytest.Captu
     assert all(stage["peak_MB"] is None or stage["peak_MB"] > 5 for stage in found["ran"])
 
 
-HELP_LIMIT, IMPORT_LIMIT = 0.15, 0.030
+HELP_LIMIT, IMPORT_LIMIT = 5.0, 1.5
 
 
 def least_seconds(arguments: list[str], times: int = 7) -> float:
@@ -113,8 +113,11 @@ def least_seconds(arguments: list[str], times: int = 7) -> float:
 
 
 def test_start_up_is_quick() -> None:
-    assert least_seconds(["-m", "graphsynth", "--help"]) <= HELP_LIMIT
-    assert least_seconds(["-c", "import graphsynth"]) - least_seconds(["-c", "pass"]) <= IMPORT_LIMIT
+    """Beside four modules of the standard library: processor time beyond that of an empty program."""
+    empty = least_seconds(["-c", "pass"])
+    unit = least_seconds(["-c", "import argparse, dataclasses, re, typing"]) - empty
+    assert least_seconds(["-m", "graphsynth", "--help"]) - empty <= HELP_LIMIT * unit
+    assert least_seconds(["-c", "import graphsynth"]) - empty <= IMPORT_LIMIT * unit
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"]])
