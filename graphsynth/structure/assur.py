@@ -138,11 +138,15 @@ class _System:
         self.drivers = drivers
         #: for each link the smallest link of its body
         self.body_of = list(range(graph.links))
+        closing = -1  # a link whose driver closes a loop of drivers
         for a, b, mobility in drivers:
             if mobility == 1:
                 low, high = sorted((self.body_of[a], self.body_of[b]))
+                closing = a if low == high else closing
                 self.body_of = [low if body == high else body for body in self.body_of]
         self.placed = self.body_of[base]
+        #: Bodies that have too many constraints before any is assigned.
+        self.refused = 0 if closing < 0 else 1 << self.body_of[closing]
         #: (body, body, mobility left, joint); a driven joint keeps one freedom less.
         self.constraints = [
             (self.body_of[j.a], self.body_of[j.b], j.mobility - (j in drivers), j)
@@ -155,7 +159,7 @@ class _System:
 
     def assign(self) -> int:
         """Assign the constraints; return a bit mask of bodies that have too many, or 0."""
-        refused = 0
+        refused = self.refused
         for a, b, mobility, _ in self.constraints:
             for _ in range(self.graph.space - mobility):
                 # A constraint inside one body is one too many whatever the assignment.
@@ -424,7 +428,7 @@ def contour_class(joints: Iterable[tuple[int, int, int]]) -> int:
         degree[b] = degree.get(b, 0) + 1
         middle = ("joint", len(edges))
         edges += [(a, b)] if mobility == 1 else [(a, middle), (middle, b)]
-    largest = max(2, *degree.values())
+    largest = max([2, *degree.values()])
     nodes = {node for edge in edges for node in edge}
     if len(edges) < max(len(nodes), 1):
         return largest  # inner joints without a loop

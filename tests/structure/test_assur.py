@@ -135,6 +135,13 @@ def test_a_structure_has_groups_without_a_driver():
             "over-constrained",
             "among themselves",
         ),
+        (
+            # Three drivers in a loop, which floats; the count of freedoms hides it.
+            MechanismGraph(4, [(0, 1), (1, 2), (0, 2)], frame=3),
+            [(1, 2), (0, 1), (0, 2)],
+            "over-constrained",
+            "links 0, 1, 2 have too many constraints with these drivers",
+        ),
     ],
 )
 def test_faults_name_the_links(graph, drivers, kind, message):
