@@ -138,24 +138,21 @@ class _System:
         self.drivers = drivers
         #: for each link the smallest link of its body
         self.body_of = list(range(graph.links))
-        closing = -1  # a link whose driver closes a loop of drivers
+        self.refused = 0  #: bodies with too many constraints from the start: drivers that close a loop
         for a, b, mobility in drivers:
             if mobility == 1:
                 low, high = sorted((self.body_of[a], self.body_of[b]))
-                closing = a if low == high else closing
+                self.refused |= (low == high or self.refused >> high & 1) << low
                 self.body_of = [low if body == high else body for body in self.body_of]
         self.placed = self.body_of[base]
-        #: Bodies that have too many constraints before any is assigned.
-        self.refused = 0 if closing < 0 else 1 << self.body_of[closing]
         #: (body, body, mobility left, joint); a driven joint keeps one freedom less.
         self.constraints = [
             (self.body_of[j.a], self.body_of[j.b], j.mobility - (j in drivers), j)
             for j in graph.joints
             if within >> j.a & within >> j.b & 1 and not (j.mobility == 1 and j in drivers)
         ]
-        moving = {body for link, body in enumerate(self.body_of) if within >> link & 1 and body != self.placed}
-        self.moving = sorted(moving)
-        self.game = PebbleGame(graph.space if link in moving else 0 for link in range(graph.links))
+        self.moving = sorted({own for k, own in enumerate(self.body_of) if within >> k & 1 and own != self.placed})
+        self.game = PebbleGame(graph.space if link in self.moving else 0 for link in range(graph.links))
 
     def assign(self) -> int:
         """Assign the constraints; return a bit mask of bodies that have too many, or 0."""
@@ -238,8 +235,7 @@ def _fault(system: _System) -> Fault | None:
     refused = system.assign()
     too_many = system.links_of(bits(refused & ~(1 << system.placed))) or system.links_of(bits(refused))
     game = system.game
-    loose = [body for body in system.moving if any(game.free[other] for other in bits(game.reach(body)))]
-    free = system.links_of(loose)
+    free = system.links_of(body for body in system.moving if any(game.free[k] for k in bits(game.reach(body))))
     if graph.mobility != given:
         text = f"mobility {graph.mobility} needs {graph.mobility} driver{'s' * (graph.mobility != 1)}, not {given}"
         if graph.mobility < 0:
