@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Generator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 from _pytest.doctest import DoctestModule
 
-_PACKAGE = Path(__file__).parent / "graphsynth"
+_PACKAGE, _TESTS = Path(__file__).parent / "graphsynth", Path(__file__).parent / "tests"
 #: Examples of docstrings that take a second or more of a processor.
 _LONG = {
     "graphsynth.intervals.cells.pave_compiled", "graphsynth.jamming.questions.largest_scale",
@@ -53,8 +54,19 @@ def pytest_make_collect_report(collector: pytest.Collector) -> Generator[None, p
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """All workers must have the same order; long examples of docstrings are marked."""
+    """All workers must have the same order; long examples of docstrings, and files that need extras, are marked."""
     items.sort(key=lambda item: item.path)
     for item in items:
         if item.name in _LONG:
             item.add_marker("long")
+        if _needs_extras(item.path):
+            item.add_marker("extra")
+
+
+@cache
+def _needs_extras(path: Path) -> bool:
+    """Whether some tests of a file, measurements aside, are skipped where an extra is not installed."""
+    if not path.is_relative_to(_TESTS) or path.is_relative_to(_TESTS / "bench"):
+        return False
+    text = path.read_text("utf-8")
+    return "importorskip" in text or "find_spec" in text

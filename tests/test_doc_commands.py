@@ -126,6 +126,7 @@ def run_commands(lines, folder, capsys, monkeypatch):
         assert missing == [], words  # shown lines are printed, in this order
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lines", list(runnable(slow=False)))
 def test_documented_commands_run(lines, tmp_path, capsys, monkeypatch):
     run_commands(lines, tmp_path, capsys, monkeypatch)
@@ -201,6 +202,7 @@ def test_a_wrong_table_is_seen():
     assert reads(merged(lambda_scene, {"mechanism": {"bearing": {"clearence_mm": 1}}})) is None
 
 
+@pytest.mark.long
 def test_the_first_run_is_as_the_tutorial_tells(tmp_path, monkeypatch):
     """The values shown, the changed clearance, the misspelt key."""
     from graphsynth.core.errors import SceneError

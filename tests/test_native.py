@@ -173,6 +173,7 @@ def test_another_machine_or_a_damaged_file_is_not_loaded(monkeypatch: pytest.Mon
     assert "GRAPHSYNTH_NATIVE" in library._load()[1]
 
 
+@pytest.mark.long
 @needs_library
 def test_a_numpy_with_other_arrays_is_noticed() -> None:
     code = """
@@ -190,6 +191,7 @@ print(out[0][0], library.reason)
 # -- as numba calls --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @needs_library
 @pytest.mark.parametrize(
     ("change", "taken"),
@@ -239,6 +241,7 @@ def test_wrong_calls_say_what_numba_says() -> None:
         assert ours.type is numbas.type and str(ours.value) == str(numbas.value)
 
 
+@pytest.mark.long
 @needs_library
 def test_numbers_of_python_and_numpy_are_alike() -> None:
     from numba.core.errors import TypingError
@@ -335,6 +338,7 @@ def test_interval_loops_give_the_bits_of_numba_for_any_numbers(signature: Signat
     assert agree_on(kernel_of(signature.kernel), interval_numbers(signature, each, np.random.default_rng(5)))
 
 
+@pytest.mark.long
 @needs_library
 def test_code_without_fused_operations_forms_them_exactly(each: int = 20_000) -> None:
     """The library's own ``a b + c``, for its plainest version, beside fractions: cancelling, tiny, huge, special."""

@@ -30,7 +30,7 @@ LISTED = [(module, signature) for module, signatures in read_modules().items() f
 
 def case(module: str, signature: Signature) -> Any:
     """One kernel as a case; those with the workspace of enumeration, twenty megabytes, are for the long run."""
-    long = ".synthesis." in signature.kernel or any(part in signature.kernel for part in PAGE)
+    long = any(part in signature.kernel for part in (".synthesis.", "canon_packed", *PAGE))
     marks = [pytest.mark.long] if long else []
     return pytest.param(module, signature, id=signature.kernel.removeprefix("graphsynth."), marks=marks)
 
@@ -143,6 +143,7 @@ main();
 
 
 @needs_node
+@pytest.mark.long
 def test_the_loader_takes_what_fits_says_what_does_not_and_loses_no_memory(tmp_path: Path) -> None:
     program, script = tmp_path / "program.js", tmp_path / "motion.js"
     program.write_text(LOADER_TESTS)

@@ -145,6 +145,7 @@ def test_without_dimensions_another_seed_searches_anew(copy, monkeypatch):
     assert len([row for row in table(copy) if row[3] == "dimensions" and row[4] == "not found"]) == 1
 
 
+@pytest.mark.long
 def test_an_interrupted_evaluation_goes_on_to_the_same(copy, tmp_path):
     whole = tmp_path / "whole.sqlite"
     whole.write_bytes(copy.read_bytes())

@@ -55,6 +55,7 @@ FILTERS = ["links", "joints", "mobility", "loops", "assortment", "automorphisms"
            "fractionated", "link_orbits"]  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("column", FILTERS)
 def test_every_column_of_chains_as_a_filter(shipped, known, column):
     """Equal to every value that occurs, and for numbers above the middle one."""
@@ -76,6 +77,7 @@ def test_filters_together(shipped, known):
     assert wanted and set(found["key"]) == wanted
 
 
+@pytest.mark.long
 def test_keys_and_labels_as_filters(shipped):
     for key, label in shipped.sql("SELECT key, label FROM chains").itertuples(index=False):
         assert shipped.query("chains", "key = ?", [key])["label"].tolist() == [label]

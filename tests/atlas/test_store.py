@@ -184,6 +184,7 @@ def test_merged_shards_are_the_catalogue_to_the_last_number(many, tmp_path, fine
         Catalogue.merge(parts[0], parts)
 
 
+@pytest.mark.long
 def test_equal_catalogues_give_equal_bytes(small, tmp_path):
     with Catalogue.build(tmp_path / "x.sqlite", range(5, 10), 2, fractionated=True) as first:
         pass
@@ -213,6 +214,7 @@ def test_the_parquet_export_holds_what_the_catalogue_holds(small, tmp_path):
     assert classes == mechanisms["class"].tolist()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("piece", "most"), [(3.0, 100_000), (0.5, 100_000), (3.0, 10)])
 def test_however_small_the_pieces_each_chain_comes_once(piece, most, monkeypatch):
     """Also when single contracted graphs are cut by their search prefixes."""
@@ -239,6 +241,7 @@ def interrupted_at(stop):
     return watch
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stop", [1, 5, 9])
 def test_an_interrupted_build_goes_on(many, tmp_path, fine, stop):
     with pytest.raises(KeyboardInterrupt):
@@ -346,6 +349,7 @@ sys.exit(main(["catalog", "build", "--links", "4..10", "--workers", "1", "-o", s
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="limits on the size of files as Linux has them")
 def test_a_file_that_may_not_grow_is_one_sentence_and_the_build_goes_on(many, tmp_path, fine):
     path = tmp_path / "x.sqlite"

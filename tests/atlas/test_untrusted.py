@@ -330,6 +330,7 @@ sys.exit(main(["catalog", *sys.argv[2:]]))
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="limits on the size of files as Linux has them")
 @pytest.mark.parametrize(
     ("words", "name"),

@@ -77,6 +77,7 @@ WRONG = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("statement", WRONG.values(), ids=WRONG)
 def test_a_single_wrong_value_is_found(right, tmp_path, altered, statement):
     found = spoiled(right, tmp_path, altered, statement)

@@ -82,6 +82,7 @@ def test_a_reader_that_is_gone_is_no_error(
     assert (done.returncode, said(done.stderr)) == (0, [])
 
 
+@pytest.mark.long
 @both
 @pytest.mark.parametrize("words", [("nonsense",), ("show", "nonsense")], ids=" ".join)
 def test_an_error_that_nobody_reads_keeps_its_status(

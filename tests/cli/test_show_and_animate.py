@@ -61,6 +61,7 @@ def test_show_draws_the_diagram_by_default_and_the_driver(tmp_path: Path, capsys
     assert any(part == "driver 0-1" for part in found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "magic"), [("x.png", b"\x89PNG"), ("x.pdf", b"%PDF")])
 def test_show_writes_through_matplotlib(
     name: str, magic: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -130,6 +131,7 @@ def test_show_tells_bad_input_in_one_sentence(
 # --- animate
 
 
+@pytest.mark.long
 def test_animate_a_chain_by_its_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, kept = tmp_path / "x.html", tmp_path / "m.toml"
     words = ["animate", eight(5).key, "-o", str(path), "--save", str(kept), "--frames", "60"]

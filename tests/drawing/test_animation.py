@@ -252,6 +252,7 @@ def test_names_are_not_read_as_mathematics(tmp_path: Path) -> None:
     assert name in coupler_curves(motion).svg()
 
 
+@pytest.mark.long
 def test_gif_of_a_part_goes_to_and_fro(motions: dict[str, Any], tmp_path: Path) -> None:
     from PIL import Image
 

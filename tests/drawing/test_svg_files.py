@@ -95,6 +95,7 @@ def written(motions: dict[str, Any]) -> dict[str, str]:
     return {name: write(motions) for name, write in WRITERS.items()}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", WRITERS)
 def test_every_writer_keeps_to_what_all_programs_read(written: dict[str, str], name: str) -> None:
     assert faults(written[name]) == []

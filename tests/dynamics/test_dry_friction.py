@@ -210,6 +210,7 @@ def test_two_blocks(form):
     assert_complementary(motion)
 
 
+@pytest.mark.long
 def test_a_pendulum_with_a_rough_pin_against_an_own_integration():
     """The pin's load has the weight, the centrifugal force and the friction's own share in it."""
     from scipy.integrate import solve_ivp
@@ -251,6 +252,7 @@ def test_a_pendulum_with_a_rough_pin_against_an_own_integration():
         assert_complementary(motion)
 
 
+@pytest.mark.long
 def test_every_joint_of_a_slider_crank_rough():
     """All joints stop together; how they share the friction is said to be open; all forms agree."""
     friction = [JointFriction(a, b, 0.2, radius=0.01) for a, b in ((0, 1), (1, 2), (2, 3))] + [
@@ -344,6 +346,7 @@ def test_laws_of_friction_are_checked():
     assert JointFriction(0, 1, 0.2).smoothing_velocity == 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", ["augmented", "partitioned"])
 @settings(max_examples=6, deadline=None)
 @given(st.data())

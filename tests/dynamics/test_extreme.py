@@ -146,6 +146,7 @@ def test_fold_of_the_input_is_left_by_the_constrained_form():
     assert np.abs(reduced.poses - motion.poses).max() < 1e-5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["DOP853", "RK45", "Radau", "BDF", "LSODA"])
 def test_every_solver_reports_the_fold_as_a_failure(method):
     """Rates have no value beyond the fold: implicit solvers of scipy raise there, which is no way to fail."""
@@ -366,6 +367,7 @@ def test_cvode_keeps_the_limit_of_steps():
     assert not motion.completed and "more than 5 steps" in motion.message
 
 
+@pytest.mark.long
 def test_stiff_friction_is_reported_not_quiet():
     """Block braking to rest with a law regularised at 1e-8 m/s: right, or a failure with its time."""
     slider = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Prismatic(0, 1)], [Driver(0, 1)])

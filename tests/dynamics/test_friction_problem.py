@@ -147,6 +147,7 @@ def slider_crank_exact(theta, omega, mu, torque):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mu", [0.1, 0.5, 2.0, 5.0])
 def test_a_slider_crank_against_fifty_digits(mu):
     bodies = {1: Body.bar(0.2, (0, 0), (0.1, 0)), 2: Body.bar(0.5, (0, 0), (0.3, 0)), 3: Body(0.8, 1e-3)}

@@ -92,6 +92,7 @@ def by_hand(motor, train, times, angle, speed):
     return solve_ivp(rates, (times[0], times[-1]), [angle, speed, 0.0], "DOP853", times, rtol=1e-13, atol=1e-14).y
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", FORMS)
 def test_four_bar_with_a_dc_motor_by_hand(form):
     motor = replace(DC, inductance=0.2, speed=60.0, rotor_inertia=1e-3, friction=2e-3)
@@ -151,6 +152,7 @@ def test_voltage_limit_is_a_located_event(method):
     assert motion.checks.energy < 1e-6 and (not tight or motion.checks.electric < 1e-11)
 
 
+@pytest.mark.long
 def test_losses_follow_the_direction_of_the_power():
     train = Train(1.0, 0.7, 0.002)
     expected = MotorDrivenPlatform(EffectiveInertia.of_slider(2.0, 0.05), DC, train, load=0.05).simulate(
@@ -190,6 +192,7 @@ def test_limit_without_inductance_is_of_first_order():
     assert order == pytest.approx([1.0, 1.0], abs=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", FORMS)
 def test_motors_without_currents_are_torque_sources(form):
     keep = {"keep": {(0, 1): 0.4}, "modes": {0: 1}, "form": form}

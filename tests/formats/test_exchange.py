@@ -64,6 +64,7 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
         return draw(st.nothing())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", EVERY)
 @given(graph=graphs())
 def test_every_format_gives_back_the_labelled_graph(name: str, graph: MechanismGraph) -> None:
@@ -80,6 +81,7 @@ def test_chains_and_mechanisms_of_the_enumerator(name: str, links: int) -> None:
         assert formats.read_text(formats.write_text(found, name), name) == found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", OF_MECHANISMS)
 @settings(max_examples=40)
 @given(mechanism=mechanisms())

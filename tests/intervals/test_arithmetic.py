@@ -53,6 +53,7 @@ OPERATIONS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", OPERATIONS)
 @given(a=PAIRS, b=PAIRS)
 def test_every_finite_operand_is_enclosed(name, a, b):
@@ -60,6 +61,7 @@ def test_every_finite_operand_is_enclosed(name, a, b):
     holds(operation(Interval(*a), Interval(*b)), *exact_range(operation, a, b))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", OPERATIONS)
 @given(a=TAME, b=TAME)
 def test_ordinary_operands_give_the_tightest_bounds(name, a, b):

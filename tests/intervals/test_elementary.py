@@ -73,6 +73,7 @@ def spacing(lo, hi):
     return order(hi) - order(lo)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_points_against_mpmath(name):
     x = arguments(name, np.random.default_rng(11), 800)
@@ -158,6 +159,7 @@ def test_a_million_boxes_against_flint(name):
 BOUNDS = st.tuples(st.floats(-30, 30), st.floats(0, 8), st.floats(0, 1))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["sin", "cos", "tan", "atan", "exp"])
 @given(BOUNDS)
 def test_ranges_hold_every_value(name, data):

@@ -234,6 +234,7 @@ def status_is_true(roots, start, width):
     return result.status
 
 
+@pytest.mark.long
 @settings(max_examples=80, deadline=None)
 @given(
     st.lists(st.integers(-64, 64), min_size=1, max_size=4), st.integers(-1, 1), st.integers(-1100, 1100),

@@ -121,6 +121,7 @@ def test_paths_of_any_numbers_are_the_tightest(name, path, draw):
     assert np.array_equal(ANY[name, path](a, b), tight(name, a, b))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("draw", [ordinary, extreme])
 def test_a_quotient_by_one_end_is_the_tightest(draw):
     """Divisors [0, b] and [b, 0]: the finite end is the quotient by b."""

@@ -192,6 +192,7 @@ CASES = [
 ]  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 def test_lid_area_against_quadrature_at_50_digits(case):
     R, Rh, h, S = case
@@ -221,6 +222,7 @@ def test_rim_area_against_quadrature_at_50_digits(case):
 ratio = st.floats(0.0, 1.0)
 
 
+@pytest.mark.long
 @settings(max_examples=15, deadline=None)
 @given(
     st.floats(1, 30), st.floats(1e-3, 0.3), st.floats(0, 20), st.floats(0, 0.9), st.floats(0, 0.1), st.integers(0, 99)

@@ -114,6 +114,7 @@ rational = st.fractions(max_denominator=10**6)
 lengths = st.fractions(F(1, 2), 4, max_denominator=1000)
 
 
+@pytest.mark.long
 @settings(max_examples=30, deadline=None)
 @given(
     st.fractions(F(1, 1000), F(3, 2), max_denominator=10**5),
@@ -144,6 +145,7 @@ def critical_alpha(condition="A", digits=60):
         return mpmath.asin(mpmath.mpf("2.5") * 2 * q / (1 + q * q))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("condition", ["A", "B"])
 def test_never_a_wrong_certificate_beside_the_touching_tilt(condition):
     edge = critical_alpha(condition)
@@ -341,6 +343,7 @@ def test_the_deck_rod():
             assert arc.start.lo <= mpmath.radians(mpmath.mpf(text)) <= arc.start.hi
 
 
+@pytest.mark.long
 @settings(max_examples=40, deadline=None)
 @given(st.data())
 def test_arcs_hold_every_member_of_a_box(data):

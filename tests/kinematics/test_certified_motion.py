@@ -206,6 +206,7 @@ def test_fifteen_links_with_gears_close_after_a_turn_of_the_wheels() -> None:
 # --- nothing false
 
 
+@pytest.mark.long
 def test_a_turn_that_the_lengths_forbid_is_never_proved() -> None:
     """Poses of a linkage that passes, claimed for one that does not: only the samples beside the gap stay open."""
     good = simulate(four_bar(3.0, 1.0, 2.0 + 1e-6, 2.0), np.linspace(0.0, math.tau, 360))
@@ -232,6 +233,7 @@ def test_a_jump_to_the_other_branch_is_found() -> None:
         assert "between inputs" in proof.reason
 
 
+@pytest.mark.long
 def test_a_jump_where_the_branches_nearly_meet_is_found() -> None:
     u = np.linspace(0.0, math.tau, 361)
     first, second = (simulate(four_bar(3.0, 1.0, 2.0 + 1e-9, 2.0), u, modes={0: s}) for s in (1, -1))
@@ -239,6 +241,7 @@ def test_a_jump_where_the_branches_nearly_meet_is_found() -> None:
     assert not proof.certified and not proof.closed and not proof.intervals[180]
 
 
+@pytest.mark.long
 def test_a_parallelogram_is_not_followed_through_its_change_point() -> None:
     """Neither on the branch that stays a parallelogram nor on the crossed one, although every sample is assembled."""
     u = np.linspace(0.1, 0.1 + math.tau, 200)

@@ -223,6 +223,7 @@ def triad(seed: int) -> tuple[Mechanism, np.ndarray, np.ndarray, np.ndarray, flo
     return Mechanism(TRIAD, joints, [Driver(0, 1)]), D, b, lengths, crank
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 1, 4, 6, 10, 12, 28, 35, 36])
 def test_triad_follows_every_mode(seed: int) -> None:
     """Each mode is followed over the turn; where it ends, two of the six roots of the sextic disappear."""

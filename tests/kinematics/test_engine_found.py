@@ -131,6 +131,7 @@ def test_escapes_are_located_whatever_hangs_on_the_link(seed: int) -> None:
     assert event.kind == "escape" and abs(event.input - exact) < 1e-8
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [3, 4])
 def test_centres_of_gears_that_coincide_end_the_motion(seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -196,6 +197,7 @@ BETWEEN = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("seed", "kind"), BETWEEN)
 def test_what_happens_between_samples_is_told(seed: int, kind: str) -> None:
     ended, faults = one(seed)

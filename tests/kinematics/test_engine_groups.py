@@ -71,6 +71,7 @@ def chains() -> list[MechanismGraph]:
     return list(enumerate_chains(8))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("index", range(16))
 def test_every_eight_link_chain_moves(index: int) -> None:
     """Each inversion, driven at each joint of the frame: classes II to IV and higher."""
@@ -243,6 +244,7 @@ def branch_of_samples(inversions: Iterable[MechanismGraph]) -> None:
             np.testing.assert_allclose(back.poses[-1, :, :2], fine.poses[0, :, :2], atol=1e-9)
 
 
+@pytest.mark.long
 def test_fold_of_a_dyad_is_not_blamed_on_the_triad_that_hangs_on_it() -> None:
     graph = MechanismGraph(8, [(0, 1), (1, 2), (2, 3), (0, 3), (3, 5), (4, 5), (4, 6), (0, 6), (4, 7), (0, 7)], frame=0)
     joints = [

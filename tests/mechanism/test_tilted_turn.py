@@ -81,6 +81,7 @@ def test_near_an_immovable_linkage_only_what_lies_beyond_rounding_is_decided(ste
         assert len(turn.limit_angles) == (2 if steps > 0 else 0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rod", ["rigid", "deck"])
 @pytest.mark.parametrize("depth", [1e-8, -1e-8, 1e-6, -1e-6])
 def test_a_dip_between_two_samples_is_seen(depth, rod):

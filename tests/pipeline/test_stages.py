@@ -39,6 +39,7 @@ def test_unknown_output_missing_giver_cycle_and_two_givers() -> None:
         resolve([stage("a", "", "x"), stage("b", "", "x")], ["x"])
 
 
+@pytest.mark.long
 @given(st.data())
 def test_random_pipelines_are_minimal_and_ordered(data: st.DataObject) -> None:
     count = data.draw(st.integers(1, 9))

@@ -214,6 +214,7 @@ def test_the_best_are_the_best_of_all_rows_whatever_is_certified() -> None:
     assert ranked > 20
 
 
+@pytest.mark.long
 def test_the_best_does_not_depend_on_how_many_are_certified() -> None:
     reports = [execute(small(certify=most)) for most in (1, 7, 40)]
     texts = [report["records"][report["ranking"].numbers[0] - 1].solution for report in reports]
@@ -290,6 +291,7 @@ def test_parquet_and_all_rows(tmp_path: Path) -> None:
     assert sorted(set(table["frame"].to_pylist())) == [0.5 * k for k in range(1, 11)]
 
 
+@pytest.mark.long
 def test_the_same_bytes_for_threads_and_none(tmp_path: Path) -> None:
     run(small(), out=tmp_path / "one")
     with ThreadPoolExecutor(3) as threads:
@@ -315,6 +317,7 @@ def cut(folder: Path, shards: int) -> None:
     (folder / "candidates.jsonl").write_bytes(b"".join(lines[: 1 + shards]) + lines[1 + shards][:50])
 
 
+@pytest.mark.long
 def test_a_killed_run_goes_on_to_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run(small(), out=tmp_path)
     whole = outputs(tmp_path)
@@ -327,6 +330,7 @@ def test_a_killed_run_goes_on_to_the_same_bytes(tmp_path: Path, monkeypatch: pyt
     assert outputs(tmp_path) == whole
 
 
+@pytest.mark.long
 def test_a_part_that_was_changed_is_refused(tmp_path: Path) -> None:
     run(small(), out=tmp_path)
     cut(tmp_path, 4)
@@ -338,6 +342,7 @@ def test_a_part_that_was_changed_is_refused(tmp_path: Path) -> None:
     assert len(list(tmp_path.glob("rows/*.csv"))) == 6
 
 
+@pytest.mark.long
 def test_parts_of_an_older_larger_run_are_removed(tmp_path: Path) -> None:
     run(small(), out=tmp_path)
     run(small(shard=1000), out=tmp_path)
@@ -361,6 +366,7 @@ def test_one_failing_shard_is_recorded_and_the_others_go_on(tmp_path: Path, monk
     assert len(list(tmp_path.glob("rows/*.csv"))) == 5
 
 
+@pytest.mark.long
 def test_a_time_budget_stops_and_more_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import time
 

@@ -81,6 +81,7 @@ def _listed(at):
     return tuple(enumerate_chains(links, mobility, **options))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("at", range(len(CHAINS)), ids=str)
 def test_every_chain_answers_the_question_once(at):
     links, mobility, options = CHAINS[at]
@@ -133,6 +134,7 @@ def test_frames_are_orbits_of_links(links, mobility, options):
     assert sorted(m.key for m in enumerate_mechanisms(spec)) == by_inversion
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("links", [5, 7, 9, 11])
 def test_assur_groups_are_orbits_of_truss_links(links):
     trusses = list(enumerate_baranov_trusses(links))
@@ -197,6 +199,7 @@ def _keys(links):
     return frozenset(g.key for g in enumerate_chains(links))
 
 
+@pytest.mark.long
 @EXACT
 @given(chains(4, 10), st.data())
 def test_a_chain_with_one_more_dyad_is_listed(chain, data):
@@ -280,6 +283,7 @@ def test_text_is_the_text_of_the_graphs(at):
     assert sum(lines for _, lines in texts(PROBLEMS[at].work_items(listing=True), None)) == len(lines)
 
 
+@pytest.mark.long
 @settings(EXACT, max_examples=25)
 @given(st.integers(2, 60), st.integers(0, 10**6))
 def test_a_contracted_graph_may_be_cut_into_any_parts(parts, pick):
@@ -303,6 +307,7 @@ def test_the_size_of_pieces_does_not_matter(monkeypatch, size):
 # --- sampling ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "question", [{"W": 1, "links": 6}, {"W": 1, "links": 8}, {"W": 1, "links": 6, "p2": 2, "t0": 3}]
 )

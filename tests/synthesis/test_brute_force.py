@@ -97,6 +97,7 @@ COLOURED = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("links", "mobility", "space", "counts"), COLOURED)
 @pytest.mark.parametrize("fractionated", [False, True])
 def test_chains_with_joints_of_any_mobility(links, mobility, space, counts, fractionated):

@@ -78,6 +78,7 @@ def test_those_that_carry_a_chain(loops, count):
     assert sum(int((count_each(f, 0, len(f.graphs)) > 0).sum()) for f in families if len(f.graphs)) == count
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("loops", range(2, SHIPPED_LOOPS + 1))
 def test_every_graph_is_what_it_should_be(loops):
     for k, mults in layers(loops):

@@ -43,6 +43,7 @@ def with_each_frame(lines):
     return sorted(set(nauty.canonical(framed)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("links", "mobility"), CHAINS)
 @pytest.mark.parametrize("fractionated", [False, True])
 def test_chains(links, mobility, fractionated):
@@ -86,6 +87,7 @@ def test_fractionated_mechanisms(links, mobility):
     assert sorted(nauty.canonical(mechanisms)) == with_each_frame(chains)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("links", "p1", "p2"),
     [(7, 8, 1), (7, 7, 3), (8, 9, 2)],

@@ -45,6 +45,7 @@ def test_there_is_something_to_share():
     assert len(LONG.work_items(listing=True)) >= 14
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("workers", [1, 2, 7])
 def test_threads(alone, workers):
     with ThreadPoolExecutor(workers) as executor:
@@ -58,6 +59,7 @@ def test_processes(alone, workers):
         assert digest(executor) == alone
 
 
+@pytest.mark.long
 def test_the_pool_of_the_command_line(alone):
     with parallel.processes(2) as executor:
         assert isinstance(executor, Executor)
@@ -131,6 +133,7 @@ def read(path):
     return path.read_bytes()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("shards", [1, 3, 8])
 def test_shard_files_one_after_the_other_are_the_whole_file(tmp_path, shards):
     whole = tmp_path / "whole.txt"

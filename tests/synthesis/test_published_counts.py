@@ -55,6 +55,7 @@ def test_every_row_names_a_source():
     assert set(named) <= set(PUBLISHED["sources"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("row", rows("chains"))
 def test_chains(row):
     assert count_chains(row["links"], row["mobility"]) == row["count"]
@@ -70,6 +71,7 @@ def listed():
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("row", listed())
 def test_chains_listed(row):
     row_count, links, mobility = row["count"], row["links"], row["mobility"]

@@ -87,6 +87,7 @@ def test_chains_of_more_freedoms(chain):
     assert chain.mobility == 2 and chain.links in (5, 7, 9) and chain.rigid_subchain() is None
 
 
+@pytest.mark.long
 def test_chains_reach_every_chain_and_other_labels():
     seen = set()
 
@@ -183,6 +184,7 @@ def test_every_class_is_reached_also_one_unit_from_its_border(kind):
         assert reaches(testing.four_bars(kind), near)
 
 
+@pytest.mark.long
 def test_all_classes_are_drawn_by_default():
     for kind in CLASSES[:-1]:
         assert reaches(testing.four_bars(), lambda bar, kind=kind: bar.type == kind)
@@ -275,6 +277,7 @@ def _lengths(mechanism):
 # --- numbers ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @given(testing.intervals((2, 3)))
 def test_intervals_are_intervals(x):
     assert isinstance(x, Interval) and x.shape == (2, 3)
@@ -375,6 +378,7 @@ def test_one_leg_at_least_reaches_its_vertex(found):
     assert (solution.deficit < 1e-12).any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "corner",
     [

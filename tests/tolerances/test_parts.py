@@ -152,6 +152,7 @@ def test_lengths_of_a_link_are_chained_from_their_datum():
     assert member.joint(1, 3).at_a == pytest.approx((0.9, 2.05))  # moves with its datum
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("make", "closed"),
     [(lambda: LAMBDA, 0), (lambda: LAMBDA, 1), (slider_crank, 1), (rocker_slider, 1)],
@@ -298,6 +299,7 @@ def test_a_member_that_does_not_turn_fully_is_named(sizes, signs):
     assert "cannot be assembled" not in plain.reason
 
 
+@pytest.mark.long
 def test_a_tolerance_of_nothing_changes_nothing():
     """A parameter without width is no reason not to cut the input."""
     given, motion = [LengthTolerance(1, (0, 2), 0.0), HolePosition(2, 3, 0.0)], simulate(LAMBDA, TURN)
@@ -307,6 +309,7 @@ def test_a_tolerance_of_nothing_changes_nothing():
     assert same.evaluated > 128 and same.decided == 1.0
 
 
+@pytest.mark.long
 def test_tubes_of_chained_dyads_hold_every_member():
     """The second dyad stands on the first: joints of random members lie inside, and the boxes are no idle ones."""
     mechanism = embody(next(iter(enumerate_chains(6))), seed=0).mechanism
@@ -384,6 +387,7 @@ def test_a_named_member_has_its_hole_inside_the_circle():
         assert f"{name} {value:+.12g}" in found.reason
 
 
+@pytest.mark.long
 def test_a_named_member_has_its_limits_and_angle():
     motion = simulate(LAMBDA, TURN)
     limits = JointLimits(0.006, tilt_range=(0.0055, 0.0065))

@@ -280,6 +280,7 @@ def test_nothing_is_parsed_as_markup_or_run_and_files_are_small(name):
 # --- Python, DXF, GIF, other frames
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", sorted(CASES))
 def test_the_python_text_makes_the_mechanism(scripts, name):
     """What the page shows as Python is run, and its mechanism moves as the one on the page."""

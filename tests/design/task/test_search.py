@@ -109,6 +109,7 @@ TASKS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TASKS)
 def test_derivatives_are_those_of_differences(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """At fine samples: derivatives are those of the motion, differences those of cubics between its samples."""
@@ -248,6 +249,7 @@ def test_a_candidate_may_begin_anywhere_on_its_turn() -> None:
             assert np.abs(np.roll(one, -start) - two).max() < 1e-7 * (1.0 + np.abs(one).max())
 
 
+@pytest.mark.long
 def test_the_largest_error_is_made_small_in_the_end() -> None:
     """A parabola by a four-bar: least squares leave uneven errors, afterwards seven or more are the largest."""
     parabola = FunctionTarget.of(np.square, (0, 1), input_range="90 deg", output_range="60 deg", count=33)
@@ -309,6 +311,7 @@ def test_classical_problems_begin_with_every_solution_of_algebra(kind: str) -> N
     assert found.accepted and found.pieces <= len(lengths)
 
 
+@pytest.mark.long
 def test_a_hidden_cylinder_is_found_from_the_angle_it_gives() -> None:
     """The law of cosines: a lever of 1 at a foot at distance 2, a cylinder from 1.3 to 2.3."""
     length = 1.3 + np.linspace(0.0, 1.0, 9)
@@ -331,6 +334,7 @@ def test_a_hidden_cylinder_is_found_from_the_angle_it_gives() -> None:
     assert found[0].transmission == pytest.approx(np.arcsin(np.sqrt(1.0 - cosine**2)).min(), abs=0.01)
 
 
+@pytest.mark.long
 def test_strokes_and_time_ratios_are_those_of_the_closed_form() -> None:
     """An offset slider-crank has both in closed form: dead centres where crank and rod are in line."""
     ratio, least = 1.25, "60 deg"
@@ -359,6 +363,7 @@ def test_strokes_and_time_ratios_are_those_of_the_closed_form() -> None:
     assert abs((math.pi + apart) / (math.pi - apart) - ratio) < 0.02
 
 
+@pytest.mark.long
 def test_an_offset_slider_crank_has_its_stroke_and_time_ratio() -> None:
     """Dead centres where crank and rod are in line: both in closed form, from the lengths of the answer."""
     wanted = SwingTarget(least=2.0, most=2.0, time_ratio=1.3, link="ram", slides=True)
@@ -384,6 +389,7 @@ def test_an_offset_slider_crank_has_its_stroke_and_time_ratio() -> None:
         assert abs((math.pi + apart) / (math.pi - apart) - 1.3) < 0.02
 
 
+@pytest.mark.long
 def test_a_dwell_stands_still_while_the_crank_turns() -> None:
     still = math.radians(0.5)
     task = DesignTask(targets=[DwellTarget(span="50 deg", tolerance=still), SwingTarget(least="25 deg")], links=[6])
@@ -415,6 +421,7 @@ def test_the_same_answers_for_any_executor_and_none_twice() -> None:
             )
 
 
+@pytest.mark.long
 def test_a_task_without_lengths_has_no_copies_of_another_size() -> None:
     task = DesignTask(targets=[SwingTarget(least="60 deg", most="60 deg", time_ratio=1.5)], links=[4])
     found = design(task, count=2)

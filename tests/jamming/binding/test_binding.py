@@ -260,6 +260,7 @@ def test_wear_of_one_joint() -> None:
     np.testing.assert_allclose(report.friction_torque, rubs, atol=1e-12)
 
 
+@pytest.mark.long
 def test_binds_where_the_limits_are_exceeded() -> None:
     """It binds exactly where the convex program of the limits says so."""
     for tilt in (0.012, 0.0121, 0.0122, 0.013):
@@ -293,6 +294,7 @@ def test_what_cannot_give_way_blocks() -> None:
     assert "neither clearance nor compliance" in report.statement
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["four-bar", "slider", "six-bar", "rail"])
 def test_exact_closure_differs_by_alpha_squared(kind: str) -> None:
     """Energy and torque with finite tilts; the difference falls with the square of the tilt."""

@@ -120,6 +120,7 @@ def half_space(weights: list[float], t: list[float], tolerance: float, brackets:
     return found.lower[0, 0], found.upper[1, 0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("n", [2, 3, 5, 9])
 def test_sums_of_uniform_quantities_are_enclosed(n: int) -> None:
     random = np.random.default_rng(n)

@@ -167,6 +167,7 @@ def unclipped_minimum(R1, a, b, e1, e2):
     return R1**2 - e1 - b**2 * (1 + e2), a**2 * (1 - e2) - R1**2 - e1
 
 
+@pytest.mark.long
 @settings(max_examples=30, deadline=None)
 @given(size, size, size, small, small, st.randoms(use_true_random=False))
 def test_ranges_of_the_radii_with_tolerances(R1, b, extra, e1, e2, random):

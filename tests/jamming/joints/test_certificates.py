@@ -53,6 +53,7 @@ def varied_limits(mechanism, rng):
     return {joint.pair: kinds[k]() for joint, k in zip(mechanism.joints, chosen)}
 
 
+@pytest.mark.long
 def test_pose_certificates_meet_on_random_linkages():
     """At float positions the two proved bounds hold the value and meet to 1e-11, over 2000 random loops."""
     rng = np.random.default_rng(4)
@@ -74,6 +75,7 @@ def test_pose_certificates_meet_on_random_linkages():
     assert undecided <= 40  # 2 %
 
 
+@pytest.mark.long
 def test_roll_and_pitch_of_slanted_guides():
     """Guides in any direction: the bounds meet at the value, so neither component has another sign or direction."""
     rng = np.random.default_rng(1)
@@ -118,6 +120,7 @@ def exact_lower(given, poses, y, units):
     return abs(float(work)) / cost
 
 
+@pytest.mark.long
 def test_any_wrenches_and_any_tilts_give_valid_bounds():
     """Adversary: the certificate starts from garbage, and must stay on the right side."""
     rng = np.random.default_rng(8)
@@ -154,6 +157,7 @@ def test_margins_at_a_pose_are_decided(margin):
             assert lower[0] > 1.0 if side > 0 else upper[0] < 1.0
 
 
+@pytest.mark.long
 def test_poses_of_another_branch_prove_nothing(monkeypatch):
     """A solver that slips to the other assembly, which jams, must not turn a free motion into a proved jam."""
     from graphsynth.kinematics import simulation
@@ -226,6 +230,7 @@ def test_whole_turn_of_the_lambda_linkage():
     assert len(proof.to_pandas()) == len(proof.low) and proof.summary()["verdict"] == "CERTIFIED_JAMMED"
 
 
+@pytest.mark.long
 def test_allowed_misalignment_from_both_sides():
     exact = 0.012128793118312840120532205597449602345
     begin = perf_counter()
@@ -319,6 +324,7 @@ def test_some_members_jam(fit, alpha, alpha_range, tolerance):
     assert found.summary()["witness"]["factor"] == one.factor and repr(one.input) in found.reason
 
 
+@pytest.mark.long
 def test_undecided_pieces_were_cut_at_least_once():
     """All over this range some members jam and some do not; a first piece alone would be given up too early."""
     fit, span = bearing_limits(Bearing(), clearance_tolerance=0.003), (1.2, 1.9)
@@ -327,6 +333,7 @@ def test_undecided_pieces_were_cut_at_least_once():
     assert width.size and width.max() < (span[1] - span[0]) / FEWEST / PARTS * (1 + 1e-9)
 
 
+@pytest.mark.long
 def test_what_no_member_decides():
     """At the limit itself a member touches: neither free nor a proved jam, whatever the tolerance below it."""
     motion = simulate(four_bar(), np.linspace(1.2, 1.9, 5))

@@ -38,6 +38,7 @@ def random_limits(mechanism, seed, plays=(0.0, 0.0, 0.02, 0.2)):
 CASES = [(6, 0), (6, 1), (8, 0), (8, 3), (8, 7)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("links", "number"), CASES)
 def test_against_a_linear_program_of_the_bodies(links, number):
     mechanism = embodied(links, number)
@@ -90,6 +91,7 @@ def test_against_a_general_optimiser():
         assert found.upper[k] == pytest.approx(best, rel=2e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(3))
 def test_single_loop_to_many_digits(seed):
     """theory/joints-that-share-a-tilt 4: the search over the point p, in 25 digits, with axial play."""
@@ -129,6 +131,7 @@ def test_loop_and_body_form_agree(links, number):
     assert (np.abs(found.zeta) <= given_.layout.end_float * (1 + 1e-12)).all()
 
 
+@pytest.mark.long
 @settings(max_examples=8, deadline=None)
 @given(
     st.floats(-9, 9), st.floats(0, 6.28), st.booleans(), st.floats(0, 6.28), st.floats(0, 6.28), st.floats(0.01, 100.0)
@@ -175,6 +178,7 @@ def test_factor_and_scale_pass_one_together():
             assert touching.factor[0] == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.long
 def test_prices_are_derivatives():
     mechanism = embodied(6, 0)
     base, link = driven_pair(mechanism)
@@ -352,6 +356,7 @@ def eight_directions():
     return motion, direction_map(motion, JointLimits(0.01, 0.003), Misalignment(0, 1, 0.01, 0.0), directions=8)
 
 
+@pytest.mark.long
 @settings(max_examples=8, deadline=None)
 @given(st.floats(0.0, 6.28))
 def test_no_direction_is_worse_than_the_bound(angle):

@@ -151,6 +151,7 @@ def test_lengths_of_any_size():
         np.testing.assert_array_equal(got.b, want.b)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("span", [1.0, 6.0])
 def test_length_ratios_up_to_a_million_millions(span):
     """Against 60 digits: angles to rounding over margin; where reach is decided wrongly, it is flagged."""

@@ -263,6 +263,7 @@ def test_special_roots():
     assert [(round(abs(math.degrees(r.angle)), 6), r.order) for r in mixed] == [(60.0, 1), (60.0, 1), (180.0, 2)]
 
 
+@pytest.mark.long
 @settings(deadline=None)
 @given(st.floats(-3.14, 3.14), st.floats(-3.14, 3.14), st.floats(-3.14, 3.14))
 def test_known_roots(p, q, r):

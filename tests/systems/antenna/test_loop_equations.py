@@ -36,6 +36,7 @@ def test_all_twelve_unknowns():
     np.testing.assert_allclose(np.degrees(solved.x), UNKNOWNS, rtol=0, atol=1e-13)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("order", ORDERS)
 def test_newton_agrees_with_the_closed_form(order):
     mechanism = PointingMechanism(order=order)
@@ -173,6 +174,7 @@ def test_every_assembly_mode_is_a_root_that_attracts(order):
         np.testing.assert_allclose(np.exp(1j * solved.x), np.broadcast_to(np.exp(1j * x), (5, 12)), atol=1e-14)
 
 
+@pytest.mark.long
 def test_false_roots_are_half_turns():
     random = np.random.default_rng(5).uniform(-np.pi, np.pi, (60, 12))
     from graphsynth.systems.antenna.loop_equations import newton

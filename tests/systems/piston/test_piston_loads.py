@@ -197,6 +197,7 @@ def test_break_even_is_the_steepest_angle_of_the_rod():
         assert (found.wall_ratio < 1.0) is better
 
 
+@pytest.mark.long
 def test_scotch_yoke_presses_with_its_ends():
     """A plain yoke has no side load, but a couple F r sin(phi): the second group takes that from the cylinder."""
     machine = PistonMachine(FloatingPiston.scotch_yoke(0.05), gas=ConstantForce(1000.0))
@@ -249,6 +250,7 @@ def test_where_friction_jams_there_is_no_number():
         piston_turn(machine)
 
 
+@pytest.mark.long
 def test_static_friction_in_a_slot_that_stands_still():
     square, askew = MACHINES["square"], MACHINES["askew"]
     loads = square.loads(np.linspace(0, 6, 20))
@@ -324,6 +326,7 @@ def test_indicated_diagram_of_the_compressor():
     assert AIR.work(stroke) == pytest.approx(area * AIR.area, rel=1e-10)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", [
     CompressorCycle(0.1, 1e5, 1e5), CompressorCycle(0.1, 1e5, 9e6, clearance=0.2), CompressorCycle(0.1, 1e5, 5e5, 0.0),
     CompressorCycle(0.1, 1e5, 5e5, exponent=1.0),

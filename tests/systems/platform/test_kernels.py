@@ -378,6 +378,7 @@ CUSPED = [
 ]  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("machine", CUSPED)
 def test_modes_that_change_places(machine):
     turned = machine.monodromy()
@@ -666,6 +667,7 @@ def case_change_point():
 CASES = [value for name, value in sorted(globals().items()) if name.startswith("case_")]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.__name__.removeprefix("case_"))
 def test_extreme_case(case):
     case()

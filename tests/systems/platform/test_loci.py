@@ -89,6 +89,7 @@ def test_ends_lie_on_circles_of_type_one(loci: tuple[ParallelPlatform, SingularL
             assert min(off) < 1e-11 * max(c.radius for c in found.circles)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sigma", [(1, 1, -1), (-1, -1, -1), (-1, 1, 1)])
 def test_no_sign_change_away_from_the_curves(sigma: tuple[int, int, int]) -> None:
     """An independent finer grid: every cell edge with a sign change is near a traced curve."""
@@ -110,6 +111,7 @@ def test_no_sign_change_away_from_the_curves(sigma: tuple[int, int, int]) -> Non
         assert np.abs(path - q).min() < 2.0 * (x1 - x0) / n
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("below", [1e-2, 1e-4])
 def test_closed_loop_around_the_singular_home_of_the_mock_up(below: float) -> None:
     """Just below the singular orientation a loop with threefold symmetry surrounds the origin."""

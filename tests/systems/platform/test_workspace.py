@@ -126,6 +126,7 @@ def test_boundary_is_closed_and_separates(platform: ParallelPlatform, alpha: flo
             assert work.contains([middle - 1e-9 * normal])[0]
 
 
+@pytest.mark.long
 @settings(max_examples=25, deadline=None)
 @given(
     platforms(),
