@@ -14,8 +14,8 @@ from graphsynth.core.wholefolders import PageFolder, put
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.workbench.modules import names, script
 
-#: Modules of kernels that the page loads at once.
-_FIRST = ("motion", "chains")
+#: Modules of kernels that the page loads at once, and those that it loads when they are asked for.
+_FIRST, _LATER = ("motion", "chains"), ("sketch",)
 _FOLDER = PageFolder("workbench-page.txt", {".": (".html", ".css", ".js")})
 
 
@@ -62,7 +62,7 @@ def write_workbench(place: str | Path, mechanism: Mechanism | None = None, *, si
         return place
     with _FOLDER.replaced(place) as (target, building):
         scripts = page_scripts(given)
-        for name, text in scripts.items():
+        for name, text in {**scripts, **later_scripts()}.items():
             put(building / f"{name}.js", text)
         put(building / "style.css", page_file("style.css"))
         named = [f'<script src="{name}.js"></script>' for name in scripts if name != "theme"]
@@ -82,8 +82,9 @@ def write_workbench(place: str | Path, mechanism: Mechanism | None = None, *, si
 
 def single_page(given: str = "") -> str:
     """Return the whole page as one text; ``given`` is the JSON of what lies on the table."""
-    scripts = page_scripts(given)
-    theme = scripts.pop("theme")
+    scripts = page_scripts(given, whole=True)
+    theme, last = scripts.pop("theme"), scripts.pop("main")
+    scripts |= {**later_scripts(), "main": last}
     allowed = " ".join(_digest(text) for text in (theme, *scripts.values()))
     return _page(
         theme=f"<script>{theme}</script>",
@@ -94,20 +95,36 @@ def single_page(given: str = "") -> str:
     )
 
 
-def page_scripts(given: str = "") -> dict[str, str]:
-    """Return the scripts by name, in the order in which the page loads them."""
-    order = page_file("order.txt").split()
-    last = order.index("main")
+def page_scripts(given: str = "", *, whole: bool = False) -> dict[str, str]:
+    """Return the scripts by name, in the order in which the page loads them; ``whole``: nothing is loaded later."""
+    own = [name for line in page_file("order.txt").splitlines()[1:] for name in line.split()]
     words = (f"Bench.words({_json(name)}, {_json(table)});\n" for name, table in languages().items())
-    data = f"Bench.templates = {_json(templates())};\nBench.given = {_json(given)};\n"
+    data = f"Bench.templates = {_json(templates())};\nBench.given = {_json(given)};\nBench.whole = {_json(whole)};\n"
     return {
         "theme": page_file("theme.js"),
-        "workbench": "".join(page_file(f"{name}.js") for name in order[:last]),
+        "workbench": mathematics() + "".join(page_file(f"{name}.js") for name in own if name != "main"),
         "words": "".join(words),
         "given": data,
         **{f"{name}.wasm": script(name) for name in names() if name in _FIRST},
-        "main": "".join(page_file(f"{name}.js") for name in order[last:]),
+        "main": page_file("main.js"),
     }
+
+
+def mathematics() -> str:
+    """Return the scripts that know no page, as one function: a worker is made of its text."""
+    own = page_file("order.txt").splitlines()[0].split()
+    known = ", ".join(name.capitalize() for name in own)
+    text = "".join(page_file(f"{name}.js") for name in own)
+    return (
+        f"const Mathematics = function () {{\n{text}return {{ {known} }};\n}};\nconst {{ {known} }} = Mathematics();\n"
+    )
+
+
+def later_scripts() -> dict[str, str]:
+    """Return the scripts that the page asks for when they are needed, by name."""
+    from graphsynth.workbench import chains
+
+    return {"chains-data": chains.script(), **{f"{name}.wasm": script(name) for name in names() if name in _LATER}}
 
 
 def languages() -> dict[str, dict[str, str]]:

@@ -16,7 +16,7 @@ FLAGS = (
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars",
 )  # fmt: skip
 #: Scripts that need no page: functions of drawings, files, addresses.
-PURE = page_file("order.txt").splitlines()[0].split()
+PURE = [name for line in page_file("order.txt").splitlines()[:2] for name in line.split()]
 
 
 @pytest.fixture(scope="session")
@@ -28,10 +28,11 @@ def scripts():
     words = "".join(f"Bench.words({json.dumps(k)}, {json.dumps(table)});" for k, table in languages().items())
     base = "".join(page_file(f"{name}.js") for name in PURE) + words + script("chains")
 
-    def run(body, *arguments):
+    def run(body, *arguments, modules=()):
         asked = f"(async (...args) => {{ {body} }})(...{json.dumps(arguments)})"
-        text = f"{base}\n{asked}.then(found => process.stdout.write(JSON.stringify({{ found }})));"
-        done = subprocess.run([node, "-"], input=text, capture_output=True, text=True, timeout=120, check=False)
+        end = "then(found => process.stdout.write(JSON.stringify({ found })))"
+        text = f"{base}\n{''.join(map(script, modules))}{asked}.{end};"
+        done = subprocess.run([node, "-"], input=text, capture_output=True, text=True, timeout=600, check=False)
         assert done.returncode == 0, done.stderr[-2000:]
         return json.loads(done.stdout).get("found")
 

@@ -88,7 +88,7 @@ const Chains = (() => {
             workspace(module, 4 * states);
             continue;
           }
-          if (outcome < 0) throw new RangeError("a contracted graph carries too many chains");
+          if (outcome < 0) throw new RangeError(`family ${family.loops},${family.vertices}: one graph carries too many chains`);
           for (let k = 0; k < stop - at; k++) total += out.data[k];
           done += stop - at;
           at = stop;
@@ -117,7 +117,7 @@ const Chains = (() => {
         for (let found = ROWS; found === ROWS;) {
           const room = workspace(module, states);
           found = module.call("synthesis.kernels.listing.list_rows", family.vertices, mults, mults.shape[0], FRAME_NONE, 0, 0, tables, room, rows);
-          if (found < 0) throw new RangeError("a contracted graph has too many symmetries");
+          if (found < 0) throw new RangeError(`family ${family.loops},${family.vertices}: one graph has too many symmetries`);
           const kept = module.call("synthesis.kernels.expanding.expand_packed", family.vertices, links, mults, rows, found, expansion, packed);
           const size = 3 * family.joints, block = packed.data.slice(0, kept * size);
           for (let k = 0; k < kept; k++) yield block.subarray(k * size, (k + 1) * size);
@@ -130,7 +130,10 @@ const Chains = (() => {
     }
   }
 
-  return { register, kinds, count, list };
+  /* What a worker has to be told. */
+  const scripts = () => (text ? [["chains", text]] : []);
+
+  return { register, scripts, kinds, count, list };
 })();
 
 if (typeof module !== "undefined") module.exports = Chains;

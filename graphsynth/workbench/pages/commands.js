@@ -46,7 +46,7 @@
   Bench.KEYS = {
     "^z": "undo", "^y": "redo", "^Z": "redo", Delete: "delete", Backspace: "delete", "^d": "duplicate", "^m": "mirror",
     "^a": "all", f: "fit", h: "mode", "#": "grid", n: "snap", x: "names", "?": "help", Escape: "escape",
-    "^s": "save", "^o": "open", " ": "play", c: "share",
+    "^s": "save", "^o": "open", " ": "play", u: "share",
   };
 
   const typing = target => target.closest && target.closest("input:not([type=range]):not([type=checkbox]), select, textarea, dialog");

@@ -68,6 +68,20 @@
     return Bench.withPair(sheet, { kind: "gear", a: wheels[0], b: wheels[1], at: one, on: other, radii, internal });
   };
 
+  /** A disk cam about one point and a roller at another; a cam of its own where only the frame has the first; returns [sheet, id].
+      In the drawn position the roller is at the mean radius. */
+  Bench.addCam = (sheet, centre, roller) => {
+    const radius = centre !== roller ? Bench.distance(sheet, centre, roller) : 0, [p, q] = [sheet.points[centre], sheet.points[roller]];
+    if (!(radius > 0)) throw new Bench.Fault("fault.short");
+    const movers = Bench.linksAt(sheet, roller).filter(id => id !== GROUND), slides = id => Object.values(sheet.pairs).some(pair => pair.kind === "P" && pair.b === id);
+    const follower = movers.find(slides) || movers[0];
+    if (!follower) throw new Bench.Fault("fault.roller");
+    let cam = Bench.linksAt(sheet, centre).find(id => id !== GROUND && id !== follower);
+    if (!cam) [sheet, cam] = Bench.withLink(sheet, [centre]);
+    const angle = Math.atan2(q.y - p.y, q.x - p.x);
+    return Bench.withPair(sheet, { kind: "cam", a: cam, b: follower, at: centre, on: roller, angle, radius, harmonics: [[0, radius / 4]] });
+  };
+
   /** Give wheels a ratio of teeth; the distance of the centres stays. */
   Bench.withTeeth = (sheet, id, first, second, internal) => {
     const pair = sheet.pairs[id], sum = internal ? second - first : first + second;

@@ -12,7 +12,8 @@
      engine.pose, engine.inputs         what it stands in now; engine.velocities, engine.accelerations
      engine.advance(to, driver = 0)     -> {reached, input, stop}, stop: null or {kind, group, links}, see STOPS
      engine.drag(link, point, target)   -> {left, end}, end: "reached", "nearest", "singular", "open"
-     engine.sweep(n, driver = 0)        -> {inputs, poses, velocities, accelerations, margins, events, full}
+     engine.sweep(n, driver = 0)        -> {inputs, poses, velocities, accelerations, margins, events, full, turns}, turns: after how many it closes
+     engine.assemblies(group)           -> poses in which this group is assembled otherwise
      engine.instantCentres()            -> Float64Array links x links x 2
      engine.transmission(margins)       -> [{group, angle}]
      engine.drivers()                   -> joints that could drive it
@@ -24,7 +25,7 @@ const Engine = (() => {
   const KINDS = ["R", "P", "pin-slot", "gear", "cam"];
   const FAULTS = ["", "drivers", "length", "parallel", "twice"];
   const STOPS = ["", "limit", "lost", "lost", "singular", "input", "change point", "passage"];
-  const TWO_MODES = [2, 3, 4, 7], DRIVE_P = 1;
+  const TWO_MODES = [2, 3, 4, 7], DRIVE_P = 1, TURNS = 6;
   const ROW_WIDTH = 12, ELIMINATED_WIDTH = 13, DRIVE_WIDTH = 8, SAMPLES = 4;
   const STEPS = 0, TOUCHED = 1, ROWS = 2, CORE = 3, GONE = 4, DRIVES = 5, GEARS = 6, AT = 7;
   /* Shifts of driver coordinates with which a pose on the limit of a driver is assembled. */
@@ -312,7 +313,13 @@ const Engine = (() => {
       const span = slides ? 4 * this.Lc : 2 * Math.PI, start = Float64Array.from(this.inputs);
       const end = (by) => start.map((q, k) => (k === driver ? q + by : q));
       const forward = this.swept(this.state, start, end(span), driver, n);
-      if (!forward.stop && !slides) return { ...forward, full: true };
+      if (!forward.stop && !slides) {
+        /* a group of more than two links may come back in another assembly: it is turned until it closes */
+        for (let turns = 1, whole = forward; turns <= TURNS && !whole.stop; whole = this.swept(this.state, start, end(++turns * span), driver, turns * (n - 1) + 1)) {
+          if (this.closes(whole)) return { ...whole, full: true, turns };
+        }
+        return { ...forward, full: true, turns: Infinity };
+      }
       const backward = this.swept(this.state, start, end(-span), driver, 2);
       /* from the lower limit, reached from here, to the upper one */
       const low = Float64Array.from(start), high = Float64Array.from(start);
@@ -322,6 +329,52 @@ const Engine = (() => {
         .map(([way, at]) => ({ ...way.stop, input: at[driver] }));
       const whole = this.swept(this.spare, low, high, driver, n);
       return { ...whole, events: [...events, ...whole.events].sort((a, b) => a.input - b.input), full: false };
+    }
+
+    /* Poses in which one group is assembled otherwise at the same driver coordinates: of a dyad the other one; of a larger
+       group those that are found from random poses of its links, not necessarily all. */
+    assemblies(group, trials = 200) {
+      if (!this.ready) return [];
+      const { links } = this, own = this.groups[group], steps = this.modes.shape[0], kept = Float64Array.from(this.modes.data);
+      const rate = this.inputs.map((_, k) => (k ? 0 : 1)), found = [], before = Float64Array.from(this.pose);
+      const read = () => {
+        const X = this.spare.X.data, pose = Float64Array.from(before);
+        for (let link = 0; link < links; link++) {
+          const at = c => X[SAMPLES * (4 * link + c)], raw = Math.atan2(at(3), at(2));
+          pose.set([at(0), at(1), raw + 2 * Math.PI * Math.round((before[3 * link + 2] - raw) / (2 * Math.PI))], 3 * link);
+        }
+        const far = other => own.links.reduce((sum, link) => sum + Math.hypot((pose[3 * link] - other[3 * link]) / this.Lc,
+          (pose[3 * link + 1] - other[3 * link + 1]) / this.Lc, 2 * Math.sin((pose[3 * link + 2] - other[3 * link + 2]) / 2)), 0);
+        if (pose.every(Number.isFinite) && [before, ...found].every(other => far(other) > 1e-6)) found.push(pose);
+      };
+      let seed = 4711;
+      const lot = () => { seed = (seed * 48271) % 2147483647; return (2 * seed) / 2147483647 - 1; };
+      if (own.twoModes) {
+        for (const [name, array] of Object.entries(this.spare)) array.data.set(this.state[name].data);
+        const reached = new Float64Array(3);
+        for (let s = 0; s < steps; s++) if (this.order[s] === group) this.modes.data[s] *= -1;
+        this.call("advancing.advance", this.tables, this.modes, this.spare, this.inputs, this.inputs, rate, this.sizes, reached);
+        if (reached[1] === 0) read();
+      } else {
+        for (let trial = 0; trial < trials; trial++) {
+          const poses = Float64Array.from(before);
+          for (const link of own.links) poses.set([before[3 * link] + this.Lc * lot(), before[3 * link + 1] + this.Lc * lot(), before[3 * link + 2] + Math.PI * lot()], 3 * link);
+          const [code] = this.call("advancing.settle", this.tables, this.modes, this.spare, this.inputs, rate, { data: poses, shape: [links, 3] }, this.sizes);
+          if (code === 0) read();
+        }
+      }
+      this.modes.data.set(kept);
+      return found;
+    }
+
+    /* Whether the last pose of a sweep is the first one, but for whole turns. */
+    closes({ poses }) {
+      const last = poses.length - 3 * this.links, near = 1e-6;
+      for (let k = 0; k < 3 * this.links; k++) {
+        const far = poses[last + k] - poses[k], turn = 2 * Math.PI;
+        if (Math.abs(k % 3 === 2 ? far - turn * Math.round(far / turn) : far / this.Lc) > near) return false;
+      }
+      return true;
     }
 
     instantCentres() {

@@ -54,6 +54,12 @@
   /** The drawing of the address; said if it is damaged. */
   Bench.openAddress = async app => {
     try {
+      const named = /^#k=([\w-]+)(?:&f=(\d+)&d=([\d,]+))?$/.exec(location.hash);
+      if (named) {
+        const chain = Bench.fromKey(app, named[1]), drivers = named[3] && named[3].split(",").map(Number);
+        if (!chain) throw new Bench.Fault("fault.key");
+        return Bench.layChain(app, chain, named[2] ? { frame: Number(named[2]), drivers } : {});
+      }
       const sheet = await Bench.fromFragment(location.hash);
       if (!sheet) return false;
       app.take(sheet, { select: [], say: ["said.opened", { file: Bench.word("name.address") }] });

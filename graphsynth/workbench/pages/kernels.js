@@ -301,6 +301,7 @@ const Kernels = (() => {
   }
 
   const registered = new Map(); /* by name: how a module is opened, then the module */
+  const announced = [];         /* what the scripts of modules said, for a worker */
 
   /* Open a module from its bytes and its table. */
   async function open(name, bytes, table) {
@@ -310,6 +311,7 @@ const Kernels = (() => {
 
   /* What the script of a module calls: its table, and its bytes, compressed and as text. */
   function register(name, table, text) {
+    announced.push(["kernels", name, table, text]);
     registered.set(name, async () => {
       const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
       const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
@@ -327,7 +329,7 @@ const Kernels = (() => {
     return opened;
   }
 
-  return { open, register, load, KernelError };
+  return { open, register, load, scripts: () => announced, KernelError };
 })();
 
 if (typeof module !== "undefined") module.exports = Kernels;

@@ -28,4 +28,42 @@
     const text = btoa(String.fromCharCode(...bytesOf(links, moved)));
     return `1${text.replace(/\+/g, "-").replace(/\//g, "_").replace(/=+$/, "")}`;
   };
+
+  const keyOf = Bench.keyOf = (app, { links, joints }) =>
+    Bench.chainKey(app.chains, { pose: Array(links).fill(0), joints: joints.map(([a, b]) => ({ kind: "R", a, b })) });
+
+  /** The chain of a mechanism in the form of files: links and joints that make one, all of mobility 1; null for others. */
+  Bench.chainOf = ({ pose, joints }) => {
+    const own = joints.map(({ a, b }) => [Math.min(a, b), Math.max(a, b)]), links = pose.length;
+    const lower = joints.every(joint => joint.kind === "R" || joint.kind === "P"), degree = link => own.filter(pair => pair.includes(link)).length;
+    return lower && links > 3 && own.every(([a, b]) => a !== b) && Array.from({ length: links }, (_, k) => degree(k)).every(count => count > 1) ? { links, joints: own } : null;
+  };
+
+  /** Chains with a dyad less and with a dyad more, each once: {smaller, larger}. */
+  Bench.relatives = (app, { links, joints }) => {
+    const once = all => [...new Map(all.map(own => [keyOf(app, own), own])).values()], smaller = [], larger = [];
+    const ends = link => joints.filter(pair => pair.includes(link));
+    for (const [a, b] of links > 5 ? joints : []) {
+      if (ends(a).length !== 2 || ends(b).length !== 2) continue;
+      const [p, q] = [a, b].map(link => ends(link).find(pair => pair[0] !== a || pair[1] !== b).find(other => other !== link));
+      const number = new Map([...Array(links).keys()].filter(link => link !== a && link !== b).map((link, k) => [link, k]));
+      const own = joints.filter(pair => !pair.includes(a) && !pair.includes(b)).map(pair => pair.map(link => number.get(link)));
+      const left = { pose: Array(links - 2), joints: own.map(([u, v]) => ({ kind: "R", a: u, b: v })) };
+      if (p !== q && Bench.chainOf(left)) smaller.push(Bench.chainOf(left));
+    }
+    for (let p = 0; p < links; p++) {
+      for (let q = 0; q < p; q++) larger.push({ links: links + 2, joints: [...joints, [q, links], [links, links + 1], [p, links + 1]] });
+    }
+    return { smaller: once(smaller), larger: once(larger) };
+  };
+
+  /** Links and joints of a key; null if it is none of a planar chain with lower pairs. */
+  Bench.fromKey = (app, key) => {
+    try {
+      const bytes = Uint8Array.from(atob(key.slice(1).replace(/-/g, "+").replace(/_/g, "/")), c => c.charCodeAt(0)), [links, kind] = bytes, joints = [];
+      if (key[0] !== "1" || kind !== 3 || links < 3 || links > 32) return null;
+      for (let b = 1, bit = 0; b < links; b++) for (let a = 0; a < b; a++, bit++) if (bytes[2 + (bit >> 3)] & (128 >> (bit & 7))) joints.push([a, b]);
+      return keyOf(app, { links, joints }) === key ? { links, joints } : null;
+    } catch { return null; }
+  };
 })();

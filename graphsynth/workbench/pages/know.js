@@ -32,6 +32,14 @@
     const key = Bench.chainKey(app.chains, Bench.written(app.sheet)), named = `chain.${key}`, name = Bench.word(named);
     return [[Bench.word("know.chain"), name === named ? key : `${name} (${key})`]];
   }
+  /** Chains one dyad away, and the page of the chain in the atlas. */
+  function kin(app) {
+    const data = Bench.written(app.sheet), chain = Bench.chainOf(data);
+    if (!app.chains || !chain) return null;
+    const key = Bench.chainKey(app.chains, data);
+    return make("div", { class: "acts" }, make("button", { type: "button", "data-kin": key, on: { click: () => Bench.showRelatives(app, chain) } }, Bench.word("know.kin")),
+      Bench.atlas ? make("a", { href: `${Bench.atlas}#/${key}`, target: "_top" }, Bench.word("know.atlas")) : null);
+  }
 
   /** A row of buttons, one for each entry. */
   const buttons = entries => make("div", { class: "acts" }, ...entries.map(([text, act, more = {}]) => make("button", { type: "button", on: { click: act }, ...more }, text)));
@@ -40,7 +48,7 @@
     const swept = motion.sweep();
     if (!swept) return [];
     const first = swept.inputs[0], last = swept.inputs[swept.inputs.length - 1];
-    const text = swept.full ? Bench.word("know.full") : Bench.word("know.range", { from: Bench.shownInput(motion, first), to: Bench.shownInput(motion, last) });
+    const text = swept.full ? Bench.word(swept.turns === 1 ? "know.full" : "know.fullbut", { n: swept.turns === Infinity ? "–" : swept.turns }) : Bench.word("know.range", { from: Bench.shownInput(motion, first), to: Bench.shownInput(motion, last) });
     const angles = [];
     const steps = swept.margins.length / swept.inputs.length;
     for (let i = 0; i < swept.inputs.length; i++) {
@@ -85,10 +93,13 @@
       app.faulty = idsOf(app, engine.fault.tooMany || []);
       parts.push(make("p", { class: "warn" }, fault(app, engine.fault)));
     } else {
-      const groups = engine.groups.map(({ kind, links }) => `${Bench.word("know.group", { kind: Bench.groupName(kind) })} (${named(app, links)})`).join("; ");
-      rows.push([Bench.word("know.groups"), groups || "–"]);
+      const name = ({ kind, links }) => `${Bench.groupName(kind)} (${named(app, links)})`;
+      rows.push([Bench.word("know.groups"), engine.groups.map(name).join("; ") || "–"]);
+      if (motion.driven && engine.groups.length) {
+        parts.push(make("h3", {}, Bench.word("know.modes")), buttons(engine.groups.map((group, k) => [name(group), () => motion.assemble(k), { "data-group": k }])));
+      }
     }
-    place.replaceChildren(...[Bench.rows(rows), ...parts, ...(motion.driven ? rotation(app, motion) : []),
+    place.replaceChildren(...[Bench.rows(rows), kin(app), ...parts, ...(motion.driven ? rotation(app, motion) : []),
       ...(engine.mobility > 0 ? drivers(app, motion) : []), ...frames(app)].filter(Boolean));
   };
 

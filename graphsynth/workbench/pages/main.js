@@ -13,6 +13,7 @@
     slider: "M7 8H17V15H7ZM3 18H21M6 18L4 21M12 18L10 21M18 18L16 21",
     slot: "M4 9A3 3 0 0 0 4 15H20A3 3 0 0 0 20 9ZM12 12m-2.5 0a2.5 2.5 0 1 0 5 0a2.5 2.5 0 1 0 -5 0",
     gears: "M8 13m-5.5 0a5.5 5.5 0 1 0 11 0a5.5 5.5 0 1 0 -11 0M17.5 8m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0M8 13h.1M17.5 8h.1",
+    cam: "M9 21A7 7 0 0 1 5 9C7 5 13 5 16 9C18 12 17 21 9 21M10 14h.1M17 5m-3 0a3 3 0 1 0 6 0a3 3 0 1 0 -6 0",
     driver: "M17 7A7 7 0 1 0 19 12M19 12L21.5 9M19 12L16 10M12 12h.1",
     trace: "M3 17C7 3 12 3 13 10C14 18 19 18 21 9M13 10m-2 0a2 2 0 1 0 4 0a2 2 0 1 0 -4 0",
     picture: "M3 5H21V19H3ZM3 16L8 11L12 15L15 12L21 17M15.5 8.5m-1.5 0a1.5 1.5 0 1 0 3 0a1.5 1.5 0 1 0 -3 0",
@@ -173,6 +174,7 @@
     Bench.listen(app);
     for (const element of document.querySelectorAll("[data-mode]")) if (element !== document.body) element.addEventListener("click", () => app.setMode(element.dataset.mode));
     Bench.charts(app, $("charts"));
+    app.work = Work.start(Mathematics);
     try {
       app.chains = await Kernels.load("chains");
       if (typeof Engine !== "undefined") {

@@ -109,6 +109,22 @@
       return Bench.word(`event.${kind.replace(" ", "-")}`, { links: names || "–", at: Bench.shownInput(this, input ?? this.input) });
     }
 
+    /** Assemble a group in the next of its modes; says whether there is another. */
+    assemble(group) {
+      const all = this.engine.assemblies(group), { links } = this.engine.groups[group];
+      if (!all.length) { this.app.say("said.nomode"); return; }
+      // in the order of the first angle in which they differ, so that the button goes through all of them
+      const turn = pose => links.map(link => Math.atan2(Math.sin(pose[3 * link + 2]), Math.cos(pose[3 * link + 2])));
+      const below = (p, q) => { const k = p.findIndex((own, n) => Math.abs(own - q[n]) > 1e-6); return k >= 0 && p[k] < q[k]; };
+      const here = turn(this.engine.pose), order = all.sort((p, q) => (below(turn(p), turn(q)) ? -1 : 1));
+      this.pause();
+      this.engine.take(order.find(pose => below(here, turn(pose))) || order[0]);
+      this.swept = null;
+      this.show();
+      this.app.say("said.mode", { n: all.length + 1 });
+      this.app.changed("rest");
+    }
+
     toggle() { if (this.playing) this.pause(); else this.play(); }
     play() {
       if (!this.driven || this.stands) { this.app.say(this.why); return; }

@@ -36,7 +36,7 @@
       const links = Object.keys(sheet.links).length;
       Bench.tracedPoints(sheet).forEach(([id, k, at], n) => {
         const path = Bench.pathOver(swept, links, k, at).map(place => view.px(place));
-        parts.push(svg("path", { class: `curve c${n % 4}`, "data-curve": id, d: Bench.pathOf(path.filter(p => p.every(Number.isFinite)), swept.full) }));
+        parts.push(svg("path", { class: `curve c${n % 4}`, "data-curve": id, d: Bench.pathOf(path.filter(p => p.every(Number.isFinite)), swept.full && swept.turns < Infinity) }));
         for (const event of swept.events) {
           const pose = rowOf(swept.poses, links, motion.nearest(event.input), k), [cx, cy] = view.px(Bench.carried(pose, at));
           if (Number.isFinite(cx)) parts.push(svg("circle", { class: `mark ${event.kind.replace(" ", "-")}`, cx, cy, r: 5 }, svg("title", {}, motion.told(event))));

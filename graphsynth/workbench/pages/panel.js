@@ -108,6 +108,18 @@
       parts.push(choice("panel.guide", pair.a, free.map(own => [own, Bench.linkName(sheet, own)]), own => set({ a: own })));
       parts.push(...driverPart(app, [pair.a, pair.b]));
     }
+    if (pair.kind === "cam") {
+      // the roller stays where it is: it is at the mean radius, and waves of the sine begin there
+      const own = pair.harmonics.findIndex(([c, s]) => c || s), drawnSo = pair.harmonics.every(([c, s], k) => !c && (k === own || !s));
+      const waves = (n, lift) => {
+        if (!(n >= 1 && n <= 40 && Number.isInteger(n)) || !(Math.abs(lift) < 2 * pair.radius)) throw new Bench.Fault("fault.cam");
+        set({ harmonics: Array.from({ length: n }, (_, k) => [0, k === n - 1 ? lift / 2 : 0]) });
+      };
+      if (drawnSo && own >= 0) {
+        parts.push(field(app, "panel.lift", tidy(2 * pair.harmonics[own][1]), text => waves(own + 1, number(text, sheet.unit)), { unit: sheet.unit }),
+          field(app, "panel.waves", String(own + 1), text => waves(Number(text), 2 * pair.harmonics[own][1])));
+      }
+    }
     if (pair.kind === "gear") {
       // the wheels stay in mesh: one radius gives the other
       const radius = k => text => {

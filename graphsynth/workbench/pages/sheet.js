@@ -111,6 +111,15 @@
     for (const [id, [x, y]] of Object.entries(places)) points[id] = { ...points[id], x: bounded(x), y: bounded(y) };
     const moved = { ...sheet, points }, pairs = { ...sheet.pairs };
     for (const [id, pair] of Object.entries(sheet.pairs)) {
+      if (pair.kind === "cam") {
+        // a roller at the mean radius stays there
+        const [p, q, from, to] = [moved, moved, sheet, sheet].map((own, k) => own.points[k % 2 ? pair.on : pair.at]), far = Math.hypot(to.x - from.x, to.y - from.y);
+        const turned = Math.atan2(q.y - p.y, q.x - p.x) - Math.atan2(to.y - from.y, to.x - from.x), next = Math.hypot(q.x - p.x, q.y - p.y);
+        if (Math.abs(pair.radius - far) < 1e-9 * far && next > 0) {
+          pairs[id] = { ...pair, radius: next, angle: pair.angle + turned, harmonics: pair.harmonics.map(wave => wave.map(value => (value * next) / far)) };
+        }
+        continue;
+      }
       if (pair.kind !== "gear") continue;
       const before = Bench.distance(sheet, pair.at, pair.on), after = Bench.distance(moved, pair.at, pair.on);
       const sum = Math.abs(pair.radii[0] * (pair.internal ? -1 : 1) + pair.radii[1]);

@@ -35,6 +35,14 @@
     return { sheet: next, select: [pair], say: ["said.gears"] };
   }
 
+  function cam(sheet, picks) {
+    let ids;
+    [sheet, ids] = Bench.picked(sheet, picks);
+    if (Bench.linksAt(sheet, ids[0]).length === 0) sheet = Bench.toggleGround(sheet, ids[0]);
+    const [next, pair] = Bench.addCam(sheet, ...ids);
+    return { sheet: next, select: [pair], say: ["said.cam"] };
+  }
+
   function bar(sheet, picks) {
     const [next, id] = Bench.drawLink(sheet, picks);
     return { sheet: next, select: [id], say: ["said.link", { a: Bench.linkName(next, id) }] };
@@ -76,6 +84,7 @@
     slider: { key: "s", picks: 2, apply: slider },
     slot: { key: "t", picks: 2, apply: slot },
     gears: { key: "e", picks: 2, apply: gears },
+    cam: { key: "c", picks: 2, apply: cam },
     driver: { key: "d", picks: 1, apply: driver },
     trace: { key: "k", picks: 1, apply: trace },
     measure: { key: "m", picks: 2 },
