@@ -133,7 +133,7 @@ def test_relatives_are_those_of_the_catalogue(scripts):
 
 
 ASSEMBLED = """const engine = Engine.open(await Kernels.load("motion"), args[0]);
-return engine.groups.map((group, k) => [group.twoModes, engine.assemblies(k).map(pose => Array.from(pose))]);"""
+return engine.groups.map((group, k) => [group.twoModes, Assembling.found(engine, k).map(pose => Array.from(pose))]);"""
 
 
 @pytest.mark.long

@@ -13,7 +13,6 @@
      engine.advance(to, driver = 0)     -> {reached, input, stop}, stop: null or {kind, group, links}, see STOPS
      engine.drag(link, point, target)   -> {left, end}, end: "reached", "nearest", "singular", "open"
      engine.sweep(n, driver = 0)        -> {inputs, poses, velocities, accelerations, margins, events, full, turns}, turns: after how many it closes
-     engine.assemblies(group)           -> poses in which this group is assembled otherwise
      engine.instantCentres()            -> Float64Array links x links x 2
      engine.transmission(margins)       -> [{group, angle}]
      engine.drivers()                   -> joints that could drive it
@@ -329,42 +328,6 @@ const Engine = (() => {
         .map(([way, at]) => ({ ...way.stop, input: at[driver] }));
       const whole = this.swept(this.spare, low, high, driver, n);
       return { ...whole, events: [...events, ...whole.events].sort((a, b) => a.input - b.input), full: false };
-    }
-
-    /* Poses in which one group is assembled otherwise at the same driver coordinates: of a dyad the other one; of a larger
-       group those that are found from random poses of its links, not necessarily all. */
-    assemblies(group, trials = 200) {
-      if (!this.ready) return [];
-      const { links } = this, own = this.groups[group], steps = this.modes.shape[0], kept = Float64Array.from(this.modes.data);
-      const rate = this.inputs.map((_, k) => (k ? 0 : 1)), found = [], before = Float64Array.from(this.pose);
-      const read = () => {
-        const X = this.spare.X.data, pose = Float64Array.from(before);
-        for (let link = 0; link < links; link++) {
-          const at = c => X[SAMPLES * (4 * link + c)], raw = Math.atan2(at(3), at(2));
-          pose.set([at(0), at(1), raw + 2 * Math.PI * Math.round((before[3 * link + 2] - raw) / (2 * Math.PI))], 3 * link);
-        }
-        const far = other => own.links.reduce((sum, link) => sum + Math.hypot((pose[3 * link] - other[3 * link]) / this.Lc,
-          (pose[3 * link + 1] - other[3 * link + 1]) / this.Lc, 2 * Math.sin((pose[3 * link + 2] - other[3 * link + 2]) / 2)), 0);
-        if (pose.every(Number.isFinite) && [before, ...found].every(other => far(other) > 1e-6)) found.push(pose);
-      };
-      let seed = 4711;
-      const lot = () => { seed = (seed * 48271) % 2147483647; return (2 * seed) / 2147483647 - 1; };
-      if (own.twoModes) {
-        for (const [name, array] of Object.entries(this.spare)) array.data.set(this.state[name].data);
-        const reached = new Float64Array(3);
-        for (let s = 0; s < steps; s++) if (this.order[s] === group) this.modes.data[s] *= -1;
-        this.call("advancing.advance", this.tables, this.modes, this.spare, this.inputs, this.inputs, rate, this.sizes, reached);
-        if (reached[1] === 0) read();
-      } else {
-        for (let trial = 0; trial < trials; trial++) {
-          const poses = Float64Array.from(before);
-          for (const link of own.links) poses.set([before[3 * link] + this.Lc * lot(), before[3 * link + 1] + this.Lc * lot(), before[3 * link + 2] + Math.PI * lot()], 3 * link);
-          const [code] = this.call("advancing.settle", this.tables, this.modes, this.spare, this.inputs, rate, { data: poses, shape: [links, 3] }, this.sizes);
-          if (code === 0) read();
-        }
-      }
-      this.modes.data.set(kept);
-      return found;
     }
 
     /* Whether the last pose of a sweep is the first one, but for whole turns. */

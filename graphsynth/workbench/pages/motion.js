@@ -111,7 +111,7 @@
 
     /** Assemble a group in the next of its modes; says whether there is another. */
     assemble(group) {
-      const all = this.engine.assemblies(group), { links } = this.engine.groups[group];
+      const all = Assembling.found(this.engine, group), { links } = this.engine.groups[group];
       if (!all.length) { this.app.say("said.nomode"); return; }
       // in the order of the first angle in which they differ, so that the button goes through all of them
       const turn = pose => links.map(link => Math.atan2(Math.sin(pose[3 * link + 2]), Math.cos(pose[3 * link + 2])));
