@@ -9,7 +9,7 @@ const Assembling = (() => {
 
   function found(engine, group, trials = 200) {
     if (!engine.ready) return [];
-    const { links } = this, own = engine.groups[group], steps = engine.modes.shape[0], kept = Float64Array.from(engine.modes.data);
+    const { links } = engine, own = engine.groups[group], steps = engine.modes.shape[0], kept = Float64Array.from(engine.modes.data);
     const rate = engine.inputs.map((_, k) => (k ? 0 : 1)), others = [], before = Float64Array.from(engine.pose);
     const read = () => {
       const X = engine.spare.X.data, pose = Float64Array.from(before);
