@@ -11,14 +11,16 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics import simulate
 from graphsynth.kinematics.dimensional import Embodiment, Goals, embody
 from graphsynth.kinematics.dimensional.design import Design, joint_kinds, teeth
+from graphsynth.kinematics.dimensional.verify import side_lengths
 from graphsynth.mechanism.constraints import residual
-from graphsynth.mechanism.joints import Cam, Gear, PinSlot
+from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Revolute
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 #: Geared five-bars: wheels 1 and 4 on the frame; the wheel 2 rolls on the frame, carried by the crank 1.
 FIXED_AXES = MechanismGraph(5, [(0, 1), (1, 2), (2, 3), (3, 4), (0, 4), (1, 4, 2)], frame=0)
 PLANETARY = MechanismGraph(5, [(0, 1), (1, 2), (2, 3), (3, 4), (0, 4), (0, 2, 2)], frame=0)
+CAM_AND_FOLLOWER = MechanismGraph(3, [(0, 1), (0, 2), (1, 2, 2)], frame=0)
 APART = MechanismGraph(5, [(0, 1), (1, 2), (2, 3), (3, 4), (0, 4), (1, 3, 2)], frame=0)
 #: A higher pair between links that no third link joins.
 LONG = MechanismGraph.from_text("DrW f0 2:2-4")
@@ -130,3 +132,98 @@ def test_a_set_of_dimensions_is_assembled_where_it_is_drawn() -> None:
             random.normal(0.0, 1.0, (len(graph.joints), 2)), random.normal(0.0, 1.0, len(design.numbers))
         )
         assert np.abs(residual(mechanism.joints, mechanism.pose)).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    "graph, kind",
+    [
+        pytest.param(APART, "cam 0.2:0 0:0.1", marks=pytest.mark.long),
+        (CAM_AND_FOLLOWER, "cam 0.3:0 0.05:0"),
+    ],
+)
+def test_a_roller_keeps_to_a_given_profile(graph: MechanismGraph, kind: str) -> None:
+    """By the polar form: the distance from the cam's centre to the roller, over the direction as the cam sees it."""
+    found = embody(graph, pairs=kind, driver=1)
+    assert found.accepted and found.mechanism is not None
+    motion = simulate(found.mechanism, np.linspace(0.0, math.tau, 361))
+    k = next(i for i, joint in enumerate(found.mechanism.joints) if isinstance(joint, Cam))
+    joint = found.mechanism.joints[k]
+    way = world(found.mechanism, motion.poses, k, "b") - world(found.mechanism, motion.poses, k, "a")
+    psi = np.angle(way) - motion.poses[:, joint.a, 2] - joint.angle_a
+    rho = np.ones(len(psi))
+    for order, pair in enumerate(kind.split()[1:], 1):
+        cosine, sine = map(float, pair.split(":"))
+        rho += cosine * np.cos(order * psi) + sine * np.sin(order * psi)
+    assert np.ptp(np.abs(way)) > 0.1 * np.abs(way).mean()  # it is not used where it is round
+    assert np.abs(way) == pytest.approx(joint.radius_a * rho, rel=1e-9)
+
+
+def test_the_size_beside_a_profile_is_searched() -> None:
+    """Two searches do not end with the same ratio of the frame to the cam."""
+    sizes = set()
+    for seed in (0, 1):
+        mechanism = embody(CAM_AND_FOLLOWER, seed=seed, driver=1, pairs="cam 0.2:0").mechanism
+        assert mechanism is not None
+        radius = next(joint.radius for joint in mechanism.joints if isinstance(joint, Cam))
+        frame = [joint.at_a for joint in mechanism.joints if joint.a == 0]
+        assert len(frame) == 2
+        sizes.add(round(math.dist(*frame) / radius, 6))
+    assert len(sizes) == 2
+
+
+def test_derivatives_through_a_profile() -> None:
+    """Gradients by places and numbers against differences of the dimensions, every column."""
+    random = np.random.default_rng(3)
+    design = Design(APART, ((0, 1),), joint_kinds(APART, {(1, 3): "cam 0.2:-0.1 0:0.05"}))
+    places, numbers = random.normal(0.0, 1.0, (1, 6, 2)), random.normal(0.0, 1.0, (1, len(design.numbers)))
+    by = random.normal(0.0, 1.0, (1, 1, 6, 10, 1))
+    found = design.pulled(by, places, numbers)[0, 0, 0]
+    x = np.concatenate([places.ravel(), numbers.ravel()])
+    for k, value in enumerate(found):
+        ends = []
+        for step in (1e-6, -1e-6):
+            moved = x.copy()
+            moved[k] += step
+            ends.append(design.dimensions(moved[:12].reshape(1, 6, 2), moved[None, 12:]))
+        assert value == pytest.approx(float((by[0, 0, :, :, 0] * (ends[0] - ends[1])[0]).sum()) / 2e-6, abs=1e-8)
+
+
+def test_a_rule_holds_where_it_can() -> None:
+    """A gear needs a carrier; what is named goes before the rule."""
+    assert "pin-slot" in joint_kinds(LONG, {}, "gear 2:1") and "cam" in joint_kinds(LONG, {}, "cam")
+    assert "gear 2:1" in joint_kinds(APART, {}, "gear 2:1")
+    assert "pin-slot" in joint_kinds(APART, {(1, 3): "pin-slot"}, "cam 0.1:0")
+    for pairs in ("R", "cam 0.1", "cam 2:0", "wheel"):
+        with pytest.raises(GeometryError):
+            joint_kinds(APART, {}, pairs)
+
+
+@pytest.mark.parametrize("rates", [(1.0, 2.0), (2.0, -3.0)])
+def test_drivers_turn_at_rates_of_their_own(rates: tuple[float, float]) -> None:
+    """Both cranks of a five-bar; the two rods keep their lengths between them, from poses of the cranks alone."""
+    five = MechanismGraph(5, [(0, 1), (1, 2), (2, 3), (3, 4), (0, 4)], frame=0)
+    found = embody(five, Goals(rates=rates), driver=[1, 4])
+    assert found.accepted and found.mechanism is not None
+    inputs = np.linspace(0.0, math.tau, 73)
+    motion = simulate(found.mechanism, inputs)
+    assert motion.completed and motion.closure.closed
+    theta = np.unwrap(motion.poses[..., 2], axis=0)
+    for link, rate in zip((1, 4), rates):
+        assert theta[:, link] - theta[0, link] == pytest.approx(rate * inputs, abs=1e-9)
+
+
+@pytest.mark.parametrize("rates, message", [((1.0, 0.5), "whole numbers"), ((1.0, 0.0), "must not be 0")])
+def test_rates_that_make_no_turn(rates: tuple[float, float], message: str) -> None:
+    with pytest.raises(GeometryError, match=message):
+        Goals(rates=rates)
+    with pytest.raises(GeometryError, match="3 rates are given, but the mobility is 1; give one"):
+        embody(APART, Goals(rates=(1.0, 1.0, 1.0)))
+
+
+def test_a_pin_in_a_slot_is_a_place_on_its_link() -> None:
+    """The bar of 2 with a pin near its joint counts as short: 0.2."""
+    joints = (Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), PinSlot(0, 2, (0.0, 0.5), (0.2, 0.0)))
+    graph = MechanismGraph(3, [(0, 1), (1, 2), (0, 2, 2)], frame=0)
+    assert sorted(side_lengths(Mechanism(graph, joints))) == pytest.approx([0.2, 1.0])
+    design = Design(graph, ((0, 1),), ("R", "pin-slot", "R"))
+    assert {(0, 2), (1, 2)} == {tuple(sorted(pair)) for pair in design.sides.tolist()}

@@ -269,6 +269,7 @@ def embody(
     *,
     driver: Drivers | None = None,
     joints: Mapping[tuple[int, int], str] | None = None,
+    pairs: str = "",
     tries: int = 12,
     seconds: float = math.inf,
     effort: float = 1.0,
@@ -288,7 +289,10 @@ def embody(
         A link on the frame, or two jointed links.
     joints : mapping of (a, b) to str, optional
         Kind by pair of links of the graph given: "R" (default) or "P"; "gear", "pin-slot" or "cam" for mobility 2, by
-        default a gear where a third link carries both wheels, else a pin in a slot.  Teeth as in "gear 2:1".
+        default a gear where a third link carries both wheels, else a pin in a slot.  Teeth as in "gear 2:1"; a profile
+        as in "cam 0.2:0 0:0.05", cosines and sines of 1, 2, ... times the polar angle over the mean radius.
+    pairs : str, optional
+        Kind of all joints of mobility 2 that ``joints`` does not name, instead of the default; gears where they can be.
     tries : int
         Searches at most; each takes the next frame and driver of the order of
         :func:`graphsynth.kinematics.dimensional.design.choices`, and starts anew from another sketch.
@@ -320,6 +324,8 @@ def embody(
     begin = perf_counter()
     wanted = Goals() if goals is None else Goals(target=goals) if isinstance(goals, Target) else goals
     _check(graph, wanted)
+    if wanted.rates and len(wanted.rates) != graph.mobility:
+        raise GeometryError(f"{len(wanted.rates)} rates are given, but the mobility is {graph.mobility}; give one each")
     whole("seed", seed, 0, 2**128)
     whole("tries", tries, 1)
     if seconds != math.inf:
@@ -329,7 +335,7 @@ def embody(
     run = _Run(wanted, seed, begin, seconds, effort)
     for attempt in range(tries):
         inversion, drivers = order[attempt % len(order)]
-        kinds = _kinds(graph, inversion, joints)
+        kinds = _kinds(graph, inversion, joints, pairs)
         run.start(Design(inversion, drivers, kinds, wanted.symmetry), attempt, attempt // len(order))
         if run.ended:
             break
@@ -451,15 +457,15 @@ class _Run:
 
 
 def _kinds(
-    graph: MechanismGraph, inversion: MechanismGraph, joints: Mapping[tuple[int, int], str] | None
+    graph: MechanismGraph, inversion: MechanismGraph, joints: Mapping[tuple[int, int], str] | None, pairs: str
 ) -> tuple[str, ...]:
     """Kinds of the joints of an inversion, from those of the graph given."""
     if joints is not None and not isinstance(joints, Mapping):
         raise GeometryError(f"joints = {joints!r} is not a mapping of (a, b) to a kind, as in {{(0, 1): 'P'}}")
     given = {pair: str(kind) for pair, kind in (joints or {}).items()}
-    kinds = joint_kinds(graph, given)
+    kinds = joint_kinds(graph, given, pairs)
     if inversion.frame == graph.frame:
         return kinds
     link = next(link for link in range(graph.links) if graph.with_frame(link) == inversion)
     new = {old: k for k, old in enumerate([link, *(k for k in range(graph.links) if k != link)])}
-    return joint_kinds(inversion, {(new[a], new[b]): kind for (a, b), kind in given.items()})
+    return joint_kinds(inversion, {(new[a], new[b]): kind for (a, b), kind in given.items()}, pairs)

@@ -33,7 +33,8 @@ _RADIUS_A, _RADIUS_B = COLUMNS.index("radius_a"), COLUMNS.index("radius_b")
 _SIGN, _OFFSET = COLUMNS.index("sign"), COLUMNS.index("offset")
 
 
-#: Kinds by mobility; a gear may name its teeth as in "gear 2:1" and "gear 1:-3" (the second wheel is internal).
+#: Kinds by mobility; a gear may name its teeth as in "gear 2:1" and "gear 1:-3" (the second wheel is internal), a cam
+#: its profile as in "cam 0.2:0 0:0.05": cosines and sines of 1, 2, ... times the polar angle, over the mean radius.
 KINDS = {1: ("R", "P"), 2: ("gear", "pin-slot", "cam")}
 _TEETH = re.compile(r"gear(?: ([1-9]\d*):(-?[1-9]\d*))?")
 
@@ -50,12 +51,31 @@ def teeth(kind: str) -> tuple[int, int] | None:
     return (int(found[1] or 1), int(found[2] or 1))
 
 
+def profile(kind: str) -> tuple[tuple[float, float], ...] | None:
+    """Harmonics of a cam over its mean radius, none if it is circular; None for other kinds.
+
+    `GeometryError` for a cam whose radius is not positive everywhere, or that is no list of pairs.
+
+    >>> profile("cam"), profile("cam 0.2:0 0:-0.05"), profile("R")
+    ((), ((0.2, 0.0), (0.0, -0.05)), None)
+    """
+    name, *pairs = kind.split(" ")
+    if name != "cam":
+        return None
+    try:
+        found = tuple((float(c), float(s)) for c, s in (pair.split(":") for pair in pairs))
+    except ValueError:
+        raise GeometryError(f"{kind!r} is no cam; give its harmonics as in 'cam 0.2:0 0:0.05'") from None
+    return Cam(0, 1, harmonics=found).harmonics
+
+
 @dataclass(frozen=True)
 class Design:
     """A mechanism graph with a frame, drivers (base, link) and kinds of joints: all but the numbers.
 
-    A kind is "R", "P", "pin-slot", "cam" (circular) or "gear", in the order of ``graph.joints``.  ``symmetry``, if any,
-    is the image of every link under an automorphism that keeps the frame: at the first input the mechanism has it too.
+    A kind is "R", "P", "pin-slot", "cam" (circular, or with a profile) or "gear", in the order of ``graph.joints``.
+    ``symmetry``, if any, is the image of every link under an automorphism that keeps the frame: at the first input the
+    mechanism has it too.  Cams with a profile have the mean radius 1: it is the rest that is larger or smaller.
     """
 
     graph: MechanismGraph
@@ -65,9 +85,24 @@ class Design:
 
     @cached_property
     def numbers(self) -> tuple[tuple[int, str], ...]:
-        """Joints with numbers besides their place: a direction, "angle"; the logarithm of a cam's radius, "size"."""
-        found = [(k, "angle") for k, kind in enumerate(self.kinds) if kind in ("P", "pin-slot", "cam")]
-        return (*found, *((k, "size") for k, kind in enumerate(self.kinds) if kind == "cam"))
+        """Joints with numbers besides their place: a direction, "angle"; of cams one more.
+
+        That is the logarithm of a circular cam's radius, "size", or where a profile is touched at first, "phase".
+        """
+        directed = [k for k, kind in enumerate(self.kinds) if kind in ("P", "pin-slot") or k in self.profiles]
+        cams = ((k, "phase" if harmonics else "size") for k, harmonics in self.profiles.items())
+        return (*((k, "angle") for k in directed), *cams)
+
+    @cached_property
+    def profiles(self) -> dict[int, tuple[tuple[float, float], ...]]:
+        """Of every cam its harmonics over its mean radius, none of a circular one."""
+        found = ((k, profile(kind)) for k, kind in enumerate(self.kinds))
+        return {k: harmonics for k, harmonics in found if harmonics is not None}
+
+    @cached_property
+    def held(self) -> tuple[int, ...]:
+        """Joints that the search leaves where they are: of `fixed` one, if a cam's profile has a size."""
+        return self.fixed[:1] if any(self.profiles.values()) else self.fixed
 
     @cached_property
     def centres(self) -> dict[int, tuple[int, int]]:
@@ -82,10 +117,18 @@ class Design:
 
     @cached_property
     def sides(self) -> NDArray[np.intp]:
-        """Pairs of joints whose distance is a length of a link, shape (sides, 2): slides have no place on a link."""
+        """Pairs of joints whose distance is a length of a link, shape (sides, 2).
+
+        Slides have no place on a link, and neither have slots and cams: only pins and rollers have one.
+        """
         found = []
         for link in range(self.graph.links):
-            own = [k for k in self.joints_of(link) if self.kinds[k] == "R"]
+            own = [
+                k
+                for k in self.joints_of(link)
+                if self.kinds[k] == "R"
+                or (self.graph.joints[k].b == link and (self.kinds[k] == "pin-slot" or k in self.profiles))
+            ]
             found += [(p, q) for i, p in enumerate(own) for q in own[i + 1 :]]
         return np.array(found, dtype=np.intp).reshape(-1, 2)
 
@@ -112,7 +155,7 @@ class Design:
                 del left[k]
                 a, b = (self.symmetry[link] for link in self.graph.joints[k][:2])
                 image = pairs.get((min(a, b), max(a, b)), -1)
-                one_sided = self.kinds[k] in ("pin-slot", "cam") and a > b
+                one_sided = (self.kinds[k] == "pin-slot" or k in self.profiles) and a > b
                 if image < 0 or one_sided or self.kinds[k] != self.kinds[image]:
                     raise GeometryError(f"joint {self.graph.joints[k][:2]} has no image of its kind; choose its kind")
                 orbit.append(image)
@@ -179,10 +222,15 @@ class Design:
         for column, (k, name) in enumerate(self.numbers):
             if name == "angle":
                 table[:, k, _ANGLE_A] = table[:, k, _ANGLE_B] = numbers[:, column]
-            else:  # a circular cam: its centre lies in the direction of the angle from the roller
-                angle, radius = table[:, k, _ANGLE_A], np.exp(numbers[:, column])
-                table[:, k, _A] += radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-                table[:, k, _RADIUS_A] = radius
+                continue
+            # a cam's centre lies in the direction of the angle from the roller
+            angle, radius = table[:, k, _ANGLE_A], np.exp(numbers[:, column])
+            table[:, k, _RADIUS_A] = radius if name == "size" else 1.0
+            if name == "phase":
+                radius, _ = _pitch(self.profiles[k], numbers[:, column])
+            table[:, k, _A] += radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+            if name == "phase":
+                table[:, k, _ANGLE_A] += math.pi - numbers[:, column]
         for k, (p, q) in self.centres.items():
             table[:, k, _A], table[:, k, _B] = places[:, p], places[:, q]
             way = places[:, q] - places[:, p]
@@ -205,16 +253,19 @@ class Design:
         for column, (k, name) in enumerate(self.numbers):
             if name == "angle":
                 more[..., column] = by[..., k, _ANGLE_A] + by[..., k, _ANGLE_B]
+                continue
+            angle = self.numbers.index((k, "angle"))
+            turn, at_a = numbers[:, angle], by[..., k, :][..., _A]
+            if name == "size":
+                radius = slope = np.exp(numbers[:, column])
+                own = by[..., k, _RADIUS_A] * radius[:, None, None]
             else:
-                angle = next(c for c, own in enumerate(self.numbers) if own == (k, "angle"))
-                radius, turn = np.exp(numbers[:, column]), numbers[:, angle]
-                across = radius[:, None] * np.stack([-np.sin(turn), np.cos(turn)], axis=1)
-                along = radius[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-                at_a = by[..., k, :][..., _A]
-                more[..., angle] += (at_a * across[:, None, None]).sum(axis=-1)
-                more[..., column] = (at_a * along[:, None, None]).sum(axis=-1) + by[..., k, _RADIUS_A] * radius[
-                    :, None, None
-                ]
+                radius, slope = _pitch(self.profiles[k], numbers[:, column])
+                own = -by[..., k, _ANGLE_A]
+            across = radius[:, None] * np.stack([-np.sin(turn), np.cos(turn)], axis=1)
+            along = slope[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+            more[..., angle] += (at_a * across[:, None, None]).sum(axis=-1)
+            more[..., column] = (at_a * along[:, None, None]).sum(axis=-1) + own
         for k, (p, q) in self.centres.items():
             way = places[:, q] - places[:, p]
             first, second = teeth(self.kinds[k]) or (1, 1)
@@ -266,8 +317,9 @@ def _made(
         return Prismatic(*places, along, at.direction - turn_b)
     if kind == "pin-slot":
         return PinSlot(*places, along)
-    if kind == "cam":
-        return Cam(*places, along, at.radii[0])
+    if (harmonics := profile(kind)) is not None:
+        size = at.radii[0]
+        return Cam(*places, along, size, tuple((size * c, size * s) for c, s in harmonics))
     phi, (r_a, r_b), internal = cmath.phase(at.B - at.A), at.radii, (teeth(kind) or (1, 1))[1] < 0
     return Gear(*places, r_a, r_b, internal, turn_b - phi + (turn_a - phi) * r_a / (-r_b if internal else r_b))
 
@@ -284,11 +336,26 @@ def _centres(graph: MechanismGraph, kinds: Sequence[str], gear: int) -> tuple[in
     return (turns[0][common[0]], turns[1][common[0]]) if common else (-1, -1)
 
 
-def joint_kinds(graph: MechanismGraph, given: Mapping[tuple[int, int], str]) -> tuple[str, ...]:
-    """Kinds of all joints: as given, else revolute, gears where both links turn on a third, else pins in slots.
+def _pitch(harmonics: Sequence[tuple[float, float]], psi: Array) -> tuple[Array, Array]:
+    """Radius of a profile over its mean radius, and its derivative by the polar angle."""
+    k, (c, s) = np.arange(1, len(harmonics) + 1), np.array(harmonics).T
+    even, odd = np.cos(psi[:, None] * k), np.sin(psi[:, None] * k)
+    return 1.0 + even @ c + odd @ s, even @ (k * s) - odd @ (k * c)
 
+
+def check_rule(rule: str) -> None:
+    """Refuse a rule that is no kind of mobility 2; an empty one is none."""
+    if rule and rule not in KINDS[2] and not teeth(rule) and not profile(rule):
+        raise GeometryError(f"pairs = {rule!r} is no kind of mobility 2; use one of {KINDS[2]}, or 'gear 2:1'")
+
+
+def joint_kinds(graph: MechanismGraph, given: Mapping[tuple[int, int], str], rule: str = "") -> tuple[str, ...]:
+    """Kinds of all joints: as given, else revolute; of mobility 2 as ``rule`` says.
+
+    By default gears where both links turn on a third, else pins in slots; so it is where a gear cannot be.
     `GeometryError` for a kind that a joint cannot be, or a joint that the graph has not.
     """
+    check_rule(rule)
     own = {}
     for (a, b), kind in given.items():
         wheels = teeth(kind)
@@ -303,11 +370,12 @@ def joint_kinds(graph: MechanismGraph, given: Mapping[tuple[int, int], str]) -> 
         allowed = KINDS.get(mobility, ())
         carried = _centres(graph, kinds, k) != (-1, -1)
         if not kinds[k] and mobility == 2:
-            kinds[k] = "gear" if carried else "pin-slot"
-        if kinds[k] not in allowed and not (mobility == 2 and teeth(kinds[k])):
+            wanted = rule or "gear"
+            kinds[k] = wanted if carried or not teeth(wanted) else "pin-slot"
+        if kinds[k] not in allowed and not (mobility == 2 and (teeth(kinds[k]) or profile(kinds[k]))):
             raise GeometryError(
                 f"joint {a}-{b} has mobility {mobility} and cannot be {kinds[k]!r}; use one of {allowed}"
-                + (", teeth as in 'gear 2:1' or 'gear 1:-3'" if mobility == 2 else "")
+                + (", as in 'gear 2:1', 'gear 1:-3' or 'cam 0.2:0 0:0.05'" if mobility == 2 else "")
             )
         if teeth(kinds[k]) and not carried:
             raise GeometryError(

@@ -215,6 +215,8 @@ class Goals:
     symmetry : sequence of int, optional
         Image of every link under an automorphism that keeps the frame: at the first input a rotation carries the
         mechanism into itself so.  Without a target.
+    rates : sequence of float, optional
+        Rate of every driver over the input, in their order; 1 by default.  Whole numbers for a full turn.
 
     Examples
     --------
@@ -227,9 +229,13 @@ class Goals:
     max_length_ratio: float = 6.0
     target: Target | None = None
     symmetry: tuple[int, ...] = ()
+    rates: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         positive("span", self.span)
+        object.__setattr__(self, "rates", _numbers("rates", self.rates, 0))
+        if 0.0 in self.rates or (self.full_turn and any(rate % 1.0 for rate in self.rates)):
+            raise GeometryError(f"rates = {self.rates} must not be 0, and whole numbers if the input is a full turn")
         object.__setattr__(self, "symmetry", _listed("symmetry", self.symmetry))
         if self.symmetry and self.target is not None:
             raise GeometryError("symmetry is given with a target; leave out one of them")

@@ -40,8 +40,8 @@ INCOMPLETE = 100.0
 #: Cost from which a bound is violated.
 OUTSIDE = 10.0
 _CLOSED = 1e-6
-#: Logarithm of a cam's radius, in mean lengths of the sketch.
-_SIZES = (math.log(0.2), math.log(5.0))
+#: Logarithms of a cam's radius, in mean lengths of the sketch, and of a mechanism's size beside its cams' profiles.
+_SIZES, _BESIDE = (math.log(0.2), math.log(5.0)), (math.log(0.5), math.log(3.0))
 #: The sine of the transmission angle is asked for with this factor: its least value lies between samples.
 _SPARE = 1.002
 
@@ -78,7 +78,7 @@ class DimensionProblem:
         begin: tuple[Array, Array] | None = None,
     ) -> None:
         self.design, self.goals, self.sense = design, goals, -1 if variant & 1 else 1
-        sense = self.sense
+        self.rates = [self.sense * rate for rate in goals.rates or [1.0] * len(design.drivers)]
         self.fit: TargetFit | None = None
         if isinstance(goals.target, LineGoal):
             self.fit = LineFit(goals.target)
@@ -89,13 +89,13 @@ class DimensionProblem:
         self.link = target_link(design, goals.target) if goals.target is not None else -1
         self.ends = [(joint.a, joint.b) for joint in design.graph.joints]
         images = [k for orbit in design.orbits for k in (orbit[1:] or orbit)]
-        self.free = np.setdiff1d(np.arange(len(self.ends)), [*design.fixed, *design.centres, *images])
+        self.free = np.setdiff1d(np.arange(len(self.ends)), [*design.held, *design.centres, *images])
         self.extras = 0 if self.fit is None else len(self.fit.ranges)
         self.size = 2 * len(self.free) + len(design.numbers) + self.extras
         if begin is None:
             self.sketch = self._sketch(random)
             angles = random.uniform(0.0, math.pi, len(design.numbers))
-            numbers = np.where([name == "angle" for _, name in design.numbers], angles, 0.0)
+            numbers = np.where([name != "size" for _, name in design.numbers], angles, 0.0)
             self.numbers = design.symmetric(self.sketch[None], numbers[None])[1][0]
         else:
             self.sketch, self.numbers = begin
@@ -103,7 +103,7 @@ class DimensionProblem:
         self.base = Mechanism(
             base.graph,
             base.joints,
-            tuple(Driver(*pair, Linear(float(sense))) for pair in design.drivers),
+            tuple(Driver(*pair, Linear(rate)) for pair, rate in zip(design.drivers, self.rates, strict=True)),
             pose=base.pose,
         )
         at_rest = simulate(self.base, [0.0], events=False)
@@ -151,8 +151,10 @@ class DimensionProblem:
         reach = 1.5 * float(np.abs(self.sketch - middle).max())
         if self.fit is not None:
             reach = max(reach, self.goals.max_length_ratio)
+        if len(self.design.held) < len(self.design.fixed):
+            reach *= math.exp(_BESIDE[1])
         box = [(middle[k % 2] - reach, middle[k % 2] + reach) for k in range(2 * len(self.free))]
-        box += [(-math.pi, 2.0 * math.pi) if name == "angle" else _SIZES for _, name in self.design.numbers]
+        box += [_SIZES if name == "size" else (-math.pi, 2.0 * math.pi) for _, name in self.design.numbers]
         return np.array([*box, *([] if self.fit is None else self.fit.ranges.tolist())]).reshape(-1, 2)
 
     def population(self, count: int, random: np.random.Generator) -> Array:
@@ -160,7 +162,9 @@ class DimensionProblem:
         wide = np.zeros((count, 1, 1)) if self.fit is None else random.choice([0.0, 0.0, 1.0], (count, 1, 1))
         places = np.repeat(self.sketch[None], count, axis=0)
         places += random.normal(0.0, 1.0, places.shape) * (random.uniform(0.0, 0.35, (count, 1, 1)) + wide)
-        places[:, self.design.fixed] = self.sketch[list(self.design.fixed)]
+        if len(self.design.held) < len(self.design.fixed):  # smaller and larger beside its cams
+            places *= np.exp(random.uniform(*_BESIDE, (count, 1, 1)))
+        places[:, self.design.held] = self.sketch[list(self.design.held)]
         sizes = random.uniform(math.log(0.15), math.log(2.0), (len(self.design.cranks), count))
         places = self.design.with_cranks(places, np.exp(sizes))
         numbers = self.numbers + random.normal(0.0, 0.5, (count, len(self.numbers)))
@@ -294,13 +298,14 @@ def dimensioned(problem: DimensionProblem, x: Array) -> Mechanism | None:
         for joint, row in zip(design.graph.joints, table)
     ]
     points = {} if problem.fit is None else {"P": (problem.link, s * point_at + t)}
-    return lying(design, world, points, float(problem.sense))
+    return lying(design, world, points, *problem.rates)
 
 
-def lying(design: Design, world: list[World], points: Mapping[str, tuple[int, complex]], rate: float) -> Mechanism:
+def lying(design: Design, world: list[World], points: Mapping[str, tuple[int, complex]], *rates: float) -> Mechanism:
     """Return the mechanism whose joints and named points (link, place) lie at some places at the first input.
 
-    The law of a driver that turns begins at the angle of its links' frames, so that inputs begin at 0.
+    ``rates``: of every driver over the input.  The law of a driver that turns begins at the angle of its links' frames,
+    so that inputs begin at 0.
     """
     own = [own_frame(design, link, world) for link in range(design.graph.links)]
     named: dict[str, TracePoint] = {}
@@ -310,7 +315,7 @@ def lying(design: Design, world: list[World], points: Mapping[str, tuple[int, co
         named[name] = TracePoint(link, (local.real, local.imag))
     drivers = tuple(
         Driver(b, k, Linear(rate, own[k][1] - own[b][1] if design.kinds[j] == "R" else 0.0))
-        for (b, k), j in zip(design.drivers, design.driver_joints)
+        for (b, k), j, rate in zip(design.drivers, design.driver_joints, rates, strict=True)
     )
     pose = tuple((z.real, z.imag, angle) for z, angle in own)
     return Mechanism(design.graph, design.joints(world, own), drivers, named, pose)

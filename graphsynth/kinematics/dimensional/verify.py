@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from graphsynth.kinematics.dimensional.goals import FunctionGoal, Goals, LineGoal, PathGoal, PosesGoal
 from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, matched
 from graphsynth.kinematics.simulation import simulate
-from graphsynth.mechanism.joints import JointGeometry, Prismatic, Revolute
+from graphsynth.mechanism.joints import Cam, JointGeometry, PinSlot, Prismatic, Revolute
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.program import Step
@@ -123,10 +123,11 @@ def smallest_transmission(motion: Motion) -> float:
 
 
 def side_lengths(mechanism: Mechanism, links: Iterable[int] | None = None) -> list[float]:
-    """Distances of revolute joints on one link, of all links or some."""
+    """Distances of revolute joints, pins in slots and rollers on one link, of all links or some."""
     found = []
     for link in range(mechanism.graph.links) if links is None else links:
         own = [j.at_a if j.a == link else j.at_b for j in mechanism.joints if link in j.pair and j.kind == "R"]
+        own += [j.at_b for j in mechanism.joints if j.b == link and isinstance(j, PinSlot | Cam)]
         found += [math.dist(p, q) for p, q in combinations(own, 2)]
     return found
 
@@ -141,7 +142,7 @@ def arm_lengths(mechanism: Mechanism) -> list[float]:
 
 
 def length_ratio(mechanism: Mechanism) -> float:
-    """Longest over shortest distance of two revolute joints on one link; named points count among the long ones."""
+    """Longest over shortest of `side_lengths`; distances of named points count among the long ones."""
     lengths = side_lengths(mechanism)
     if not lengths:
         return 1.0

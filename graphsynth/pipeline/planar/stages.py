@@ -71,10 +71,12 @@ def take(context: Context) -> Iterator[Candidate | FileCandidate]:
     table: PlanarTable = context.scene.mechanism
     if table.files:
         return iter([_read(context, i, name) for i, name in enumerate(table.files)])
+    from graphsynth.kinematics.dimensional.design import check_rule
     from graphsynth.pipeline.steps import generate, mechanisms as listed, solve
 
     try:
         goals_of(table.embody)
+        check_rule(table.embody.pairs)
     except GraphsynthError as error:
         raise (context.scene.place / "mechanism" / "embody").error(f"asks for what cannot be: {error}") from error
     solutions = solve(context)
@@ -100,7 +102,8 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
 
     own = table.embody
     goals = replace(goals_of(own), symmetry=_symmetry(context, design.graph) if own.symmetric else ())
-    found = search(design.graph, goals, context.scene.scene.seed, tries=own.tries, effort=own.effort)
+    seed = context.scene.scene.seed
+    found = search(design.graph, goals, seed, pairs=own.pairs, tries=own.tries, effort=own.effort)
     if not found.accepted or found.mechanism is None or found.figures is None:
         causes = [why.removeprefix("result: ") for why in found.reasons if why.startswith("result: ")]
         error = found.figures.goal_error if found.figures is not None else math.nan
@@ -146,7 +149,7 @@ def goals_of(table: EmbodyTable) -> Goals:
         target = PosesGoal(rows, poses.inputs, poses.link, poses.tolerance)
     if (wanted := table.function) is not None:
         target = FunctionGoal(wanted.inputs, wanted.outputs, wanted.link, wanted.tolerance)
-    return Goals(table.span, table.min_transmission, table.max_length_ratio, target)
+    return Goals(table.span, table.min_transmission, table.max_length_ratio, target, rates=table.rates)
 
 
 def _crank(mechanism: Mechanism) -> float:

@@ -71,6 +71,8 @@ class EmbodyTable:
     tries: Annotated[int, In(least=1, most=10_000)] = 12
     effort: Annotated[float, In(above=0, most=100)] = 1.0
     symmetric: bool = False  # the dimensions keep the symmetry of [structure.generate], where it names one
+    rates: tuple[float, ...] = ()  # of every driver over the input, 1 by default
+    pairs: str = ""  # kind of joints of mobility 2: gear, pin-slot, cam, "gear 2:1", "cam 0.2:0 0:0.05"
     line: LineTable | None = None
     path: PathTable | None = None
     poses: PosesTable | None = None
