@@ -143,7 +143,7 @@ def test_a_set_of_dimensions_is_assembled_where_it_is_drawn() -> None:
 )
 def test_a_roller_keeps_to_a_given_profile(graph: MechanismGraph, kind: str) -> None:
     """By the polar form: the distance from the cam's centre to the roller, over the direction as the cam sees it."""
-    found = embody(graph, pairs=kind, driver=1)
+    found = embody(graph, joints=kind, driver=1)
     assert found.accepted and found.mechanism is not None
     motion = simulate(found.mechanism, np.linspace(0.0, math.tau, 361))
     k = next(i for i, joint in enumerate(found.mechanism.joints) if isinstance(joint, Cam))
@@ -162,7 +162,7 @@ def test_the_size_beside_a_profile_is_searched() -> None:
     """Two searches do not end with the same ratio of the frame to the cam."""
     sizes = set()
     for seed in (0, 1):
-        mechanism = embody(CAM_AND_FOLLOWER, seed=seed, driver=1, pairs="cam 0.2:0").mechanism
+        mechanism = embody(CAM_AND_FOLLOWER, seed=seed, driver=1, joints="cam 0.2:0").mechanism
         assert mechanism is not None
         radius = next(joint.radius for joint in mechanism.joints if isinstance(joint, Cam))
         frame = [joint.at_a for joint in mechanism.joints if joint.a == 0]

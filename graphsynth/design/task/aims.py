@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.design.task.model import Model, Moved, Rows, Unknowns
-from graphsynth.design.task.targets import DwellTarget, FunctionTarget, PathTarget, PosesTarget, SwingTarget
+from graphsynth.design.task.targets import DwellTarget, FunctionTarget, LinkTarget, PathTarget, PosesTarget, SwingTarget
 from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, followed, matched
 
 Array = NDArray[np.float64]
@@ -196,42 +196,60 @@ def beside(z: Complex, corners: Complex) -> Complex:
 
 
 class Measure:
-    """What a link on the frame does: its angle, or of a slider its place along its guide."""
+    """What a link does at its joint with the frame or another link: its angle, or its place along the guide there."""
 
-    def __init__(self, model: Model, name: str) -> None:
-        design, self.link = model.plan.design, model.carrier(name)
-        frame = design.graph.frame
-        at_frame = [k for k, (a, b, _) in enumerate(design.graph.joints) if {a, b} == {frame, self.link}]
-        self.guide = model.angle_at(at_frame[0]) if at_frame and design.kinds[at_frame[0]] == "P" else -1
+    def __init__(self, model: Model, target: LinkTarget) -> None:
+        design, self.link = model.plan.design, model.carrier(target.link)
+        assert design.graph.frame is not None
+        self.base = model.carrier(target.base) if target.base else design.graph.frame
+        self.frame = design.graph.frame
+        joints = [k for k, (a, b, _) in enumerate(design.graph.joints) if {a, b} == {self.base, self.link}]
+        self.joint = joints[0] if joints else -1
+        self.guide = model.angle_at(joints[0]) if joints and design.kinds[joints[0]] == "P" else -1
         self.model = model
 
-    def along(self, u: Unknowns) -> Complex:
-        """Direction of the guide (sets, 1)."""
+    def _slid(self, frames: Array, u: Unknowns) -> tuple[Complex, Complex, Complex, Complex]:
+        """Direction of the guide, way along it, arms of the link's and of the base's point, all (sets, n)."""
         number = self.model.angles[self.guide - 2 * len(self.model.free)]
-        return np.asarray(np.exp(1j * u.numbers[:, number : number + 1]))
+        own, at = frames.view(np.complex128), (u.places[:, self.joint] @ [1.0, 1.0j])[:, None]
+        arm, foot = own[:, :, self.link, 1] * at, own[:, :, self.base, 1] * at
+        along = own[:, :, self.base, 1] * np.exp(1j * u.numbers[:, number : number + 1])
+        return along, own[:, :, self.link, 0] + arm - own[:, :, self.base, 0] - foot, arm, foot
 
     def values(self, frames: Array, u: Unknowns) -> Array:
         """Values (sets, n): angles in (-pi, pi]."""
-        own = frames[:, :, self.link]
+        frames = np.ascontiguousarray(frames)
         if self.guide < 0:
-            return np.arctan2(own[..., 3], own[..., 2])
-        return np.asarray((np.conj(self.along(u)) * (own[..., 0] + 1j * own[..., 1])).real)
+            own = frames.view(np.complex128)
+            return np.asarray(np.angle(own[:, :, self.link, 1] * np.conj(own[:, :, self.base, 1])))
+        along, way, _, _ = self._slid(frames, u)
+        return np.asarray((np.conj(along) * way).real)
 
-    def rates(self, rates: Array, u: Unknowns) -> Array:
+    def rates(self, frames: Array, rates: Array, u: Unknowns) -> Array:
         """Return derivatives by the input (sets, n)."""
-        own = rates[:, :, self.link]
+        own, base = rates[:, :, self.link], rates[:, :, self.base]
         if self.guide < 0:
-            return np.asarray(own[..., 2])
-        return np.asarray((np.conj(self.along(u)) * (own[..., 0] + 1j * own[..., 1])).real)
+            return np.asarray(own[..., 2] - base[..., 2])
+        along, way, arm, foot = self._slid(np.ascontiguousarray(frames), u)
+        v = (own[..., 0] + 1j * own[..., 1]) - (base[..., 0] + 1j * base[..., 1])
+        v += 1j * (own[..., 2] * arm - base[..., 2] * foot)
+        return np.asarray((np.conj(along) * v).real + base[..., 2] * (np.conj(along) * way).imag)
 
     def put(self, loads: Array, direct: Array, frames: Array, u: Unknowns) -> None:
         """Write the derivatives of the values into the first row of loads and direct derivatives."""
         if self.guide < 0:
             loads[:, 0, self.link, 2] = 1.0
+            if self.base != self.frame:
+                loads[:, 0, self.base, 2] = -1.0
             return
-        own, along = frames[:, :, self.link], self.along(u)
-        loads[:, 0, self.link, 0], loads[:, 0, self.link, 1] = along.real, along.imag
-        direct[:, 0, :, self.guide] = (np.conj(along) * (own[..., 0] + 1j * own[..., 1])).imag
+        along, way, arm, foot = self._slid(np.ascontiguousarray(frames), u)
+        turned = (np.conj(along) * way).imag
+        moments = (np.conj(along) * 1j * arm).real, (np.conj(along) * 1j * foot).real - turned
+        for link, sign, moment in ((self.link, 1.0, moments[0]), (self.base, -1.0, moments[1])):
+            if link != self.frame:
+                loads[:, 0, link, 0], loads[:, 0, link, 1] = sign * along.real, sign * along.imag
+                loads[:, 0, link, 2] = sign * moment
+        direct[:, 0, :, self.guide] = turned
 
     def wrapped(self, values: Array) -> Array:
         """Differences of angles in (-pi, pi], of places as they are."""
@@ -248,7 +266,7 @@ class FunctionAim(TimedAim):
             inputs = tuple(((target.start or 0.0) + np.linspace(0.0, target.span, _STILL)).tolist())
             outputs, own_start = np.zeros(_STILL), target.start is None
         super().__init__(model, at, target.weight / target.tolerance / math.sqrt(len(outputs)), inputs, own_start)
-        self.outputs, self.measure = outputs, Measure(model, target.link)
+        self.outputs, self.measure = outputs, Measure(model, target)
         self.unknowns += 1
 
     def begin(self, times: Array, moved: Moved, u: Unknowns, random: np.random.Generator) -> Array:
@@ -289,13 +307,13 @@ class SwingAim(Aim):
 
     def __init__(self, model: Model, at: int, target: SwingTarget) -> None:
         super().__init__(model, at, target.weight / target.tolerance)
-        self.target, self.measure = target, Measure(model, target.link)
+        self.target, self.measure = target, Measure(model, target)
 
     def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
         """Return inputs of the largest and the smallest value (sets, 2)."""
         values = self.measure.values(moved.frames, u)
         values = values if self.measure.guide >= 0 else np.unwrap(values, axis=1)
-        rates = self.measure.rates(moved.rates, u)
+        rates = self.measure.rates(moved.frames, moved.rates, u)
         return np.stack([extreme(moved, values, rates, 1.0), extreme(moved, values, rates, -1.0)], axis=1)
 
     def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
@@ -340,7 +358,7 @@ class RatioAim(Aim):
 
     def __init__(self, model: Model, at: int, target: SwingTarget) -> None:
         super().__init__(model, at, target.weight / target.tolerance)
-        self.measure = Measure(model, target.link)
+        self.measure = Measure(model, target)
         ratio = target.time_ratio or 1.0
         self.slow = math.tau * ratio / (1.0 + ratio)
 
@@ -351,12 +369,10 @@ class RatioAim(Aim):
 
     def begin(self, times: Array, moved: Moved, u: Unknowns, random: np.random.Generator) -> Array:
         """Begin at a dead centre, the largest or the smallest value."""
-        own = moved.link(self.measure.link)
-        theta = np.unwrap(np.arctan2(own.frames[..., 3], own.frames[..., 2]), axis=1)
-        if self.measure.guide >= 0:
-            theta = np.abs(own.frames[..., 0] + 1j * own.frames[..., 1])
-        up = random.choice([-1.0, 1.0], (len(theta), 1))
-        return np.asarray(own.u[(up * theta).argmax(axis=1)][:, None])
+        values = self.measure.values(moved.frames, u)
+        values = values if self.measure.guide >= 0 else np.unwrap(values, axis=1)
+        up = random.choice([-1.0, 1.0], (len(values), 1))
+        return np.asarray(moved.inputs[(up * values).argmax(axis=1)][:, None])
 
     def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
         """Both speeds by differences, so that their derivatives are those of the poses."""

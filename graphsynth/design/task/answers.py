@@ -18,7 +18,15 @@ from graphsynth.design.task.aims import TimedAim, beside, extreme
 from graphsynth.design.task.model import Moved
 from graphsynth.design.task.plans import Plan
 from graphsynth.design.task.problem import TaskProblem
-from graphsynth.design.task.targets import DwellTarget, FunctionTarget, PathTarget, PosesTarget, SwingTarget, Target
+from graphsynth.design.task.targets import (
+    DwellTarget,
+    FunctionTarget,
+    LinkTarget,
+    PathTarget,
+    PosesTarget,
+    SwingTarget,
+    Target,
+)
 from graphsynth.design.task.task import DesignTask
 from graphsynth.jamming.questions import largest_scale
 from graphsynth.kinematics.dimensional.design import World
@@ -34,6 +42,7 @@ from graphsynth.kinematics.dimensional.verify import (
     smallest_transmission,
 )
 from graphsynth.kinematics.simulation import simulate
+from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.mechanism.scaling import rounded
@@ -332,7 +341,7 @@ def _errors(
         own = own or (isinstance(target, DwellTarget) and target.start is None)
         start = next(left) if own else 0.0
         if isinstance(target, SwingTarget):
-            found.append(_swing_error(task, target, motion, carriers[target.link]))
+            found.append(_swing_error(task, target, motion, *pair_of(target, motion.mechanism, carriers)))
         elif isinstance(target, PathTarget | PosesTarget):
             found.append(_point_error(task, target, motion, carriers[target.point], start))
         else:
@@ -372,18 +381,28 @@ def _point_error(task: DesignTask, target: PathTarget | PosesTarget, motion: Mot
     return max(far, float(np.abs(np.angle(rest * np.conj(rest.sum()))).max()))
 
 
-def _output(motion: Motion, link: int) -> tuple[Array, Array]:
-    """Return what a link does over the motion, and its rate: an angle, or of a slider the place along its guide."""
-    mechanism = motion.mechanism
-    joint = next((j for j in mechanism.joints if {*j.pair} == {mechanism.frame, link}), None)
-    if joint is None or joint.kind != "P":
-        return np.unwrap(motion.poses[:, link, 2]), motion.velocities[:, link, 2]
-    way = np.ptp(motion.poses[:, link, :2], axis=0)
-    z = motion.poses[:, link, :2] @ [1.0, 1.0j]
-    far = z - z[0]
-    k = int(np.abs(far).argmax())
-    along = np.conj(far[k]) / max(abs(far[k]), 1e-300) if way.any() else 1.0
-    return (along * z).real, (along * (motion.velocities[:, link, :2] @ [1.0, 1.0j])).real
+def output(motion: Motion, link: int, base: int) -> tuple[Array, Array]:
+    """Return what a link does against another over a motion, and its rate: an angle, or a place along their guide."""
+    joint = _guide(motion.mechanism, link, base)
+    turned, spin = (own[:, link, 2] - own[:, base, 2] for own in (motion.poses, motion.velocities))
+    if joint is None:
+        return np.unwrap(turned), spin
+    a, b = (motion.point(n, at) for n, at in ((joint.a, joint.at_a), (joint.b, joint.at_b)))
+    along = np.exp(1j * (motion.poses[:, joint.a, 2] + joint.angle_a)) * (1.0 if link == joint.b else -1.0)
+    way, speed = ((q - p) @ [1.0, 1.0j] for p, q in ((a.position, b.position), (a.velocity, b.velocity)))
+    seen = np.conj(along) * way
+    return seen.real, (np.conj(along) * speed).real + motion.velocities[:, joint.a, 2] * seen.imag
+
+
+def _guide(mechanism: Mechanism, link: int, base: int) -> Prismatic | None:
+    """Return the prismatic joint of two links, if there is one."""
+    own = (j for j in mechanism.joints if {*j.pair} == {link, base} and isinstance(j, Prismatic))
+    return next(own, None)
+
+
+def pair_of(target: LinkTarget, mechanism: Mechanism, carriers: Mapping[str, int]) -> tuple[int, int]:
+    """Return the link of a target and that against which it moves."""
+    return carriers[target.link], carriers[target.base] if target.base else mechanism.frame
 
 
 def _angle_error(task: DesignTask, target: Target, motion: Motion, carriers: Mapping[str, int], start: float) -> float:
@@ -391,7 +410,8 @@ def _angle_error(task: DesignTask, target: Target, motion: Motion, carriers: Map
     from scipy.interpolate import CubicHermiteSpline
 
     assert isinstance(target, FunctionTarget | DwellTarget)
-    values, rates = _output(motion, carriers[target.link])
+    link, base = pair_of(target, motion.mechanism, carriers)
+    values, rates = output(motion, link, base)
     spline = CubicHermiteSpline(motion.inputs, values, rates)
     whole = values[-1] - values[0]  # of a link that turns with the driver
     if isinstance(target, DwellTarget):
@@ -404,21 +424,15 @@ def _angle_error(task: DesignTask, target: Target, motion: Motion, carriers: Map
     every = spline(rest) + turns * whole
     return min(
         float(0.5 * np.ptp(every - sign * wanted))
-        for sign in ((1.0, -1.0) if _slides(motion, carriers, target) else (1.0,))
+        for sign in ((1.0, -1.0) if _guide(motion.mechanism, link, base) else (1.0,))
     )
 
 
-def _slides(motion: Motion, carriers: Mapping[str, int], target: FunctionTarget | DwellTarget) -> bool:
-    mechanism = motion.mechanism
-    pair = {mechanism.frame, carriers[target.link]}
-    return any({*joint.pair} == pair and joint.kind == "P" for joint in mechanism.joints)
-
-
-def _swing_error(task: DesignTask, target: SwingTarget, motion: Motion, link: int) -> float:
+def _swing_error(task: DesignTask, target: SwingTarget, motion: Motion, link: int, base: int) -> float:
     """Return what the stroke lacks or has too much, and how far the slow stroke is from its time (input)."""
     from scipy.interpolate import CubicHermiteSpline
 
-    values, rates = _output(motion, link)
+    values, rates = output(motion, link, base)
     ends = [_extreme(task, motion.inputs, values, rates, sign) for sign in (1.0, -1.0)]
     high, low = CubicHermiteSpline(motion.inputs, values, rates)(ends)
     swing = float(high - low)

@@ -34,8 +34,8 @@ def solutions(task: DesignTask, seconds: float) -> Iterator[Mechanism]:
     6
     """
     target = task.targets[0]
-    if len(task.targets) > 1 or 4 not in task.links or task.drive != "rotation":  # of a four-bar
-        return
+    if len(task.targets) > 1 or 4 not in task.links or task.drive != "rotation" or getattr(target, "base", False):
+        return  # not of a four-bar whose output is on the frame
     try:
         found = _found(task, target, seconds)
     except GeometryError:  # special points: the search has to do without

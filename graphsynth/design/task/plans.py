@@ -134,7 +134,10 @@ def _kinds(task: DesignTask, graph: MechanismGraph, driver: tuple[int, int]) -> 
 
 
 def _carriers(task: DesignTask, design: Design) -> Iterator[tuple[int, ...]]:
-    """Yield a link for each name: of points no link that turns about a pivot, of outputs one that does."""
+    """Yield a link for each name: of points no link that turns about a pivot, of outputs one that does.
+
+    Outputs against another link have a joint with it that is not driven.
+    """
     graph, frame = design.graph, design.graph.frame
     assert frame is not None
     near = {link for link in range(graph.links) if graph.neighbours[frame] >> link & 1}
@@ -146,7 +149,20 @@ def _carriers(task: DesignTask, design: Design) -> Iterator[tuple[int, ...]]:
     outputs = {
         slides: [link for link in sorted(near - driven) if (link in guided) == slides] for slides in (True, False)
     }
-    yield from product(*(free if of_point else outputs[name in task.sliding] for name, of_point in task.names.items()))
+    own = [target for target in task.targets if isinstance(target, LinkTarget)]
+    on_frame = {target.link for target in own if not target.base}
+    moving = [link for link in range(graph.links) if link != frame]
+    every = [
+        free if of_point else outputs[name in task.sliding] if name in on_frame else moving
+        for name, of_point in task.names.items()
+    ]
+    kinds = {frozenset(pair[:2]): kind for pair, kind in zip(graph.joints, design.kinds, strict=True)}
+    kinds.pop(frozenset(design.drivers[0]))
+    for carriers in product(*every):
+        links = dict(zip(task.names, carriers, strict=True))
+        pairs = [(frozenset((links[t.link], links[t.base])), t.slides) for t in own if t.base]
+        if all(kinds.get(pair) == ("P" if slides else "R") for pair, slides in pairs):
+            yield carriers
 
 
 def _given(task: DesignTask, design: Design, carriers: tuple[int, ...]) -> Iterator[tuple[tuple[int, Place], ...]]:

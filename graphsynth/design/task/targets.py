@@ -28,6 +28,8 @@ Inputs = Kept[Sequence[float | str] | None, tuple[float, ...] | None]
 Tolerance = Kept[float | str, float]
 #: Points of a curve that is given as a whole: a segment, an arc, a drawing.
 _COUNT = 48
+#: Part of its range by which a function may differ at both ends and yet has the same value there.
+_SAME = 1e-9
 #: Most points, poses or values of a target.
 MOST = 400
 
@@ -296,14 +298,17 @@ class PosesTarget(TimedTarget):
 
 @dataclass(frozen=True, kw_only=True)
 class LinkTarget(Target):
-    """A target of a link that is jointed to the frame: see `FunctionTarget`."""
+    """A target of a link that is jointed to the frame, or to another named link: see `FunctionTarget`."""
 
     link: str = "output"
+    base: str = ""
     slides: bool = False
     pivot: Place | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.base and (self.base == self.link or self.pivot is not None):
+            raise GeometryError(f"link {self.link!r} moves against {self.base!r}: name two links, and leave pivot out")
         if self.pivot is not None and self.slides:
             raise GeometryError(f"link {self.link!r} slides and has no pivot; leave slides or pivot out")
         if self.pivot is not None:
@@ -320,8 +325,10 @@ class FunctionTarget(LinkTarget, TimedTarget):
         At the inputs, which must be given: radians or texts such as "30 deg"; lengths of a slider.
     link : str
         Name of the output link, which is jointed to the frame.
+    base : str
+        Name of the link to which it is jointed instead: then the outputs are those of this joint.
     slides : bool
-        It slides on the frame: outputs and tolerance are lengths.
+        It slides there: outputs and tolerance are lengths.
     pivot : (x, y) or (x0, y0, x1, y1), optional
         Where its joint on the frame is: a place, or a region.
     """
@@ -354,19 +361,21 @@ class FunctionTarget(LinkTarget, TimedTarget):
     ) -> Self:
         """Return a function y(x) between two x, drawn out over ranges of input and output.
 
-        `GeometryError` for a function that is not finite there, or the same at both ends.
+        The output goes through its range from the first to the last y; if these are the same, as of a period, between
+        the least and the largest.  `GeometryError` for a function that is not finite there, or constant.
 
         >>> FunctionTarget.of(np.log10, (1, 2), input_range="60 deg", output_range="90 deg", count=3).inputs[1]
         0.5235987755982988
         """
         first, last = (finite(f"between[{k}]", value) for k, value in enumerate(between))
         y = np.asarray(function(np.linspace(first, last, whole("count", count, 3, MOST))))
-        if not np.isfinite(y).all() or y[0] == y[-1]:
-            raise GeometryError(f"the function must be finite and differ at both ends of {between}; choose others")
+        if not np.isfinite(y).all() or not np.ptp(y) > 0.0:
+            raise GeometryError(f"the function must be finite and not constant in {between}; choose other ends")
+        whole_range = y[-1] - y[0] if abs(y[-1] - y[0]) > _SAME * np.ptp(y) else np.ptp(y)
         span, reach = angle("input_range", input_range), angle("output_range", output_range)
         return cls(
             inputs=np.linspace(0.0, span, len(y)).tolist(),
-            outputs=(reach * (y - y[0]) / (y[-1] - y[0])).tolist(),
+            outputs=(reach * (y - y[0]) / whole_range).tolist(),
             **more,
         )
 
@@ -381,7 +390,7 @@ class DwellTarget(LinkTarget):
         How long: of the input.
     start : float or str, optional
         From where on; free by default.
-    link, slides, pivot
+    link, base, slides, pivot
         As of a function.
     """
 
@@ -417,7 +426,7 @@ class SwingTarget(LinkTarget):
         Limits of the stroke: radians or texts such as "30 deg", lengths of a slider.
     time_ratio : float, optional
         Time of the slow stroke over that of the quick one, at a constant speed of the driver (full rotation).
-    link, slides, pivot
+    link, base, slides, pivot
         As of a function.
     """
 

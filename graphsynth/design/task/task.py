@@ -13,7 +13,7 @@ from graphsynth.core.checks import choice, finite, positive, whole
 from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import Shown
 from graphsynth.design.task.places import Box, Place, Point, box, limits, place
-from graphsynth.design.task.targets import PathTarget, PosesTarget, SwingTarget, Target
+from graphsynth.design.task.targets import LinkTarget, PathTarget, PosesTarget, SwingTarget, Target
 
 Drive = Literal["rotation", "rocking", "cylinder", "slide"]
 #: How the driven link turns: counter-clockwise is positive.
@@ -180,11 +180,10 @@ class DesignTask(Shown):
             finite(f"rank[{name!r}]", value)
         put(self, "rank", {**RANKED, **self.rank})
         for name in self.sliding:
-            if not all(
-                getattr(t, "slides", False) for t in targets if name == getattr(t, "link", getattr(t, "point", ""))
-            ):
+            own = [t for t in targets if name in (getattr(t, "link", ""), getattr(t, "point", ""))]
+            if not all(getattr(t, "slides", False) for t in own if not getattr(t, "base", "")):
                 raise GeometryError(f"link {name!r} slides for one target and turns for another; name two links")
-        if self.sliding and not self.sliders:
+        if any(getattr(target, "slides", False) for target in targets) and not self.sliders:
             raise GeometryError("a link slides, but sliders = 0; allow one or more")
         for target in targets:
             last = (getattr(target, "inputs", None) or (0.0,))[-1]
@@ -252,12 +251,14 @@ class DesignTask(Shown):
         for target in self.targets:
             name = str(getattr(target, "point", "") or getattr(target, "link", ""))
             found[name] = found.get(name, False) or hasattr(target, "point")
+            if base := str(getattr(target, "base", "")):
+                found.setdefault(base, False)
         return found
 
     @property
     def sliding(self) -> set[str]:
         """Names of the links that slide on the frame."""
-        return {str(getattr(target, "link", "")) for target in self.targets if getattr(target, "slides", False)}
+        return {own.link for own in self.targets if isinstance(own, LinkTarget) and own.slides and not own.base}
 
     def _told(self) -> tuple[str, list[tuple[str, str]]]:
         rows = [(type(t).__name__, f"tolerance {t.tolerance:g}, weight {t.weight:g}") for t in self.targets]

@@ -268,8 +268,7 @@ def embody(
     seed: int = 0,
     *,
     driver: Drivers | None = None,
-    joints: Mapping[tuple[int, int], str] | None = None,
-    pairs: str = "",
+    joints: Mapping[tuple[int, int], str] | str | None = None,
     tries: int = 12,
     seconds: float = math.inf,
     effort: float = 1.0,
@@ -287,12 +286,11 @@ def embody(
         Same labelled graph, goals and seed, same result (unless ``seconds`` cuts the search short).
     driver : int or (base, link), or one of these for each driver, optional
         A link on the frame, or two jointed links.
-    joints : mapping of (a, b) to str, optional
+    joints : mapping of (a, b) to str, or str, optional
         Kind by pair of links of the graph given: "R" (default) or "P"; "gear", "pin-slot" or "cam" for mobility 2, by
         default a gear where a third link carries both wheels, else a pin in a slot.  Teeth as in "gear 2:1"; a profile
-        as in "cam 0.2:0 0:0.05", cosines and sines of 1, 2, ... times the polar angle over the mean radius.
-    pairs : str, optional
-        Kind of all joints of mobility 2 that ``joints`` does not name, instead of the default; gears where they can be.
+        as in "cam 0.2:0 0:0.05", cosines and sines of 1, 2, ... times the polar angle over the mean radius.  A text
+        alone is the kind of all joints of mobility 2, of gears where they can be.
     tries : int
         Searches at most; each takes the next frame and driver of the order of
         :func:`graphsynth.kinematics.dimensional.design.choices`, and starts anew from another sketch.
@@ -335,7 +333,7 @@ def embody(
     run = _Run(wanted, seed, begin, seconds, effort)
     for attempt in range(tries):
         inversion, drivers = order[attempt % len(order)]
-        kinds = _kinds(graph, inversion, joints, pairs)
+        kinds = _kinds(graph, inversion, joints)
         run.start(Design(inversion, drivers, kinds, wanted.symmetry), attempt, attempt // len(order))
         if run.ended:
             break
@@ -457,15 +455,16 @@ class _Run:
 
 
 def _kinds(
-    graph: MechanismGraph, inversion: MechanismGraph, joints: Mapping[tuple[int, int], str] | None, pairs: str
+    graph: MechanismGraph, inversion: MechanismGraph, joints: Mapping[tuple[int, int], str] | str | None
 ) -> tuple[str, ...]:
     """Kinds of the joints of an inversion, from those of the graph given."""
+    rule, joints = (joints, None) if isinstance(joints, str) else ("", joints)
     if joints is not None and not isinstance(joints, Mapping):
         raise GeometryError(f"joints = {joints!r} is not a mapping of (a, b) to a kind, as in {{(0, 1): 'P'}}")
     given = {pair: str(kind) for pair, kind in (joints or {}).items()}
-    kinds = joint_kinds(graph, given, pairs)
+    kinds = joint_kinds(graph, given, rule)
     if inversion.frame == graph.frame:
         return kinds
     link = next(link for link in range(graph.links) if graph.with_frame(link) == inversion)
     new = {old: k for k, old in enumerate([link, *(k for k in range(graph.links) if k != link)])}
-    return joint_kinds(inversion, {(new[a], new[b]): kind for (a, b), kind in given.items()}, pairs)
+    return joint_kinds(inversion, {(new[a], new[b]): kind for (a, b), kind in given.items()}, rule)

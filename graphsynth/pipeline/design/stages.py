@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.design.task.targets import FunctionTarget, PathTarget, PosesTarget, SwingTarget, Target
+from graphsynth.design.task.targets import FunctionTarget, LinkTarget, PathTarget, PosesTarget, SwingTarget, Target
 from graphsynth.pipeline.display import table
 from graphsynth.pipeline.products import Columns, Finding, Picture, Quantity, Record, Table, exact
 from graphsynth.pipeline.stages import Context
@@ -260,7 +260,7 @@ def curves(context: Context, designs: Designs) -> tuple[Picture, ...]:
         for k, answer in enumerate(designs.answers[:_CURVES]):
             if point:
                 x, y = answer.motion.point(point).position.T
-            else:
+            elif isinstance(target, LinkTarget):
                 x, y = unit * answer.motion.inputs, _output(designs, answer, target)
                 y = y - (y.min() if isinstance(target, SwingTarget) else y[0])
             lines.append(Line(x, y, f"place {k + 1}", "acd"[k]))
@@ -274,14 +274,15 @@ def curves(context: Context, designs: Designs) -> tuple[Picture, ...]:
     return tuple(found) if designs.answers else ()
 
 
-def _output(designs: Designs, answer: DesignedMechanism, target: Target) -> NDArray[np.float64]:
-    """Angle of the link of a target in degrees, or the way of a slider from where it begins."""
-    poses = answer.motion.poses[:, answer.carriers[str(getattr(target, "link", ""))]]
-    if not getattr(target, "slides", False):
-        return np.degrees(np.unwrap(poses[:, 2]))
-    way = poses[:, :2] - poses[0, :2]
-    far = way[np.hypot(*way.T).argmax()]
-    return np.asarray(way @ far / max(math.hypot(*far), 1e-300))
+def _output(designs: Designs, answer: DesignedMechanism, target: LinkTarget) -> NDArray[np.float64]:
+    """Angle of the link of a target in degrees, or the way of a slider."""
+    from graphsynth.design.task.answers import output, pair_of
+
+    values, _ = output(answer.motion, *pair_of(target, answer.mechanism, answer.carriers))
+    if not target.slides:
+        return np.degrees(values)
+    way = values - values[0]
+    return np.asarray(way * np.sign(way[np.abs(way).argmax()] or 1.0))
 
 
 def _wanted(target: Target, unit: float, span: float) -> Iterator[Line]:

@@ -109,7 +109,10 @@ class PosesTable:
 
 @dataclass(frozen=True, slots=True)
 class FunctionTable:
-    """The angle of a link on the frame is a function of the input: a table, or a formula of x between two x."""
+    """The angle of a link on the frame is a function of the input: a table, or a formula of x between two x.
+
+    ``base``: name of the link to which it is jointed instead of the frame.
+    """
 
     inputs: tuple[float, ...] = ()
     outputs: Annotated[tuple[float, ...], In("deg")] = ()
@@ -121,6 +124,7 @@ class FunctionTable:
     place_range: float = 1.0
     own_start: bool = False
     link: str = "output"
+    base: str = ""
     pivot: Place = ()
     within: Annotated[float | None, In(above=0)] = None
     tolerance: Deg = 0.5 * DEGREE
@@ -153,6 +157,7 @@ class DwellTable:
     span: float
     start: float | None = None
     link: str = "output"
+    base: str = ""
     pivot: Place = ()
     within: Annotated[float | None, In(above=0)] = None
     tolerance: Deg = 0.5 * DEGREE
@@ -175,6 +180,7 @@ class SwingTable:
     stroke: tuple[float, float] | None = None
     time_ratio: Annotated[float | None, In(least=1, most=20)] = None
     link: str = "output"
+    base: str = ""
     pivot: Place = ()
     within: Annotated[float | None, In(above=0)] = None
     tolerance: Deg = 0.5 * DEGREE
@@ -199,7 +205,7 @@ def _of_link(table: FunctionTable | DwellTable | SwingTable) -> dict[str, Any]:
     slides = table.within is not None
     tolerance = table.within if slides else table.tolerance
     more = {"pivot": table.pivot or None, "tolerance": tolerance, "weight": table.weight}
-    return {"link": table.link, "slides": slides, **more}
+    return {"link": table.link, "base": table.base, "slides": slides, **more}
 
 
 @dataclass(frozen=True, slots=True)

@@ -103,7 +103,7 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
     own = table.embody
     goals = replace(goals_of(own), symmetry=_symmetry(context, design.graph) if own.symmetric else ())
     seed = context.scene.scene.seed
-    found = search(design.graph, goals, seed, pairs=own.pairs, tries=own.tries, effort=own.effort)
+    found = search(design.graph, goals, seed, joints=own.pairs, tries=own.tries, effort=own.effort)
     if not found.accepted or found.mechanism is None or found.figures is None:
         causes = [why.removeprefix("result: ") for why in found.reasons if why.startswith("result: ")]
         error = found.figures.goal_error if found.figures is not None else math.nan
