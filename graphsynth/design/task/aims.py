@@ -24,8 +24,11 @@ _OFFSETS, _DIFFERENCE = (
     np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]),
     np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0,
 )
-#: Samples all over a curve that shall draw a closed path, and half the width of the band that holds it, over a side.
-_WHOLE, BAND = 48, 0.2
+#: Samples all over a curve that shall draw a closed path.
+_WHOLE = 48
+#: Half the width of the band that holds it, over a side: at most, and for each radian by which the polygon turns at an
+#: end, twice the sagitta of an arc; what turns more than this is a corner of the curve.
+_BAND, _SAGITTA, _SHARP = 0.2, 0.25, 1.2
 #: Steps of the times of a path after each step of its mechanism.
 _ROUNDS = 2
 
@@ -180,16 +183,27 @@ class PointAim(TimedAim):
         return Rows(times, np.stack(values, axis=1), loads, direct, self.weight, free, start=self.start)
 
 
-def beside(z: Complex, corners: Complex) -> Complex:
-    """Return points (any shape) themselves within a band about a closed polygon, else the nearest ones of the band.
+def bands(corners: Complex) -> Array:
+    """Return half the widths of the bands about the sides of a closed polygon in which a smooth curve through them lies.
 
-    The band is wider than the sagitta of a smooth curve through the corners.
+    Where the polygon goes straight on, or has a sharp corner, so does the curve.
+
+    >>> (bands(np.exp(0.1j * math.pi * np.arange(20))) / abs(np.exp(0.1j * math.pi) - 1)).round(3)[:2].tolist()
+    [0.079, 0.079]
     """
+    side = np.roll(corners, -1) - corners
+    turn = np.abs(np.angle(side * np.conj(np.roll(side, 1))))
+    turn[turn > _SHARP] = 0.0
+    return np.abs(side) * np.minimum(_BAND, _SAGITTA * np.maximum(turn, np.roll(turn, -1)))
+
+
+def beside(z: Complex, corners: Complex) -> Complex:
+    """Return points (any shape) themselves within the bands about a closed polygon, else the nearest ones there."""
     side = np.roll(corners, -1) - corners
     part = (np.conj(side) * (z[..., None] - corners)).real / np.maximum(np.abs(side) ** 2, 1e-300)
     on = corners + np.clip(part, 0.0, 1.0) * side
     away = np.maximum(np.abs(z[..., None] - on), 1e-300)
-    over = np.maximum(away - BAND * np.abs(side), 0.0)
+    over = np.maximum(away - bands(corners), 0.0)
     k = over.argmin(axis=-1)[..., None]
     way = (z[..., None] - on) * over / away
     return np.asarray(z - np.take_along_axis(way, k, axis=-1)[..., 0])

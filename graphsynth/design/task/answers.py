@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 #: What is said of targets, not of bounds.
 _MISSED = " is missed"
 #: Relative difference of a length from that of a given bar.
@@ -365,20 +366,28 @@ def _point_error(task: DesignTask, target: PathTarget | PosesTarget, motion: Mot
     """Largest distance over the size; of poses also the largest angle, from the line that suits best."""
     own = _seen(task, motion, link, target.point)
     turn = target.turn if isinstance(target, PosesTarget) else None
+    if isinstance(target, PathTarget) and target.outline:  # passed by, and the curve is nowhere else
+        z = own.frames[0, :, 0] + 1j * own.frames[0, :, 1]
+        return max(_passed(z, target.goal), float(np.abs(z - beside(z, target.goal)).max())) / target.size
     if target.inputs is not None:
         times = np.array(target.inputs)[None] + start
     else:
-        closed = isinstance(target, PathTarget) and target.closed
-        times = matched(own, Wanted(target.goal, turn, target.size, closed, free=False))
+        times = matched(own, Wanted(target.goal, turn, target.size, False, free=False))
     at = at_times(own, times)[0][0]
     far = float(np.abs(at[:, 0] + 1j * at[:, 1] - target.goal).max()) / target.size
-    if isinstance(target, PathTarget) and target.outline:  # nor may the curve be elsewhere
-        z = own.frames[0, :, 0] + 1j * own.frames[0, :, 1]
-        far = max(far, float(np.abs(z - beside(z, target.goal)).max()) / target.size)
     if turn is None:
         return far
     rest = (at[:, 2] + 1j * at[:, 3]) * np.exp(-1j * turn)
     return max(far, float(np.abs(np.angle(rest * np.conj(rest.sum()))).max()))
+
+
+def _passed(z: Complex, corners: Complex) -> float:
+    """Largest distance of corners of a closed polygon from a curve where it runs the same way as a side there."""
+    side, ways = np.diff(z), np.roll(corners, -1) - corners
+    part = np.clip((np.conj(side) * (corners[:, None] - z[:-1])).real / np.maximum(np.abs(side) ** 2, 1e-300), 0.0, 1.0)
+    along = [(np.conj(side) * own[:, None]).real for own in (ways, np.roll(ways, 1))]
+    far = np.abs(corners[:, None] - z[:-1] - part * side)
+    return float(np.where(np.maximum(*along) > 0.0, far, np.inf).min(axis=1).max())
 
 
 def output(motion: Motion, link: int, base: int) -> tuple[Array, Array]:

@@ -12,15 +12,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.design.task.aims import BAND, PointAim
+from graphsynth.design.task.aims import PointAim, bands
 from graphsynth.design.task.model import Model, Moved, Picks, Rows, Unknowns
 from graphsynth.design.task.targets import PathTarget
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Whole = NDArray[np.intp]
-#: Points of equal distance along the curve and along the outline; chords between two samples of the motion.
-_ALONG, _CHORDS = 128, 4
+#: Points of about equal distance along the outline, besides its corners, and along the curve, besides the samples of its
+#: motion, which are dense where it turns back; chords between two samples.
+_ALONG, _EQUAL, _CHORDS = 128, 96, 4
 #: Points by which a curve is placed.
 _PLACED = 24
 #: Steps to the nearest points of a curve.
@@ -55,29 +56,30 @@ class ContourAim(PointAim):
     """A named point draws a closed outline, however fast; looked at at all samples of the motion.
 
     ``turned``: distance, over the size, that counts like an angle of a radian between directions when nearest points
-    are looked for.  Points of the curve shall lie on the polygon, until all do but for its sagitta; given points always
-    on the curve.
+    are looked for.  Points of the curve shall lie on the polygon but for its sagitta, given points on the curve.
     """
 
     def __init__(self, model: Model, target: PathTarget, turned: float) -> None:
         super().__init__(model, 0, target, _PLACED)
         self.turned = turned * self.size
-        z = np.append(target.goal, target.goal[0])
-        sides = np.abs(np.diff(z))
-        length = np.concatenate([[0.0], np.cumsum(sides)])
-        along = np.arange(_ALONG) / _ALONG * length[-1]
-        self.outline, self.given = Polygon.of(np.interp(along, length, z)[None]), Polygon.of(target.goal[None])
-        self.band = BAND * sides[np.searchsorted(length, along, side="right") - 1] / self.size
-        self.weight = target.weight / target.tolerance / math.sqrt(2.0 * _ALONG)
-        self.heavy = math.sqrt(_ALONG / len(target.goal))
+        side = np.roll(target.goal, -1) - target.goal
+        parts = np.ceil(_ALONG * np.abs(side) / np.abs(side).sum()).astype(np.intp).clip(1)
+        k = np.repeat(np.arange(len(side)), parts)
+        part = (np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[k]
+        self.outline, self.given = Polygon.of((target.goal[k] + part * side[k])[None]), Polygon.of(target.goal[None])
+        self.band = bands(target.goal)[k]
+        self.count = _EQUAL + len(model.inputs) - 1
+        self.weight = target.weight / target.tolerance / math.sqrt(2.0 * self.count)
+        self.heavy = math.sqrt(self.count / len(target.goal))
 
     def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
         """Nothing is kept from step to step: as many zeros as there are distances."""
-        return np.zeros((len(moved.frames), _ALONG + self.given.z.shape[1]))
+        return np.zeros((len(moved.frames), self.count + self.given.z.shape[1]))
 
     def looked(self, moved: Moved, times: Array) -> tuple[Array, Array]:
-        """At all samples of the motion."""
-        return moved.frames, moved.rates
+        """At the samples of any motion."""
+        at = np.searchsorted(moved.inputs, self.model.inputs - 1e-9)
+        return moved.frames[:, at], moved.rates[:, at]
 
     def rows(self, times: Array, frames: Array, rates: Array, u: Unknowns) -> Rows:
         """Distances of points of the curve from the outline, then of given points from the curve."""
@@ -88,17 +90,17 @@ class ContourAim(PointAim):
         h = np.diff(self.model.inputs)
         z, v = own[..., 0] + 1j * own[..., 1] + arm, speed[..., 0] + 1j * speed[..., 1] + 1j * speed[..., 2] * arm
         curve = _Cubics(z[:, :-1], z[:, 1:], v[:, :-1] * h, v[:, 1:] * h)
-        at, corners = curve.equal()
-        polygon = Polygon.of(corners)
+        at = curve.spread()
+        polygon = Polygon.of(curve.at(at)[0])
         there, back = _nearest(polygon, self.outline, self.given, self.turned)
         foot = self.outline.foot(polygon.z, there)
         away = polygon.z - foot
-        outside = (np.abs(away) > self.band[there] * self.size).any(axis=1, keepdims=True)
+        away *= np.maximum(1.0 - self.band[there] / np.maximum(np.abs(away), 1e-300), 0.0)
         back_at = curve.nearest(at[np.arange(sets)[:, None], back], self.given.z)
-        e = np.concatenate([away * outside, self.heavy * (curve.at(back_at)[0] - self.given.z)], axis=1) / self.size
+        e = np.concatenate([away, self.heavy * (curve.at(back_at)[0] - self.given.z)], axis=1) / self.size
         far = np.abs(e)
         way = np.where(far > _NONE, e / np.maximum(far, _NONE), 0.0)
-        way[:, _ALONG:] *= self.heavy
+        way[:, self.count :] *= self.heavy
         loads, direct = self.blank(sets, 2, n)
         self.put(loads, direct, arm, turn)
         low, part = curve.split(np.concatenate([at, back_at], axis=1))
@@ -126,19 +128,19 @@ class _Cubics(NamedTuple):
         z = y * y * ((1 + 2 * x) * a + x * p) + x * x * ((1 + 2 * y) * b - y * q)
         return z, 6 * x * y * (b - a) + y * (1 - 3 * x) * p + x * (3 * x - 2) * q
 
-    def equal(self) -> tuple[Array, Complex]:
-        """Return places (sets, _ALONG), and points of equal distance along the curves."""
+    def spread(self) -> Array:
+        """Return places (sets, _EQUAL + n) of equal distance along the curves and where cubics begin, in order."""
         sets, n = self.a.shape
         fine, _ = self.at(np.tile(np.arange(n * _CHORDS) / _CHORDS, (sets, 1)))
-        side = np.roll(fine, -1, axis=1) - fine
-        share = np.cumsum(np.abs(side), axis=1)
+        share = np.cumsum(np.abs(np.roll(fine, -1, axis=1) - fine), axis=1)
         share /= np.maximum(share[:, -1:], 1e-300)
-        row, wanted = np.arange(sets)[:, None], (np.arange(_ALONG) + 0.5) / _ALONG
+        row, wanted = np.arange(sets)[:, None], (np.arange(_EQUAL) + 0.5) / _EQUAL
         k = np.searchsorted((share + row).ravel(), (wanted + row).ravel()).reshape(sets, -1) - row * n * _CHORDS
         k = np.clip(k, 0, n * _CHORDS - 1)
         begin = np.where(k > 0, share[row, k - 1], 0.0)
         part = np.clip((wanted - begin) / np.maximum(share[row, k] - begin, 1e-300), 0.0, 1.0)
-        return (k + part) / _CHORDS, fine[row, k] + part * side[row, k]
+        own = np.broadcast_to(np.arange(n, dtype=np.float64), (sets, n))
+        return np.sort(np.concatenate([(k + part) / _CHORDS, own], axis=1), axis=1)
 
     def bends(self, at: Array) -> Complex:
         """Return accelerations at places (sets, m)."""
@@ -157,7 +159,7 @@ class _Cubics(NamedTuple):
 
 
 def _nearest(curve: Polygon, outline: Polygon, given: Polygon, turned: float) -> tuple[Whole, Whole]:
-    """Corner of the outline nearest to every one of the curves (sets, _ALONG); of the curves to every given point."""
+    """Corner of the outline nearest to every one of the curves (sets, m); of the curves to every given point."""
     one, two, three = (_four(own, turned) for own in (curve, outline, given))
     there = (one @ two[0].T - 0.5 * (two[0] ** 2).sum(axis=1)).argmax(axis=2)
     return there, (three[0] @ one.transpose(0, 2, 1) - 0.5 * (one**2).sum(axis=2)[:, None]).argmax(axis=2)

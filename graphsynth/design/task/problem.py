@@ -100,7 +100,8 @@ class TaskProblem:
             more = np.concatenate([own.ravel() for own in (*times, *near) if own is not None])
             moved = model.move(u, more)
         found = [aim.times(moved, u, own) for aim, own in zip(self.aims, times)]
-        every = [(aim.rows(own, *moved.at(own), u), *moved.at(own)) for aim, own in zip(self.aims, found)]
+        seen = [aim.looked(moved, own) for aim, own in zip(self.aims, found)]
+        every = [(aim.rows(own, *at, u), *at) for aim, own, at in zip(self.aims, found, seen)]
         every += [(rows, *moved.at(rows.times)) for rows in sampled_wishes(model, moved, u, math.inf)]
         pulled = [(values[0], model.through_ties(x[None], slopes)[0]) for values, slopes in self._pulled(every, u)]
         errors = [

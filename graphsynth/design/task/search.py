@@ -12,7 +12,7 @@ from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain, cycle, repeat
+from itertools import chain, repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,7 @@ from graphsynth.core.ordered import in_order
 from graphsynth.core.shown import Shown
 from graphsynth.design.task.answers import Candidate, Chain, DesignedMechanism, Origin, built, judged, proved, signature
 from graphsynth.design.task.descend import Descended, best, descend
+from graphsynth.design.task.growth import grown, promised
 from graphsynth.design.task.impossible import proof
 from graphsynth.design.task.model import Model, Unknowns
 from graphsynth.design.task.plans import Plan, plans
@@ -44,6 +45,8 @@ _STAGES: Stages = ((80, 0.2, 8), (25, 0.2, 15), (6, 3.0, 40))
 _MANY, _GLANCES = 16, 6
 _GLANCE: Stages = ((4, 0.2, 12), (1, 1.0, 6))
 _ONWARD: Stages = ((24, 0.2, 10), (6, 1.0, 15), (2, 3.0, 20))
+#: Larger mechanisms that are looked at, and what becomes of them.
+_DYADS, _GROWING = 96, ((8, 0.2, 12), (3, 1.0, 15), (2, 3.0, 20))
 #: How much directions count beside distances where outlines are drawn: at first, in the last stage.
 _TURNED = 0.5, 0.05
 #: Points at most of a path without times before the last stage; errors, in tolerances, of answers that miss the task
@@ -66,11 +69,15 @@ _OUTLINED = 0.3
 
 
 class Begun(NamedTuple):
-    """What a piece begins with: a plan and random candidates, a mechanism, or the best so far of another piece."""
+    """What a piece begins with: a plan and random candidates, a mechanism, or the best so far of another piece.
+
+    ``grows``: with a dyad more.
+    """
 
     origin: Origin
     parent: Array | None = None
     stages: Stages = _STAGES
+    grows: bool = False
 
 
 class Piece(NamedTuple):
@@ -227,8 +234,9 @@ class _Run:
         self.reasons: Counter[str] = Counter()
         self.pieces, self.stopped = 0, ""
         self.tries: Counter[tuple[Chain, float]] = Counter()
-        outlines = any(isinstance(target, PathTarget) and target.outline for target in task.targets)
-        self.near, self.even = (_OUTLINED, _OUTLINED) if outlines else (_NEAR, _EVEN)
+        self.outlines = any(isinstance(target, PathTarget) and target.outline for target in task.targets)
+        self.near, self.even = (_OUTLINED, _OUTLINED) if self.outlines else (_NEAR, _EVEN)
+        self.grows = any(isinstance(target, PathTarget) for target in task.targets)
         self.before, self.idle = 0, 0  # accepted before the last wave, waves without another one
 
     def search(self, executor: Executor | None, progress: Callable[[Progress], None] | None) -> None:
@@ -239,37 +247,49 @@ class _Run:
         for k in range(0, len(given), _GLANCES if many else _WAVE):
             some = [Begun(origin) for origin in given[k : k + (_GLANCES if many else _WAVE)]]
             if many:
-                some = [own._replace(stages=_GLANCE) for own in some] + self._again(_WAVE - _GLANCES, _ONWARD)
+                some = [own._replace(stages=_GLANCE) for own in some]
+                some += [*self._again(1, _ONWARD), *self._again(1, _GROWING, True)]
             if self._wave(some, executor, progress):
                 return
-        fresh = {links: cycle(own) for links, own in self._plans().items()}
-        for links in chain.from_iterable(repeat([n for n in fresh for _ in range(_WAVES[n])])):
-            again = self._again(_WAVE - 1, _ONWARD) if many else self._again(_AGAIN, _STAGES)
-            new = [Begun(Origin(next(fresh[links]), -1, None)) for _ in range(_WAVE - len(again))]
+        fresh: dict[int, list[Plan]] = {}
+        for wave, links in enumerate(chain.from_iterable(repeat([n for n in self.task.links for _ in range(_WAVES[n])]))):
+            again = self._again(_WAVE // 2 if many else _AGAIN, _GROWING, True) if self.grows else []
+            again += self._again(_WAVE - len(again) - 1, _ONWARD) if many else []
+            again += self._again(_AGAIN - len(again), _STAGES) if not many else []
+            if links not in fresh:
+                fresh[links] = self._plans(links)
+                if not any(fresh.values()) and len(fresh) == len(self.task.links):
+                    raise GeometryError(
+                        f"no chain of {' or '.join(map(str, self.task.links))} links fits the task: too many pivots are "
+                        "given, or no link is free to carry a named point; allow more links"
+                    )
+            own = fresh[links]
+            if not own:
+                continue
+            new = [Begun(Origin(own[(wave * _WAVE + k) % len(own)], -1, None)) for k in range(_WAVE - len(again))]
             if self._wave([*new, *again], executor, progress):
                 return
 
-    def _plans(self) -> dict[int, list[Plan]]:
-        """Return all plans by the number of links, in an order of chance."""
-        every = {links: list(plans(self.task, links)) for links in self.task.links}
-        if not any(every.values()):
-            raise GeometryError(
-                f"no chain of {' or '.join(map(str, self.task.links))} links fits the task: too many pivots are given, "
-                "or no link is free to carry a named point; allow more links"
-            )
-        for links, own in every.items():
-            np.random.default_rng([self.seed, links]).shuffle(own)
-        return {links: own for links, own in every.items() if own}
+    def _plans(self, links: int) -> list[Plan]:
+        """Return all plans with so many links, in an order of chance."""
+        found = list(plans(self.task, links))
+        np.random.default_rng([self.seed, links]).shuffle(found)  # type: ignore[arg-type]
+        return found
 
-    def _again(self, count: int, stages: Stages) -> list[Begun]:
-        """Go on from the best candidates so far, of different chains; those that do not come on have to wait."""
+    def _again(self, count: int, stages: Stages, grows: bool = False) -> list[Begun]:
+        """Go on from the best candidates so far, of different chains; those that do not come on have to wait.
+
+        ``grows``: from those that may have a dyad more.
+        """
         found: dict[Chain, Candidate] = {}
+        most = max(self.task.links) - 2 if grows else math.inf
         for candidate in self.found:  # sorted
-            found.setdefault(candidate.chain, candidate)
+            if candidate.plan.design.graph.links <= most:
+                found.setdefault(candidate.chain, candidate)
         turn = sorted(found.values(), key=lambda own: own.error * _TIRED ** self.tries[own.chain, own.error])[:count]
         for own in turn:
             self.tries[own.chain, own.error] += 1
-        return [Begun(own.origin, own.x, stages) for own in turn]
+        return [Begun(own.origin, own.x, stages, grows) for own in turn]
 
     def _wave(
         self,
@@ -279,9 +299,9 @@ class _Run:
     ) -> bool:
         """Do a piece for each, judge what came of them, and tell whether that is enough."""
         begun = []
-        for number, (origin, x, stages) in enumerate(chosen, self.pieces):
-            own = origin if x is not None else origin._replace(number=number)
-            begun.append(Piece(self.task, self.seed, number, Begun(own, x, stages)))
+        for number, piece in enumerate(chosen, self.pieces):
+            own = piece if piece.parent is not None else piece._replace(origin=piece.origin._replace(number=number))
+            begun.append(Piece(self.task, self.seed, number, own))
         results = in_order(executor, partial(told, worked, here()), begun)
         try:
             for (found, reasons), spent in results:
@@ -321,15 +341,16 @@ class _Run:
         self.found.sort(key=lambda candidate: candidate.error)
         for k, candidate in enumerate(self.found[: _JUDGED * self.count]):
             if id(candidate) not in self.judged:
-                own = self.found[k] = self._settled(candidate) if candidate.error < self.near else candidate
+                near = candidate.error < self.near and (k < self.count or not self.outlines)
+                own = self.found[k] = self._settled(candidate) if near else candidate
                 self.judged[id(own)] = own, judged(self.task, own)
-                if own.error < 1.0:  # then the largest error may be small enough, too
+                if near and own.error < 1.0:  # then the largest error may be small enough, too
                     self._level(own)
 
     def _settled(self, candidate: Candidate) -> Candidate:
         """Return a candidate at its least sum of squares, its motion and bounds taken exactly."""
         with suppress(GraphsynthError):
-            problem = TaskProblem(_modelled(self.task, self.seed, candidate.origin)[0])
+            problem = TaskProblem(_modelled(self.task, self.seed, candidate.origin)[0], 0, _TURNED[1])
             x, error = settled(problem, candidate.x)
             error += float(problem.model.untransmitted(x[None])[0])
             if error < candidate.error:
@@ -343,7 +364,7 @@ class _Run:
         if answer.accepted:
             return
         with suppress(GraphsynthError):
-            problem = TaskProblem(_modelled(self.task, self.seed, candidate.origin)[0])
+            problem = TaskProblem(_modelled(self.task, self.seed, candidate.origin)[0], 0, _TURNED[1])
             x, error = levelled(problem, candidate.x)
             if not error < math.inf:
                 return
@@ -412,27 +433,40 @@ class _Run:
 
 def worked(piece: Piece) -> tuple[list[Candidate], dict[str, int]]:
     """Do one piece: begin with many candidates, keep the best, improve them; return the best and what failed."""
-    (origin, parent, stages), random = piece.begun, np.random.default_rng([piece.seed, piece.number, 1])
+    (origin, parent, stages, grows), random = piece.begun, np.random.default_rng([piece.seed, piece.number, 1])
     try:
         model, given = _modelled(piece.task, piece.seed, origin)
         if not model.regular:
             return [], {"the chain cannot be assembled": 1}
+        if grows:
+            assert parent is not None
+            larger = grown(model, parent, _DYADS, random)
+            if larger is None:
+                return [], {"no dyad can be added": 1}
+            origin = Origin(larger.plan, piece.number, larger.mechanism)
+            model, _ = _modelled(piece.task, piece.seed, origin)
         problem, coarse = TaskProblem(model, 0, _TURNED[1]), TaskProblem(model, _FEW, _TURNED[0])
-        if parent is not None:
+        if grows:
+            X = model.write(larger.every)
+            error, times = promised(problem, X)
+            found = Descended(X, error, times)
+        elif parent is not None:
             X, times = _children(coarse, parent, stages[0][0], random)
+            found = Descended(X, np.zeros(len(X)), times)
         else:
             copies = _COPIES if stages is _STAGES else 2 * stages[0][0]
             first = random_starts(model, _FIRST, random) if given is None else shaken(given, copies, random)
             X, times = placed_starts(coarse, first, stages[0][0], random)
+            found = Descended(X, np.zeros(len(X)), times)
     except GraphsynthError:
         return [], {"the chain cannot be moved": 1}
-    reasons = {"no candidate completes the range": 1} if not len(X) else {}
-    found = Descended(X, np.zeros(len(X)), times)
+    reasons = {"no candidate completes the range": 1} if not len(found.X) else {}
     for stage, (keep, strict, iterations) in enumerate(stages):
         found = best(found, keep)
         if len(found.X):
             last = stage == len(stages) - 1  # at all points
-            found = descend(problem if last else coarse, found.X, strict, iterations, None if last else found.times)
+            own = problem if last or grows else coarse
+            found = descend(own, found.X, strict, iterations, None if last else found.times)
     candidates = []
     error = found.error + model.untransmitted(found.X)
     for k in np.argsort(error, kind="stable")[:_KEPT]:

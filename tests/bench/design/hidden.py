@@ -10,9 +10,10 @@ from __future__ import annotations
 import argparse
 import csv
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
@@ -25,7 +26,7 @@ from graphsynth.core.errors import GraphsynthError
 from graphsynth.design import CurveIndex, DesignTask, FunctionTarget, PathTarget, design, index_starts
 from graphsynth.design.curves.families import Family, families
 from graphsynth.design.curves.sampling import draw
-from graphsynth.design.task.targets import evenly
+from graphsynth.design.task.targets import MOST, evenly
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.model import Mechanism
 
@@ -33,10 +34,10 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 #: Error over the size that counts as found; shares of four, six and eight links.
 NEAR, SHARES = 1e-3, {4: 0.1, 6: 0.3, 8: 0.6}
-#: Positions of a hidden motion; points of a curve that are given, or more where so few do not tell it; of a function.
-_FINE, _POINTS, _ANGLES = 2048, (48, 96, 192), 36
-#: Smallest swing of a function; drawn mechanisms of a family; band about the polygon of a closed path, in its sides.
-_SWING, _DRAWN, _BAND = 0.1, 4, 0.2
+#: Positions of a hidden motion; points of a curve that are given, and more where so few do not tell it; of a function.
+_FINE, _POINTS, _ANGLES = 2048, 96, 36
+#: Smallest swing of a function; drawn mechanisms of a family.
+_SWING, _DRAWN = 0.1, 4
 #: What a range that is not a full turn lacks at either end.
 _CUT = 0.05
 #: The random numbers: of this benchmark, not of the index, which has 0.
@@ -58,7 +59,7 @@ class Hidden(NamedTuple):
         """Of a curve its largest distance from its middle, of a function its swing."""
         if self.values.dtype == np.float64:
             return float(np.ptp(self.values))
-        z = evenly(self.values, _POINTS[0], self.drive == "rotation")
+        z = evenly(self.values, 48, self.drive == "rotation")
         return float(np.abs(z - z.mean()).max())
 
 
@@ -140,7 +141,7 @@ def task_of(kind: str, own: Hidden) -> DesignTask:
         outputs = np.interp(at, own.inputs, own.values).tolist()
         target = FunctionTarget(inputs=at.tolist(), outputs=outputs, tolerance=NEAR * own.size)
     else:
-        z = next((z for z in _polygons(own) if _told(own, z)), evenly(own.values, _POINTS[-1], own.drive == "rotation"))
+        z = polygon(own)
         target = PathTarget(
             points=[(p.real, p.imag) for p in z.tolist()], closed=own.drive == "rotation", tolerance=NEAR
         )
@@ -150,16 +151,18 @@ def task_of(kind: str, own: Hidden) -> DesignTask:
     return DesignTask(targets=[target], drive=own.drive, span=own.span, links=list(SHARES), **free)  # type: ignore[arg-type]
 
 
-def _polygons(own: Hidden) -> Iterator[Complex]:
-    return (evenly(own.values, count, own.drive == "rotation") for count in _POINTS)
-
-
-def _told(own: Hidden, corners: Complex) -> bool:
-    """Whether a closed curve is so near to its polygon that a closed path stands for it."""
-    if own.drive != "rotation":
-        return True
-    side = float(np.abs(corners[1] - corners[0]))
-    return bool(_distances(own.values[::4], np.append(corners, corners[0])).max() < 0.5 * _BAND * side)
+def polygon(own: Hidden) -> Complex:
+    """Points of a curve, evenly along it, and more until their polygon tells it to half the error asked for."""
+    z, closed = own.values, own.drive == "rotation"
+    near = evenly(z, _POINTS, closed)
+    at = [0, *(int(np.abs(z - point).argmin()) for point in near[1:-1]), len(z) - 1]
+    while len(at) < MOST:
+        sides = [(k, _distances(z[k : end + 1], z[[k, end]])) for k, end in pairwise(sorted({*at}))]
+        more = [k + int(far.argmax()) for k, far in sides if far.max() > 0.5 * NEAR * own.size]
+        if not more:
+            break
+        at += more
+    return np.asarray(z[sorted({*at})[: -1 if closed else None]][:MOST])
 
 
 def _distances(z: Complex, corners: Complex) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -10,12 +11,16 @@ import pytest
 
 import graphsynth as gs
 from graphsynth.design import DesignTask, PathTarget
+from graphsynth.design.task.aims import bands, beside
+from graphsynth.design.task.answers import _passed
 from graphsynth.design.task.contours import ContourAim, Polygon, _Cubics, _nearest
 from graphsynth.design.task.descend import descend
 from graphsynth.design.task.model import Model
 from graphsynth.design.task.plans import fitting
 from graphsynth.design.task.problem import TaskProblem
+from graphsynth.design.task.growth import grown, promised
 from graphsynth.design.task.starts import from_mechanism, shaken
+from graphsynth.design.task.targets import evenly
 from graphsynth.kinematics.dimensional.design import Design
 
 HIDDEN = gs.Mechanism.four_bar(4.0, 1.5, 3.5, 3.0, coupler_point=(1.6, 1.9))
@@ -56,15 +61,44 @@ def test_distances_are_those_of_brute_force() -> None:
     u = problem.model.read(X[:1])
     moved = problem.model.move(u)
     values = aim.rows(aim.times(moved, u, None), *aim.looked(moved, np.zeros((1, 0))), u).values[0, 0]
+    own = aim.seen(moved, u)
+    z, v = own.frames[..., 0] + 1j * own.frames[..., 1], own.rates[..., 0] + 1j * own.rates[..., 1]
+    h = np.diff(own.u)
+    cubics = _Cubics(z[:, :-1], z[:, 1:], v[:, :-1] * h, v[:, 1:] * h)
+    at = cubics.at(cubics.spread())[0][0]
     curve, sides = drawn(20_000), np.append(goal, goal[0])
     outline = np.concatenate([np.linspace(a, b, 500, endpoint=False) for a, b in pairwise(sides)])
-    length = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(np.append(curve, curve[0]))))])
+    apart = np.abs(at[:, None] - outline)
+    far = np.maximum(apart.min(axis=1) - bands(goal)[apart.argmin(axis=1) // 500], 0.0) / aim.size
     count = len(values) - len(goal)
-    at = np.interp((np.arange(count) + 0.5) / count * length[-1], length, np.arange(20_001)).astype(int)
-    far = np.abs(curve[at][:, None] - outline).min(axis=1) / aim.size
-    assert np.abs(values[:count] - far).max() < 0.01 * far.max()
+    assert count == len(at) and np.abs(values[:count] - far).max() < 0.01 * far.max()
     back = np.abs(goal[:, None] - curve).min(axis=1) / aim.size * math.sqrt(count / len(goal))
     assert np.abs(values[count:] - back).max() < 1e-3 * back.max()
+
+
+@pytest.mark.parametrize("curve", [lambda t: np.exp(1j * t), lambda t: 3.0 * np.cos(t) + 1j * np.sin(t)])
+@pytest.mark.parametrize("count", [24, 60])
+def test_a_smooth_curve_lies_in_the_bands_of_its_polygon(curve: Callable[[np.ndarray], np.ndarray], count: int) -> None:
+    corners = evenly(curve(np.linspace(0.0, math.tau, 10_001)), count, True)
+    fine = curve(np.linspace(0.0, math.tau, 2000))
+    assert np.abs(beside(fine, corners) - fine).max() < 1e-12
+    assert np.abs(beside(1.2 * fine, corners) - 1.2 * fine).max() > 0.1
+
+
+def test_nothing_beyond_a_sharp_corner_lies_in_a_band() -> None:
+    """A curve that runs there and back on a line may not go on at its ends."""
+    corners = np.concatenate([np.linspace(0.0, 1.0, 11), np.linspace(0.9, 0.1, 9)]) + 0j
+    assert bands(corners).max() == 0.0
+    assert beside(np.array([1.001 + 0j, 0.5 + 0.001j]), corners).tolist() == [1.0, 0.5]
+
+
+def test_a_corner_is_passed_by_a_curve_that_runs_its_way() -> None:
+    square = np.array([0.0, 1.0, 1.0 + 1.0j, 1.0j])
+    there = np.append(square, 0.0)
+    assert _passed(there, square) == 0.0 and _passed(there + 0.01, square) == pytest.approx(0.01)
+    assert _passed(there[::-1], square) > 0.9
+    line = np.array([0.0, 0.5, 1.0, 0.5]) + 0j  # there and back
+    assert _passed(np.append(line, 0.0), line) == 0.0
 
 
 def test_slopes_are_those_of_differences() -> None:
@@ -90,17 +124,50 @@ def test_directions_tell_the_sides_of_a_stroke_apart() -> None:
     assert fine.foot(curve.z, same)[0, 1] == pytest.approx(0.5)
 
 
-def test_points_of_equal_distance_lie_on_the_curve() -> None:
+def test_points_along_the_curve_are_spread_over_it_and_over_its_samples() -> None:
     """Of an ellipse in cubics."""
     t = np.arange(60) * math.tau / 60
     z, v = (3.0 * np.cos(t) + 1j * np.sin(t))[None], (-3.0 * np.sin(t) + 1j * np.cos(t))[None] * t[1]
     curve = _Cubics(z, np.roll(z, -1, axis=1), v, np.roll(v, -1, axis=1))
-    at, points = curve.equal()
-    steps = np.abs(np.diff(points[0]))
-    assert steps.max() < 1.01 * steps.min()
-    assert np.abs((points.real / 3.0) ** 2 + points.imag**2 - 1.0).max() < 1e-3
-    own, speed = curve.at(at)
-    assert np.abs(own - points).max() < 1e-3 and np.abs(own.real**2 / 9.0 + own.imag**2 - 1.0).max() < 1e-5
+    at = curve.spread()
+    assert (np.diff(at[0]) >= 0.0).all() and set(range(60)) <= set(at[0].tolist())
+    equal = np.setdiff1d(at[0], np.arange(60))[None]
+    own, speed = curve.at(equal)
+    steps = np.abs(np.diff(own[0]))
+    assert len(steps) > 90 and steps.max() < 1.02 * steps.min()
+    assert np.abs(own.real**2 / 9.0 + own.imag**2 - 1.0).max() < 1e-5
     goal = 1.2 * own
-    near = curve.at(curve.nearest(at[:, np.abs(goal[0][:, None] - points[0]).argmin(axis=1)], goal))
+    near = curve.at(curve.nearest(equal[:, np.abs(goal[0][:, None] - own[0]).argmin(axis=1)], goal))
     assert np.abs((np.conj(near[1]) * (goal - near[0])).real).max() < 1e-3 * np.abs(speed).max()
+
+
+def test_a_mechanism_with_a_dyad_more_draws_the_same_but_for_the_distance_of_its_point() -> None:
+    problem, X = modelled(drawn(40), 0.05)
+    model, random, links = problem.model, np.random.default_rng(3), set()
+    before = problem.aims[0].seen(model.move(model.read(X[:1])), model.read(X[:1])).frames[0, :, 0:2] @ [1.0, 1.0j]
+    for _ in range(12):
+        more = grown(model, X[0], 40, random)
+        assert more is not None and len(more.plan.design.kinds) == 7
+        given, sense = from_mechanism(model.task, more.plan, more.mechanism)
+        larger = Model(model.task, more.plan, random, given, sense)
+        found = TaskProblem(larger, 0, 0.05)
+        u = larger.read(larger.write(more.every))
+        moved = larger.move(u)
+        assert moved.complete.all()
+        after = found.aims[0].seen(moved, u).frames[..., 0:2] @ [1.0, 1.0j]
+        assert np.abs(after - before) == pytest.approx(3e-3 * model.task.size, rel=1e-6)
+        links |= {joint.a for joint in more.plan.design.graph.joints if joint.b == 5}
+    assert links == {0, 1, 3, 4}  # of the four-bar all but the coupler, and its own
+
+
+def test_promised_errors_are_those_of_damped_least_squares() -> None:
+    problem, X = modelled(1.1 * drawn(40), 0.05)
+    error, _ = promised(problem, X)
+    (before, r, J), _ = problem.linearise(X, None, 0.2)
+    good = np.flatnonzero(np.isfinite(before))
+    assert len(good) > 5 and np.isinf(error[np.isinf(before)]).all()
+    for k in good:
+        damped = np.concatenate([J[k], np.diag(math.sqrt(1e-3) * np.linalg.norm(J[k], axis=0))])
+        step = np.linalg.lstsq(damped, -np.append(r[k], np.zeros(X.shape[1])), rcond=None)[0]
+        assert error[k] == pytest.approx(np.linalg.norm(damped @ step + np.append(r[k], np.zeros(len(step)))), rel=1e-3)
+        assert error[k] < before[k]
