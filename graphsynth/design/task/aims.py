@@ -184,7 +184,7 @@ class PointAim(TimedAim):
 
 
 def bands(corners: Complex) -> Array:
-    """Return half the widths of the bands about the sides of a closed polygon in which a smooth curve through them lies.
+    """Return half the widths of the bands about the sides of a closed polygon that hold a smooth curve through them.
 
     Where the polygon goes straight on, or has a sharp corner, so does the curve.
 

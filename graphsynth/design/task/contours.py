@@ -19,8 +19,8 @@ from graphsynth.design.task.targets import PathTarget
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Whole = NDArray[np.intp]
-#: Points of about equal distance along the outline, besides its corners, and along the curve, besides the samples of its
-#: motion, which are dense where it turns back; chords between two samples.
+#: Points of about equal distance along the outline, besides its corners, and along the curve, besides the samples of
+#: its motion, which are dense where it turns back; chords between two samples.
 _ALONG, _EQUAL, _CHORDS = 128, 96, 4
 #: Points by which a curve is placed.
 _PLACED = 24

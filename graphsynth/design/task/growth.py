@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.design.task.descend import Descended
 from graphsynth.design.task.model import Model, Unknowns
 from graphsynth.design.task.plans import Plan, fitting
 from graphsynth.design.task.problem import TaskProblem
@@ -85,8 +86,10 @@ def grown(model: Model, x: Array, count: int, random: np.random.Generator) -> Gr
 def _dyads(
     joint: Complex, base: Complex, size: float, count: int, random: np.random.Generator
 ) -> tuple[Complex, Complex]:
-    """Return the pivots (n,) of new dyads and their inner joints (n,), at the start, which move with a joint (samples,)
-    and a base, place and direction (samples, 2)."""
+    """Return pivots (n,) and inner joints (n,) of new dyads at the start.
+
+    They move with a joint (samples,) and a base, its place and direction (samples, 2).
+    """
     z = joint.mean() + size * _between(_FAR, count, random) * np.exp(1j * random.uniform(0.0, math.tau, count))
     z = (z - base[0, 0]) * np.conj(base[0, 1])
     way = base[:, :1] + base[:, 1:] * z - joint[:, None]
@@ -131,12 +134,12 @@ def _mechanism(model: Model, plan: Plan, every: Unknowns) -> Mechanism:
     return Mechanism(base.graph, base.joints, drivers, traced, base.pose)
 
 
-def promised(problem: TaskProblem, X: Array) -> tuple[Array, list[Array]]:
-    """Return errors (sets,) of candidates after a step of Gauss and Newton, and the times of their targets."""
+def promised(problem: TaskProblem, X: Array) -> Descended:
+    """Return candidates (sets, size) with what their errors would be after a damped step of Gauss and Newton."""
     (error, r, J), times = problem.linearise(X, None, 0.2)
     turned = J.transpose(0, 2, 1)
     H, g = turned @ J, turned @ r[:, :, None]
     scale = np.einsum("sii->si", H)
     H += (_DAMPING * scale + 1e-12 * scale.max(axis=1, keepdims=True) + 1e-300)[:, :, None] * np.eye(X.shape[1])
     left = error**2 - (g * np.linalg.solve(H, g))[:, :, 0].sum(axis=1)
-    return np.where(np.isfinite(error), np.sqrt(np.maximum(left, 0.0)), np.inf), times
+    return Descended(X, np.where(np.isfinite(error), np.sqrt(np.maximum(left, 0.0)), np.inf), times)

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain, repeat
+from itertools import cycle, islice
 from typing import NamedTuple
 
 import numpy as np
@@ -251,30 +251,27 @@ class _Run:
                 some += [*self._again(1, _ONWARD), *self._again(1, _GROWING, True)]
             if self._wave(some, executor, progress):
                 return
-        fresh: dict[int, list[Plan]] = {}
-        for wave, links in enumerate(chain.from_iterable(repeat([n for n in self.task.links for _ in range(_WAVES[n])]))):
-            again = self._again(_WAVE // 2 if many else _AGAIN, _GROWING, True) if self.grows else []
-            again += self._again(_WAVE - len(again) - 1, _ONWARD) if many else []
-            again += self._again(_AGAIN - len(again), _STAGES) if not many else []
+        fresh: dict[int, Iterator[Plan]] = {}
+        for links in cycle([n for n in self.task.links for _ in range(_WAVES[n])]):
+            again = self._again((_WAVE if many else _AGAIN) // 2, _GROWING, True) if self.grows else []
+            more = _WAVE - 1 if many else _AGAIN
+            again += self._again(more - len(again), _ONWARD if many else _STAGES)
             if links not in fresh:
                 fresh[links] = self._plans(links)
-                if not any(fresh.values()) and len(fresh) == len(self.task.links):
-                    raise GeometryError(
-                        f"no chain of {' or '.join(map(str, self.task.links))} links fits the task: too many pivots are "
-                        "given, or no link is free to carry a named point; allow more links"
-                    )
-            own = fresh[links]
-            if not own:
-                continue
-            new = [Begun(Origin(own[(wave * _WAVE + k) % len(own)], -1, None)) for k in range(_WAVE - len(again))]
+            new = [Begun(Origin(plan, -1, None)) for plan in islice(fresh[links], _WAVE - len(again))]
+            if not (new or again) and len(fresh) == len(self.task.links):
+                raise GeometryError(
+                    f"no chain of {' or '.join(map(str, self.task.links))} links fits the task: too many pivots are "
+                    "given, or no link is free to carry a named point; allow more links"
+                )
             if self._wave([*new, *again], executor, progress):
                 return
 
-    def _plans(self, links: int) -> list[Plan]:
-        """Return all plans with so many links, in an order of chance."""
+    def _plans(self, links: int) -> Iterator[Plan]:
+        """Yield all plans with so many links for ever, in an order of chance."""
         found = list(plans(self.task, links))
-        np.random.default_rng([self.seed, links]).shuffle(found)  # type: ignore[arg-type]
-        return found
+        np.random.default_rng([self.seed, links]).shuffle(found)
+        return cycle(found)
 
     def _again(self, count: int, stages: Stages, grows: bool = False) -> list[Begun]:
         """Go on from the best candidates so far, of different chains; those that do not come on have to wait.
@@ -438,18 +435,15 @@ def worked(piece: Piece) -> tuple[list[Candidate], dict[str, int]]:
         model, given = _modelled(piece.task, piece.seed, origin)
         if not model.regular:
             return [], {"the chain cannot be assembled": 1}
-        if grows:
-            assert parent is not None
-            larger = grown(model, parent, _DYADS, random)
-            if larger is None:
-                return [], {"no dyad can be added": 1}
+        larger = grown(model, parent, _DYADS, random) if grows and parent is not None else None
+        if larger is not None:
             origin = Origin(larger.plan, piece.number, larger.mechanism)
             model, _ = _modelled(piece.task, piece.seed, origin)
+        elif grows:
+            return [], {"no dyad can be added": 1}
         problem, coarse = TaskProblem(model, 0, _TURNED[1]), TaskProblem(model, _FEW, _TURNED[0])
-        if grows:
-            X = model.write(larger.every)
-            error, times = promised(problem, X)
-            found = Descended(X, error, times)
+        if larger is not None:
+            found = promised(problem, model.write(larger.every))
         elif parent is not None:
             X, times = _children(coarse, parent, stages[0][0], random)
             found = Descended(X, np.zeros(len(X)), times)

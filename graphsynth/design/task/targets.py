@@ -123,7 +123,8 @@ class PathTarget(TimedTarget):
     points : sequence of (x, y)
     closed : bool
         Without inputs: the last point is followed by the first, and the path is the whole curve, which nowhere leaves
-        its polygon by more than a fifth of a side.
+        its polygon by more than a smooth curve through the points would (twice the sagitta, a fifth of a side at most);
+        where the polygon turns by more than 69 degrees it has a corner.
     point : str
         Name of the point.
 

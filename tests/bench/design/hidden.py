@@ -36,6 +36,8 @@ Complex = NDArray[np.complex128]
 NEAR, SHARES = 1e-3, {4: 0.1, 6: 0.3, 8: 0.6}
 #: Positions of a hidden motion; points of a curve that are given, and more where so few do not tell it; of a function.
 _FINE, _POINTS, _ANGLES = 2048, 96, 36
+#: Of the error that counts as found: what the polygon of a curve may differ from it, and what it is asked for with.
+_TOLD, _ASKED = 0.25, 0.6
 #: Smallest swing of a function; drawn mechanisms of a family.
 _SWING, _DRAWN = 0.1, 4
 #: What a range that is not a full turn lacks at either end.
@@ -143,7 +145,7 @@ def task_of(kind: str, own: Hidden) -> DesignTask:
     else:
         z = polygon(own)
         target = PathTarget(
-            points=[(p.real, p.imag) for p in z.tolist()], closed=own.drive == "rotation", tolerance=NEAR
+            points=[(p.real, p.imag) for p in z.tolist()], closed=own.drive == "rotation", tolerance=_ASKED * NEAR
         )
     free: dict[str, Any] = {"transmission": 0.0, "length_ratio": 1e3, "lengths": (1e-3 * own.size, 1e3 * own.size)}
     if kind == "functions":
@@ -152,13 +154,13 @@ def task_of(kind: str, own: Hidden) -> DesignTask:
 
 
 def polygon(own: Hidden) -> Complex:
-    """Points of a curve, evenly along it, and more until their polygon tells it to half the error asked for."""
+    """Points of a curve, evenly along it, and more where their polygon would not tell it."""
     z, closed = own.values, own.drive == "rotation"
     near = evenly(z, _POINTS, closed)
     at = [0, *(int(np.abs(z - point).argmin()) for point in near[1:-1]), len(z) - 1]
     while len(at) < MOST:
         sides = [(k, _distances(z[k : end + 1], z[[k, end]])) for k, end in pairwise(sorted({*at}))]
-        more = [k + int(far.argmax()) for k, far in sides if far.max() > 0.5 * NEAR * own.size]
+        more = [k + int(far.argmax()) for k, far in sides if far.max() > _TOLD * NEAR * own.size]
         if not more:
             break
         at += more
@@ -188,7 +190,7 @@ def error_of(kind: str, own: Hidden, mechanism: Mechanism, link: int) -> float:
     if kind == "functions":
         theta = np.unwrap(motion.poses[:, link, 2])
         return float(0.5 * np.ptp(theta - np.interp(motion.inputs, own.inputs, own.values))) / own.size
-    z = motion.point("P").position @ [1.0, 1.0j]
+    z: Any = motion.point("P").position @ [1.0, 1.0j]
     far = _distances(own.values[::4], z).max()
     if own.drive == "rotation":
         far = max(far, _distances(z[::4], own.values).max())
@@ -277,6 +279,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.bench.design.hidden", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("hidden-benchmark"))
     parser.add_argument("--count", type=int, default=200, help="hidden mechanisms of each kind")
+    parser.add_argument("--first", type=int, default=0, help="number of the first of them")
     parser.add_argument("--seconds", type=float, default=20.0, help="of the processor, at most, for each")
     parser.add_argument("--only", nargs="*", default=["curves", "functions"], choices=["curves", "functions"])
     parser.add_argument("--index", type=Path, help="folder of an index of curves; --curves 0: none")
@@ -289,7 +292,7 @@ def main() -> None:
         place = given.index or given.out / "index"
         index = CurveIndex(place) if given.index else CurveIndex.build(place, given.curves, sliders=0)
     done = {(row.kind, row.number) for row in read(results)}
-    for number in range(given.count):
+    for number in range(given.first, given.first + given.count):
         for kind in given.only:
             if (kind, number) not in done:
                 row = found_for(kind, number, given.seconds, index, given.starts)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,10 +16,10 @@ from graphsynth.design.task.aims import bands, beside
 from graphsynth.design.task.answers import _passed
 from graphsynth.design.task.contours import ContourAim, Polygon, _Cubics, _nearest
 from graphsynth.design.task.descend import descend
-from graphsynth.design.task.model import Model
+from graphsynth.design.task.growth import grown, promised
+from graphsynth.design.task.model import Model, Unknowns
 from graphsynth.design.task.plans import fitting
 from graphsynth.design.task.problem import TaskProblem
-from graphsynth.design.task.growth import grown, promised
 from graphsynth.design.task.starts import from_mechanism, shaken
 from graphsynth.design.task.targets import evenly
 from graphsynth.kinematics.dimensional.design import Design
@@ -26,7 +27,7 @@ from graphsynth.kinematics.dimensional.design import Design
 HIDDEN = gs.Mechanism.four_bar(4.0, 1.5, 3.5, 3.0, coupler_point=(1.6, 1.9))
 
 
-def drawn(count: int) -> np.ndarray:
+def drawn(count: int) -> Any:
     """Points of the hidden curve."""
     return gs.simulate(HIDDEN, np.linspace(0.0, math.tau, count + 1)).point("P").position[:-1] @ [1.0, 1.0j]
 
@@ -62,7 +63,8 @@ def test_distances_are_those_of_brute_force() -> None:
     moved = problem.model.move(u)
     values = aim.rows(aim.times(moved, u, None), *aim.looked(moved, np.zeros((1, 0))), u).values[0, 0]
     own = aim.seen(moved, u)
-    z, v = own.frames[..., 0] + 1j * own.frames[..., 1], own.rates[..., 0] + 1j * own.rates[..., 1]
+    z: Any = own.frames[..., :2] @ [1.0, 1.0j]
+    v: Any = own.rates[..., :2] @ [1.0, 1.0j]
     h = np.diff(own.u)
     cubics = _Cubics(z[:, :-1], z[:, 1:], v[:, :-1] * h, v[:, 1:] * h)
     at = cubics.at(cubics.spread())[0][0]
@@ -78,7 +80,7 @@ def test_distances_are_those_of_brute_force() -> None:
 
 @pytest.mark.parametrize("curve", [lambda t: np.exp(1j * t), lambda t: 3.0 * np.cos(t) + 1j * np.sin(t)])
 @pytest.mark.parametrize("count", [24, 60])
-def test_a_smooth_curve_lies_in_the_bands_of_its_polygon(curve: Callable[[np.ndarray], np.ndarray], count: int) -> None:
+def test_a_smooth_curve_lies_in_the_bands_of_its_polygon(curve: Callable[[Any], Any], count: int) -> None:
     corners = evenly(curve(np.linspace(0.0, math.tau, 10_001)), count, True)
     fine = curve(np.linspace(0.0, math.tau, 2000))
     assert np.abs(beside(fine, corners) - fine).max() < 1e-12
@@ -87,18 +89,18 @@ def test_a_smooth_curve_lies_in_the_bands_of_its_polygon(curve: Callable[[np.nda
 
 def test_nothing_beyond_a_sharp_corner_lies_in_a_band() -> None:
     """A curve that runs there and back on a line may not go on at its ends."""
-    corners = np.concatenate([np.linspace(0.0, 1.0, 11), np.linspace(0.9, 0.1, 9)]) + 0j
+    corners: Any = np.concatenate([np.linspace(0.0, 1.0, 11), np.linspace(0.9, 0.1, 9)]) + 0j
     assert bands(corners).max() == 0.0
     assert beside(np.array([1.001 + 0j, 0.5 + 0.001j]), corners).tolist() == [1.0, 0.5]
 
 
 def test_a_corner_is_passed_by_a_curve_that_runs_its_way() -> None:
-    square = np.array([0.0, 1.0, 1.0 + 1.0j, 1.0j])
-    there = np.append(square, 0.0)
+    square: Any = np.array([0.0, 1.0, 1.0 + 1.0j, 1.0j])
+    there: Any = np.append(square, 0.0)
     assert _passed(there, square) == 0.0 and _passed(there + 0.01, square) == pytest.approx(0.01)
     assert _passed(there[::-1], square) > 0.9
-    line = np.array([0.0, 0.5, 1.0, 0.5]) + 0j  # there and back
-    assert _passed(np.append(line, 0.0), line) == 0.0
+    line: Any = np.array([0.0, 0.5, 1.0, 0.5]) + 0j  # there and back
+    assert _passed(np.append(line, line[:1]), line) == 0.0
 
 
 def test_slopes_are_those_of_differences() -> None:
@@ -144,17 +146,20 @@ def test_points_along_the_curve_are_spread_over_it_and_over_its_samples() -> Non
 def test_a_mechanism_with_a_dyad_more_draws_the_same_but_for_the_distance_of_its_point() -> None:
     problem, X = modelled(drawn(40), 0.05)
     model, random, links = problem.model, np.random.default_rng(3), set()
-    before = problem.aims[0].seen(model.move(model.read(X[:1])), model.read(X[:1])).frames[0, :, 0:2] @ [1.0, 1.0j]
+
+    def traced(of: TaskProblem, u: Unknowns) -> Any:
+        aim, moved = of.aims[0], of.model.move(u)
+        assert isinstance(aim, ContourAim) and moved.complete.all()
+        return aim.seen(moved, u).frames[..., :2] @ [1.0, 1.0j]
+
+    before = traced(problem, model.read(X[:1]))
     for _ in range(12):
         more = grown(model, X[0], 40, random)
         assert more is not None and len(more.plan.design.kinds) == 7
         given, sense = from_mechanism(model.task, more.plan, more.mechanism)
         larger = Model(model.task, more.plan, random, given, sense)
         found = TaskProblem(larger, 0, 0.05)
-        u = larger.read(larger.write(more.every))
-        moved = larger.move(u)
-        assert moved.complete.all()
-        after = found.aims[0].seen(moved, u).frames[..., 0:2] @ [1.0, 1.0j]
+        after = traced(found, larger.read(larger.write(more.every)))
         assert np.abs(after - before) == pytest.approx(3e-3 * model.task.size, rel=1e-6)
         links |= {joint.a for joint in more.plan.design.graph.joints if joint.b == 5}
     assert links == {0, 1, 3, 4}  # of the four-bar all but the coupler, and its own
@@ -162,7 +167,7 @@ def test_a_mechanism_with_a_dyad_more_draws_the_same_but_for_the_distance_of_its
 
 def test_promised_errors_are_those_of_damped_least_squares() -> None:
     problem, X = modelled(1.1 * drawn(40), 0.05)
-    error, _ = promised(problem, X)
+    error = promised(problem, X).error
     (before, r, J), _ = problem.linearise(X, None, 0.2)
     good = np.flatnonzero(np.isfinite(before))
     assert len(good) > 5 and np.isinf(error[np.isinf(before)]).all()
