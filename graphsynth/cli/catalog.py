@@ -217,15 +217,14 @@ def _site(options: argparse.Namespace) -> int:
     with Catalogue(options.file) as catalogue:
         count = console.workers_for(options.workers, len(catalogue) > _MANY)
         with ordered.processes(count) as executor, console.counting() as watch:
-            motions = options.motion_links
-            report = build_site(catalogue, options.output, motion_links=motions, executor=executor, watch=watch)
+            report = build_site(catalogue, options.output, executor=executor, watch=watch)
     seconds = round(time.perf_counter() - begin, 3)
     if options.json:
         held = {"bytes" if name == "size" else name: value for name, value in asdict(report).items()}
         console.put_json({**held, "page": str(report.page), "seconds": seconds})
     else:
         console.put(
-            f"{report.page}: {report.chains} chains, {report.motions} in motion, {report.files} files, "
+            f"{report.page}: {report.chains} chains, {report.dimensioned} with dimensions, {report.files} files, "
             f"{report.size / 1e6:.1f} MB, {report.first_load / 1000:.0f} kB to begin with ({seconds:.1f} s)"
         )
     return 0

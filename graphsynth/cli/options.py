@@ -244,7 +244,6 @@ _ACTIONS: dict[str, tuple[str, *tuple[Option, ...]]] = {
         "Write the atlas page: a static site that opens from a file.",
         _FILE,
         _option("-o --output DIR", "folder of the page", Path, required=True),
-        _option("--motion-links N", "show chains of at most N links in motion (default 10; 0: none)", int, default=10),
         _WORKERS,
     ),
 }

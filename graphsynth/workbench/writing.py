@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from base64 import b64encode
+from base64 import b64encode, urlsafe_b64encode
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
@@ -13,9 +13,10 @@ from graphsynth.core.wholefiles import replacing
 from graphsynth.core.wholefolders import PageFolder, put
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.workbench.modules import names, script
+from graphsynth.workbench.posing import assembled
 
 #: Modules of kernels that the page loads at once, and those that it loads when they are asked for.
-_FIRST, _LATER = ("motion", "chains"), ("sketch",)
+_FIRST, _LATER = ("motion", "chains"), ("sketch", "binding")
 _FOLDER = PageFolder("workbench-page.txt", {".": (".html", ".css", ".js")})
 
 
@@ -61,23 +62,41 @@ def write_workbench(place: str | Path, mechanism: Mechanism | None = None, *, si
             put(fresh, single_page(given))
         return place
     with _FOLDER.replaced(place) as (target, building):
-        scripts = page_scripts(given)
-        for name, text in {**scripts, **later_scripts()}.items():
-            put(building / f"{name}.js", text)
-        put(building / "style.css", page_file("style.css"))
-        named = [f'<script src="{name}.js"></script>' for name in scripts if name != "theme"]
-        put(
-            building / "index.html",
-            _page(
-                theme='<script src="theme.js"></script>',
-                style='<link rel="stylesheet" href="style.css">',
-                scripts=named,
-                own="'self' file:",
-                allowed="'self' file:",
-            ),
-        )
+        write_files(building, given)
         put(building / _FOLDER.mark, "This folder is written by 'graphsynth workbench' and replaced by it.\n")
     return target / "index.html"
+
+
+def write_files(folder: Path, given: str = "", atlas: str = "") -> None:
+    """Write the files of the page into a folder that exists; ``atlas`` is the address of an atlas page to lead to."""
+    scripts = page_scripts(given, atlas=atlas)
+    for name, text in {**scripts, **later_scripts()}.items():
+        put(folder / f"{name}.js", text)
+    put(folder / "style.css", page_file("style.css"))
+    page = _page(
+        theme='<script src="theme.js"></script>',
+        style='<link rel="stylesheet" href="style.css">',
+        scripts=[f'<script src="{name}.js"></script>' for name in scripts if name != "theme"],
+        own="'self' file:",
+        allowed="'self' file:",
+    )
+    put(folder / "index.html", page)
+
+
+def fragment(mechanism: Mechanism) -> str:
+    """Return the part of an address, from ``#`` on, with which the page opens with a mechanism in its pose.
+
+    Raises
+    ------
+    GeometryError
+        As `write_workbench`.
+    """
+    from zlib import compressobj
+
+    packer = compressobj(9, wbits=-15)
+    text = f'{{"u":"mm","m":{_compact(assembled(mechanism))}}}'
+    packed = packer.compress(text.encode()) + packer.flush()
+    return f"#m={urlsafe_b64encode(packed).decode().rstrip('=')}"
 
 
 def single_page(given: str = "") -> str:
@@ -95,11 +114,12 @@ def single_page(given: str = "") -> str:
     )
 
 
-def page_scripts(given: str = "", *, whole: bool = False) -> dict[str, str]:
+def page_scripts(given: str = "", *, whole: bool = False, atlas: str = "") -> dict[str, str]:
     """Return the scripts by name, in the order in which the page loads them; ``whole``: nothing is loaded later."""
     own = [name for line in page_file("order.txt").splitlines()[1:] for name in line.split()]
     words = (f"Bench.words({_json(name)}, {_json(table)});\n" for name, table in languages().items())
-    data = f"Bench.templates = {_json(templates())};\nBench.given = {_json(given)};\nBench.whole = {_json(whole)};\n"
+    told = {"templates": templates(), "given": given, "whole": whole, "atlas": atlas}
+    data = "".join(f"Bench.{name} = {_json(value)};\n" for name, value in told.items())
     return {
         "theme": page_file("theme.js"),
         "workbench": mathematics() + "".join(page_file(f"{name}.js") for name in own if name != "main"),
@@ -155,8 +175,6 @@ def page_file(name: str) -> str:
 def _given(mechanism: Mechanism | None) -> str:
     if mechanism is None:
         return ""
-    from graphsynth.workbench.posing import assembled
-
     return _compact(assembled(mechanism))
 
 

@@ -85,7 +85,7 @@ def test_values_of_another_form_are_not_worked_with(path, altered, tmp_path, sta
         assert raw.execute(statement).rowcount > 0
     found = pytest.raises(FormatError, match=r"values that no catalogue holds|too big|not of a chain as its row says")
     for work in (
-        lambda own: build_site(own, tmp_path / "page", motion_links=4),
+        lambda own: build_site(own, tmp_path / "page"),
         lambda own: own.export(tmp_path / "tables") if "CAMB" not in statement else build_site(own, tmp_path / "page"),
     ):
         with found, Catalogue(path) as catalogue:
@@ -337,7 +337,7 @@ sys.exit(main(["catalog", *sys.argv[2:]]))
     [
         (["export", "FILE", "-o", "out"], "out/"),
         (["export", "FILE", "-o", "out", "--form", "parquet"], "out/"),
-        (["site", "FILE", "-o", "out", "--motion-links", "0"], "style.css"),
+        (["site", "FILE", "-o", "out"], "style.css"),
         (["merge", "FILE", "-o", "out"], "out"),
     ],
 )

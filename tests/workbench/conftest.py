@@ -10,11 +10,8 @@ import pytest
 
 from graphsynth.workbench.modules import script
 from graphsynth.workbench.writing import languages, page_file, write_workbench
+from tests.chromium import started
 
-FLAGS = (
-    "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars",
-)  # fmt: skip
 #: Scripts that need no page: functions of drawings, files, addresses.
 PURE = [name for line in page_file("order.txt").splitlines()[:2] for name in line.split()]
 
@@ -37,26 +34,6 @@ def scripts():
         return json.loads(done.stdout).get("found")
 
     return run
-
-
-def started(downloads):
-    """Chromium with its driver, or a skipped test."""
-    webdriver = pytest.importorskip("selenium.webdriver")
-    from selenium.webdriver.chrome.service import Service
-
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    driver = shutil.which("chromedriver")
-    if not chromium or not driver:
-        pytest.skip("no Chromium with chromedriver on this machine")
-    options = webdriver.ChromeOptions()
-    options.binary_location = chromium
-    for flag in FLAGS:
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    found = webdriver.Chrome(options=options, service=Service(driver))
-    found.set_script_timeout(60)
-    found.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(downloads)})
-    return found
 
 
 @pytest.fixture(scope="session")

@@ -112,8 +112,13 @@ def _digit(value: int) -> str:
     return "0123456789abcdefghijklmnopqrstuvwxyz"[min(value, 35)]
 
 
-def relatives_script(connection: sqlite3.Connection, family: Family, places: dict[str, tuple[str, int]]) -> str:
-    """Write parents and children of each chain, and what was evaluated.
+def relatives_script(
+    connection: sqlite3.Connection,
+    family: Family,
+    places: dict[str, tuple[str, int]],
+    stored: dict[int, tuple[int, list[int], str]],
+) -> str:
+    """Write parents and children of each chain, what was evaluated, and mechanisms that the catalogue holds.
 
     Relatives are places in the families of two links fewer and more, or keys.
     """
@@ -137,7 +142,9 @@ def relatives_script(connection: sqlite3.Connection, family: Family, places: dic
     for k, row in enumerate(family.rows):
         for frame, driver, *rest in connection.execute(query, (row["chain_id"],)):
             evaluations.setdefault(k, []).append([frame, str(driver), *rest])
-    return script("takeRelatives", family.name, {"parents": parents, "children": children, "evaluations": evaluations})
+    held = {k: stored[row["chain_id"]] for k, row in enumerate(family.rows) if row["chain_id"] in stored}
+    more = {"evaluations": evaluations, "mechanisms": held}
+    return script("takeRelatives", family.name, {"parents": parents, "children": children, **more})
 
 
 def groups_script(connection: sqlite3.Connection) -> str:

@@ -60,6 +60,8 @@
         if (!chain) throw new Bench.Fault("fault.key");
         return Bench.layChain(app, chain, named[2] ? { frame: Number(named[2]), drivers } : {});
       }
+      const template = /^#t=(\w+)$/.exec(location.hash), found = template && Bench.templates.find(own => own.name === template[1]);
+      if (found) return Bench.openText(app, found.text, Bench.word(`template.${found.name}`));
       const sheet = await Bench.fromFragment(location.hash);
       if (!sheet) return false;
       app.take(sheet, { select: [], say: ["said.opened", { file: Bench.word("name.address") }] });
@@ -74,6 +76,7 @@
 
   /** The browser keeps the drawing until the next visit. */
   Bench.keep = async app => {
+    if (window !== top) return; // on another page it is a picture of that page's mechanism
     try { localStorage.setItem(KEPT, await Bench.toFragment(app.sheet)); } catch { /* no storage: nothing is kept */ }
   };
   Bench.kept = async () => {

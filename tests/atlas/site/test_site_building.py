@@ -3,21 +3,24 @@
 import json
 import re
 import shutil
+from base64 import urlsafe_b64decode
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from zlib import decompress
 
 import numpy as np
 import pytest
 
-from graphsynth import MechanismGraph
+from graphsynth import Mechanism, MechanismGraph
 from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.evaluations import Evaluation
 from graphsynth.atlas.site import build_site
 from graphsynth.atlas.site.families import places_of
-from graphsynth.atlas.site.motions import choice_of
+from graphsynth.atlas.site.named import named
 from graphsynth.cli import main
-from graphsynth.core.errors import GraphsynthError, SpecError
+from graphsynth.core.errors import GraphsynthError
 from graphsynth.kinematics.dimensional.sketch import layout
-from graphsynth.structure.assur import find_fault
+from graphsynth.workbench.writing import templates
 
 DIGITS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
 
@@ -31,7 +34,7 @@ def handed(path):
 def test_the_report_tells_what_is_written(report):
     folder = report.page.parent
     files = [path for path in folder.rglob("*") if path.is_file()]
-    assert (report.chains, report.motions) == (1 + 2 + 16, 1)
+    assert (report.chains, report.dimensioned) == (1 + 2 + 16, 0)
     assert (report.files, report.size) == (len(files), sum(path.stat().st_size for path in files))
     assert report.first_load < 200_000
     assert not list(folder.parent.glob("*.building"))
@@ -80,30 +83,25 @@ def test_places_are_those_of_the_sketch():
     assert np.abs(units / 4095 - moved / moved.max()).max() <= 0.5001 / 4095
 
 
-@pytest.mark.parametrize("links", [4, 6, 8])
-def test_the_frame_and_driver_shown_are_numbers_of_the_chain(links, catalogue):
-    for (key,) in catalogue.connection.execute("SELECT key FROM chains WHERE links = ?", (links,)):
-        chain = MechanismGraph.from_key(key)
-        for frame, drivers in choice_of(chain, 3):
-            assert all(chain.neighbours[frame] >> driver & 1 for driver in drivers)
-            assert find_fault(MechanismGraph(links, chain.joints, frame=frame), drivers) is None
+def test_names_are_of_the_chains_of_their_mechanisms():
+    """Every template of the workbench has its name under the chain that it is built of."""
+    entries = named()
+    made = {entry["name"]: Mechanism.from_json(entry["text"]) for entry in templates()}
+    assert sorted(entry["template"] for entry in entries) == sorted(made)
+    for entry in entries:
+        assert made[entry["template"]].graph.without_frame().key == entry["key"], entry["name"]
+        assert all(entry[word].strip() for word in ("name", "uses", "source"))
 
 
-def test_the_motion_moves_the_chain_of_its_label(report):
-    from graphsynth import Mechanism
-
-    contents = handed(report.page.parent / "data" / "contents.js")[0]
-    assert [label for label, facts in contents["motions"].items() if "drivers" in facts] == ["1.4.4.1"]
-    facts = contents["motions"]["1.4.4.1"]
-    mechanism = Mechanism.from_toml((report.page.parent / "motions" / "1.4.4.1.toml").read_text("utf-8"))
-    assert mechanism.graph.without_frame().key == "1BAN4"
-    assert (mechanism.graph.frame, [driver.link for driver in mechanism.drivers]) == (facts["frame"], facts["drivers"])
-    assert facts["transmission"] > np.radians(25)
+def test_the_workbench_is_part_of_the_site(report):
+    folder = report.page.parent / "workbench"
+    assert 'Bench.atlas = "../index.html"' in (folder / "given.js").read_text("utf-8")
+    assert (folder / "index.html").is_file() and (folder / "chains-data.js").is_file()
 
 
 def test_the_page_is_the_same_whoever_works(report, catalogue, tmp_path):
     with ThreadPoolExecutor(2) as executor:
-        again = build_site(catalogue, tmp_path / "again", motion_links=4, executor=executor)
+        again = build_site(catalogue, tmp_path / "again", executor=executor)
     for path in report.page.parent.rglob("*"):
         twin = again.page.parent / path.relative_to(report.page.parent)
         assert path.is_dir() or path.read_bytes() == twin.read_bytes(), path.name
@@ -122,7 +120,7 @@ def test_large_families_are_not_in_the_first_load(catalogue, tmp_path, monkeypat
     from graphsynth.atlas.site import building
 
     monkeypatch.setattr(building, "_FIRST_LOAD", 500)
-    small = build_site(catalogue, tmp_path / "small", motion_links=0)
+    small = build_site(catalogue, tmp_path / "small")
     text = small.page.read_text("utf-8")
     assert "data/family-1-6.js" in text and "data/family-1-8.js" not in text
     assert (small.page.parent / "data" / "family-1-8.js").is_file()
@@ -130,9 +128,9 @@ def test_large_families_are_not_in_the_first_load(catalogue, tmp_path, monkeypat
 
 def test_an_old_page_is_replaced_and_anything_else_is_refused(catalogue, tmp_path):
     place = tmp_path / "page"
-    build_site(catalogue, place, motion_links=0)
+    build_site(catalogue, place)
     (place / "leftover.js").write_text("")
-    build_site(catalogue, place, motion_links=0)
+    build_site(catalogue, place)
     assert not (place / "leftover.js").exists()
     other = tmp_path / "other"
     other.mkdir()
@@ -144,15 +142,13 @@ def test_an_old_page_is_replaced_and_anything_else_is_refused(catalogue, tmp_pat
         build_site(catalogue, other / "thesis.tex")
     with pytest.raises(GraphsynthError, match="does not exist"):
         build_site(catalogue, tmp_path / "no" / "such" / "folder")
-    with pytest.raises(SpecError, match="motion_links = -1"):
-        build_site(catalogue, place, motion_links=-1)
 
 
 def test_a_failed_build_leaves_the_old_page(catalogue, tmp_path, monkeypatch):
     from graphsynth.atlas.site import building
 
     place = tmp_path / "page"
-    build_site(catalogue, place, motion_links=0)
+    build_site(catalogue, place)
     before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
 
     def fail(*_):
@@ -160,7 +156,7 @@ def test_a_failed_build_leaves_the_old_page(catalogue, tmp_path, monkeypatch):
 
     monkeypatch.setattr(building, "sketch_scripts", fail)
     with pytest.raises(OSError, match="No space"):
-        build_site(catalogue, place, motion_links=0)
+        build_site(catalogue, place)
     assert {path: path.read_bytes() for path in place.rglob("*") if path.is_file()} == before
     assert [path.name for path in tmp_path.iterdir()] == ["page"]
 
@@ -175,11 +171,9 @@ def test_unfinished_catalogues_are_refused(tmp_path):
 
 
 def test_the_command_writes_the_page(catalogue, tmp_path, capsys):
-    assert (
-        main(["catalog", "site", str(catalogue.path), "-o", str(tmp_path / "a"), "--motion-links", "0", "--json"]) == 0
-    )
+    assert main(["catalog", "site", str(catalogue.path), "-o", str(tmp_path / "a"), "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert (facts["chains"], facts["motions"]) == (19, 0)
+    assert (facts["chains"], facts["dimensioned"]) == (19, 0)
     assert (tmp_path / "a" / "index.html").is_file()
     assert main(["catalog", "site", str(tmp_path / "none.sqlite"), "-o", str(tmp_path / "b")]) == 2
     assert "there is no such catalogue" in capsys.readouterr().err
@@ -191,14 +185,12 @@ def test_evaluations_of_the_catalogue_are_handed_over(tmp_path):
     with Catalogue.build(path, links=[4]) as own:
         frame, driver = own.connection.execute("SELECT frame, driver FROM mechanisms").fetchone()
         own.record([Evaluation("1.4.4.1", frame, driver, "jamming", "free", 0.25, "rad", "certified")])
-        page = build_site(own, tmp_path / "page", motion_links=0)
+        page = build_site(own, tmp_path / "page")
     data = handed(page.page.parent / "data" / "relatives-1-4.js")[1]
     assert data["evaluations"] == {"0": [[frame, str(driver), "jamming", "free", 0.25, "rad", "certified"]]}
 
 
-def test_stored_dimensions_are_shown_in_motion(tmp_path):
-    from graphsynth import Mechanism
-
+def test_stored_dimensions_are_handed_to_the_workbench(tmp_path):
     with Catalogue.build(tmp_path / "own.sqlite", links=[4, 6]) as own:
         own.evaluate(links=[4])
         mechanism = own.connection.execute("SELECT data FROM evaluations WHERE kind = 'dimensions'").fetchone()[0]
@@ -211,22 +203,23 @@ def test_stored_dimensions_are_shown_in_motion(tmp_path):
             "SELECT frame, driver FROM mechanisms JOIN chains USING (chain_id) WHERE key = ?", (six,)
         ).fetchone()
         own.record([Evaluation(six, frame, driver, "dimensions", "found", data=other)])
-        page = build_site(own, tmp_path / "page", motion_links=4)
-    contents = handed(page.page.parent / "data" / "contents.js")[0]
-    shown = {label: facts.get("statement") for label, facts in contents["motions"].items()}
-    assert shown["1.4.4.1"] == "dimensions of the catalogue"
-    assert [words for label, words in shown.items() if label.startswith("1.6.")] == [
-        "those of the catalogue make no full turn"
-    ]
-    moved = Mechanism.from_toml((page.page.parent / "motions" / "1.4.4.1.toml").read_text("utf-8"))
-    assert moved == Mechanism.from_json(json.dumps(json.loads(mechanism)["mechanism"]))
+        page = build_site(own, tmp_path / "page")
+    (held,) = handed(page.page.parent / "data" / "relatives-1-4.js")[1]["mechanisms"].values()
+    assert handed(page.page.parent / "data" / "relatives-1-6.js")[1]["mechanisms"] == {}
+    assert page.dimensioned == 1
+    frame, drivers, address = held
+    packed = urlsafe_b64decode(address.removeprefix("#m=") + "==")
+    moved = Mechanism.from_json(json.dumps(json.loads(decompress(packed, wbits=-15))["m"]))
+    stored = Mechanism.from_json(json.dumps(json.loads(mechanism)["mechanism"]))
+    assert replace(moved, pose=None, points={}) == replace(stored, pose=None, points={})
     assert moved.graph.without_frame() == MechanismGraph.from_key(four)
+    assert (moved.graph.frame, [own.link for own in moved.drivers]) == (frame, drivers)
 
 
 def test_other_mobilities_and_fractionated_chains(tmp_path):
     with Catalogue.build(tmp_path / "two.sqlite", links=[5, 7], mobility=2, fractionated=True) as own:
-        page = build_site(own, tmp_path / "page", motion_links=5)
-    assert (page.chains, page.motions) == (5, 1)
+        page = build_site(own, tmp_path / "page")
+    assert page.chains == 5
     columns = handed(page.page.parent / "data" / "family-2-7.js")[1]
     assert columns["fractionated"].count("1") == 1  # two four-bars on one link
 
@@ -241,6 +234,6 @@ def test_the_page_of_twelve_links(tmp_path):
         page = build_site(whole, tmp_path / "page")
     now = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     seconds = sum(b.ru_utime + b.ru_stime - a.ru_utime - a.ru_stime for a, b in zip(used, now, strict=True))
-    assert (page.chains, page.motions) == (7105, 249)
+    assert page.chains == 7105
     assert page.first_load < 1_000_000
     assert seconds < 2 * 180

@@ -45,7 +45,7 @@ def test_damage_is_one_sentence(right, tmp_path, altered, capsys, kind):
     (page / "atlas-page.txt").write_text("older")
     words = "tables are not those" if "DROP" in WRONG[kind] else "damaged|values that no catalogue holds"
     with pytest.raises(FormatError, match=words), Catalogue(path) as catalogue:
-        build_site(catalogue, page, motion_links=1)
+        build_site(catalogue, page)
     assert main(["catalog", "site", str(path), "-o", str(page)]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and "x.sqlite" in error

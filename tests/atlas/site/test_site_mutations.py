@@ -217,7 +217,7 @@ def change(data, choice):
 
 
 COMMANDS = {
-    "site": ["site", "FILE", "-o", "OUT/page", "--workers", "1", "--motion-links", "MOTION"],
+    "site": ["site", "FILE", "-o", "OUT/page", "--workers", "1"],
     "query": ["query", "FILE"],
     "evaluations": ["query", "FILE", "--table", "evaluations", "--json"],
     "entry": ["query", "FILE", "--entry", "1.4.4.1"],
@@ -265,7 +265,7 @@ def campaign(right, altered, top, monkeypatch, seeds, window=None):
     out.mkdir()
     (inside / PRECIOUS).touch()
     for words in COMMANDS.values():  # kernels are compiled once
-        named = {"FILE": str(right), "MOTION": "4"}
+        named = {"FILE": str(right)}
         tried([named.get(word, word.replace("OUT", str(out))) for word in words])
     for seed in seeds:
         if window and (seed % 50 == 0 or faults[told:]):
@@ -277,7 +277,7 @@ def campaign(right, altered, top, monkeypatch, seeds, window=None):
         before = outside(top) | {f"a/b/c/in/x.sqlite{end}" for end in ("-wal", "-shm", "-journal")}
         content = (place / "x.sqlite").read_bytes()
         for name, words in COMMANDS.items():
-            named = {"FILE": str(place / "x.sqlite"), "MOTION": "0" if seed % 2 else "4"}
+            named = {"FILE": str(place / "x.sqlite")}
             own = [named.get(word, word.replace("OUT", str(out))) for word in words]
             found, status = tried(own)
             statuses[name, status] = statuses.get((name, status), 0) + 1
@@ -305,8 +305,7 @@ def ran(window, page):
     """Addresses of a page at which a script of its data ran."""
     found = []
     addresses = ["", "#/1.4.4.1", "#/1BgMw8g", "#/about"]
-    motions = [own.as_uri() for own in page.parent.glob("motions/*.html")]
-    for one in [*(page.as_uri() + own for own in addresses), *motions]:
+    for one in [page.as_uri() + own for own in addresses]:
         window.get("about:blank")
         window.get(one)
         window.execute_async_script("setTimeout(arguments[0], 50)")

@@ -16,7 +16,7 @@
     const sizes = [...new Map(families.map(f => [f.links, 0]))].map(([links]) => [links, families.filter(f => f.links === links).reduce((s, f) => s + f.chains, 0)]);
     const any = option("", "any");
     $("question").innerHTML = html`${[
-      html`<label class="wide">Search<input type="search" name="text" placeholder="label, key or graph6" autocomplete="off" spellcheck="false"></label>`,
+      html`<label class="wide">Search<input type="search" name="text" placeholder="name, use, label, key, graph6" autocomplete="off" spellcheck="false"></label>`,
       mobilities.length > 1 && select("mobility", "mobility", [any, ...mobilities.map(w => option(w, w))], "mobility"),
       html`<fieldset><legend>Links</legend>${sizes.map(([n, count]) =>
         html`<label class="chip"><input type="checkbox" name="links" value="${n}"><span>${n} <small>${Atlas.count(count)}</small></span></label>`)}</fieldset>`,
@@ -26,7 +26,7 @@
       select("girth", "shortest loop", [any, ...[3, 4, 5, 6, 7, 8].filter(g => Atlas.rows.some(row => row.girth === g)).map(g => option(g, `${g} links`))], "girth"),
       select("low", "class within reach", [any, ...[2, 3, 4, 5].map(c => option(c, c === 2 ? "II" : `up to ${Atlas.roman(c)}`))], "class"),
       Atlas.rows.some(row => row.fractionated) && select("fractionated", "fractionated", [any, option("no", "no"), option("yes", "yes")], "fractionated"),
-      html`<label class="check"><input type="checkbox" name="motion" value="yes"> shown in motion</label>`,
+      html`<label class="check"><input type="checkbox" name="named" value="yes"> with a name</label>`,
       select("sort", "sort by", Object.entries(Atlas.ORDERS).map(([name, [words]]) => option(name, words))),
       html`<label class="check"><input type="checkbox" name="down" value="yes"> from the end</label>
 <fieldset><legend>Show as</legend><label class="chip"><input type="radio" name="view" value="plates" checked><span>plates</span></label>

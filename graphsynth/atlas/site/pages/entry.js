@@ -45,21 +45,21 @@ ${loops} ${Atlas.term("loop")}, ${Atlas.term("mobility")} ${row.mobility}.`;
     html`<div class="scroll"><table class="matrix"><caption>${caption}</caption><thead><tr><td></td>${heads.map(h => html`<th scope="col">${h}</th>`)}</tr></thead>
 <tbody>${rows.map((row, k) => html`<tr><th scope="row">${k}</th>${row.map(v => (v ? html`<td class="one">${v}</td>` : html`<td>·</td>`))}</tr>`)}</tbody></table></div>`;
 
-  const motionOf = row => Atlas.contents.motions[row.label];
-
-  function motion(row) {
-    const facts = motionOf(row);
-    if (!facts) return html`<p class="soft">Not computed${Atlas.contents.motionLinks ? `: this atlas gives dimensions to chains of up to ${Atlas.contents.motionLinks} links` : " in this atlas"}.</p>`;
-    if (!facts.drivers) return html`<p class="soft">No dimensions were accepted: ${facts.statement}.</p>`;
-    return html`<p>Frame ${facts.frame}, driver ${listed(facts.drivers)}, ${facts.statement.startsWith("dimensions of") ? "dimensions of the catalogue" : "dimensions found for this page"}; smallest ${Atlas.term("transmission")} ${(facts.transmission * 180 / Math.PI).toFixed(1)}°,
-longest link over shortest ${facts.ratio}. Drag the driven link. <a href="motions/${row.label}.html">On a page of its own</a> · <a href="motions/${row.label}.toml" download>dimensions, TOML</a></p>
-<iframe src="motions/${row.label}.html" title="Chain ${row.label} in motion" loading="lazy"></iframe>`;
+  /** The workbench with this frame and these drivers: dimensions of the catalogue where it holds some, else found there. */
+  function bench() {
+    const {row, frame, drivers} = state, held = state.mechanism, same = held && held[0] === frame && String(held[1]) === String(drivers);
+    return `workbench/index.html${same ? held[2] : `#k=${row.key}${frame === null || !drivers.length ? "" : `&f=${frame}&d=${listed(drivers, ",")}`}`}`;
   }
 
-  /** Best choice to begin with: that of the motion, or the first driver that gives the lowest class. */
-  function firstChoice(row, graph, label) {
-    const facts = motionOf(row);
-    if (facts && facts.drivers) return {frame: facts.frame, drivers: facts.drivers};
+  function named(row) {
+    const own = Atlas.names.filter(one => one.key === row.key);
+    return own.length > 0 && html`<h2>Names and uses</h2><ul class="named">${own.map(one =>
+      html`<li><a href="workbench/index.html#t=${one.template}">${one.name}</a>: ${one.uses}. <small class="soft">${one.source}</small></li>`)}</ul>`;
+  }
+
+  /** Best choice to begin with: that of the catalogue's dimensions, or the first driver that gives the lowest class. */
+  function firstChoice(row, graph, label, mechanism) {
+    if (mechanism) return {frame: mechanism[0], drivers: mechanism[1]};
     for (const [frame] of orbitsOf(label))
       for (const drivers of driverSets(graph, frame)) {
         const groups = Atlas.groups({...graph, frame}, drivers);
@@ -130,6 +130,10 @@ longest link over shortest ${facts.ratio}. Drag the driven link. <a href="motion
     document.querySelectorAll("#entry .pick").forEach(button =>
       button.setAttribute("aria-pressed", button.dataset.frame === String(frame) && button.dataset.drivers === String(drivers)));
     saveButtons(shown);
+    const moves = frame === null || Boolean(state.groups), address = bench(), shownBench = $("bench");
+    $("openbench").href = address;
+    $("moving").hidden = !moves;
+    if (moves && shownBench.getAttribute("src") !== address) shownBench.setAttribute("src", address);
   }
 
   function groupList() {
@@ -230,10 +234,10 @@ longest link over shortest ${facts.ratio}. Drag the driven link. <a href="motion
 <p class="soft">Other frames and drivers: not computed in this catalogue.</p>`;
   }
 
-  function choiceIn(parameters, row, graph, label) {
+  function choiceIn(parameters, row, graph, label, mechanism) {
     const frame = parameters.get("frame");
     if (frame === "none") return {frame: null, drivers: []};
-    if (frame === null || !/^\d+$/.test(frame) || +frame >= graph.links) return firstChoice(row, graph, label);
+    if (frame === null || !/^\d+$/.test(frame) || +frame >= graph.links) return firstChoice(row, graph, label, mechanism);
     const near = Atlas.neighbours(graph)[+frame];
     const given = (parameters.get("driver") || "").split(",").filter(Boolean).map(Number).filter(link => near.includes(link));
     return {frame: +frame, drivers: given.length ? given : driverSets(graph, +frame).find(set => Atlas.groups({...graph, frame: +frame}, set)) || []};
@@ -248,17 +252,18 @@ longest link over shortest ${facts.ratio}. Drag the driven link. <a href="motion
       entry.innerHTML = html`<h1 tabindex="-1">Not in this atlas</h1><p>No chain here has the key or label <code>${name}</code>. <a href="#/find">Find my mechanism</a> says why.</p>`;
       return "Not in this atlas";
     }
-    const [places] = await Promise.all([Atlas.loadPlaces(row), Atlas.loadClasses()]);
+    const [places, mechanism] = await Promise.all([Atlas.loadPlaces(row), Atlas.mechanismOf(row), Atlas.loadClasses()]);
     if (state !== mark) return null;
     const graph = Atlas.decodeKey(row.key), label = Atlas.label(graph);
-    state = {row, graph, label, places, ...choiceIn(parameters, row, graph, label)};
+    state = {row, graph, label, places, mechanism, ...choiceIn(parameters, row, graph, label, mechanism)};
     const joints = graph.joints.map(([a, b]) => `${a}-${b}`);
     entry.innerHTML = html`${header(row)}<p class="lead">${sentence(row, graph)}</p>
 <div class="plate"><figure><div id="sketch" class="picture"></div><figcaption>Kinematic diagram</figcaption></figure>
 <figure><div id="levelsketch" class="picture"></div><figcaption>Graph by ${Atlas.term("levels")}</figcaption></figure></div>${controls(graph)}
 <div class="columns"><section><h2>${Atlas.term("group", "Structural groups")}</h2><div id="groups"></div></section><section><h2>Properties</h2>${properties(row, label)}</section></div>
 <h2>${Atlas.term("inversion", "Inversions")} and drivers</h2>${inversions(graph, label)}
-<h2>Motion</h2>${motion(row)}
+${named(row)}<div id="moving"><h2>Motion</h2><p>This frame and these drivers on the workbench: play it, drag it, change its dimensions. <a id="openbench" href="workbench/index.html">On a page of its own</a></p>
+<iframe id="bench" title="Chain ${row.label} on the workbench" loading="lazy"></iframe></div>
 <h2>Evaluations</h2><div id="evaluations"><p class="soft">Dimensions, transmission, jamming: not computed in this catalogue.</p></div>
 <h2>Matrices</h2><div class="columns">${matrixTable(Atlas.matrix(graph), Atlas.term("adjacency"), [...Array(graph.links).keys()])}
 ${matrixTable(Atlas.incidence(graph), Atlas.term("incidence"), joints)}</div>

@@ -37,6 +37,8 @@
   };
   Atlas.takeSketches = (name, number, text) => sketches.set(`${name}-${number}`, text);
   Atlas.takeRelatives = (name, data) => relatives.set(name, data);
+  Atlas.names = [];
+  Atlas.takeNames = data => { Atlas.names = data; };
   Atlas.takeGroups = data => { classes = data; };
 
   /** Load a script of the data folder once; the promise tells whether it came. */
@@ -98,6 +100,13 @@
     return {parents: await resolve(own.parents[row.place], -2), children: await resolve(own.children[row.place], 2)};
   };
 
+  /** The mechanism that the catalogue holds of a chain: [frame, drivers, the workbench's address], or null. */
+  Atlas.mechanismOf = async function (row) {
+    await load(`relatives-${row.family}`);
+    const held = relatives.get(row.family)?.mechanisms?.[row.place], whole = link => Number.isInteger(link) && link >= 0 && link < row.links;
+    return held && [held[0], ...held[1]].every(whole) && /^#m=[\w-]+$/.test(held[2]) ? held : null;
+  };
+
   /** What the catalogue has evaluated of a chain: [frame, drivers, kind, status, value, unit, guarantee] each. */
   Atlas.evaluationsOf = async function (row) {
     await load(`relatives-${row.family}`);
@@ -130,12 +139,13 @@
     fractionated: value => row => row.fractionated === (value === "yes"),
     low: value => row => row.low > 0 && row.low <= +value,
     contracted: value => row => row.contracted === +value,
-    motion: () => row => Boolean((Atlas.contents.motions[row.label] || {}).drivers),
+    named: () => { const keys = new Set(Atlas.names.map(one => one.key)); return row => keys.has(row.key); },
     text: value => {
       const plain = value.trim(), lower = plain.toLowerCase();
       let key = "";
       try { key = Atlas.label(Atlas.fromGraph6(plain)).key; } catch { /* no graph6 */ }
-      return row => row.label.includes(lower) || row.key.startsWith(plain) || row.key === key;
+      const keys = new Set(lower.length < 3 ? [] : Atlas.names.filter(one => `${one.name} ${one.uses}`.toLowerCase().includes(lower)).map(one => one.key));
+      return row => row.label.includes(lower) || row.key.startsWith(plain) || row.key === key || keys.has(row.key);
     },
   };
 
