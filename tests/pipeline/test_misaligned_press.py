@@ -15,6 +15,7 @@ from graphsynth.core.errors import SceneError
 from graphsynth.jamming import Bearing
 from graphsynth.jamming.binding import ContactFriction, LinkSection
 from graphsynth.jamming.joints import Misalignment, bearing_limits
+from graphsynth.mechanism.laws import Linear
 from graphsynth.pipeline.runner import execute
 from graphsynth.pipeline.scene import Scene, load_scene
 from graphsynth.pipeline.summary import facts, sentences
@@ -136,3 +137,31 @@ def test_mistakes_are_told_in_one_sentence(wrong: dict[str, Any], words: str) ->
     with pytest.raises(SceneError, match=words) as caught:
         changed(["records"], **wrong)
     assert "\n" not in str(caught.value) and "binding" in str(caught.value)
+
+
+def long_coupler(folder: Path) -> str:
+    """A file with a parallelogram whose coupler is 0.4 mm too long, from the upright position on."""
+    mechanism = gs.Mechanism.four_bar(0.2, 0.1, 0.2004, 0.1)
+    mechanism = replace(mechanism, drivers=(gs.Driver(0, 1, Linear(1.0, 1.5)),), pose=None)
+    path = folder / "long_coupler.toml"
+    path.write_text(mechanism.to_toml(), encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.long
+def test_pins_shift_where_a_mechanism_does_not_close(tmp_path: Path) -> None:
+    """With ``radial`` it turns on through its clearances or their springs; without it the range is not completed."""
+    file = (long_coupler(tmp_path),)
+    (stiff,) = execute(changed(["records"], file))["records"]
+    assert stiff.status == "rejected" and stiff.reason.startswith("the range is not completed")
+    for clearance, radial in ((0.05, 2e7), (0.14, 2e7)):
+        bearings = {"clearance_mm": clearance, "alpha_deg": 1e-3}
+        report = execute(changed(["records", "binding_tables"], file, bearings, radial=f"{radial} N/m", friction=0.0))
+        (record,) = report["records"]
+        told = {margin.name: margin.value for margin in record.margins}
+        u = 1.5 + np.linspace(0.0, math.tau, 361)
+        way = np.hypot(0.2 - 0.1 * np.cos(u), 0.1 * np.sin(u))
+        over = np.maximum(0.1004 - way - 3e-3 * clearance, 0.0)  # the shaft of the motor has no clearance
+        torque = radial / 4.0 * over * 0.02 * np.abs(np.sin(u)) / way
+        assert told["binding torque"] == pytest.approx(torque.max(), rel=1e-4, abs=1e-9)
+        assert (told["binding torque"] > 0.0) == (clearance < 0.4 / 3.0)

@@ -32,26 +32,29 @@ class JointStiffness:
     tilt : float
         Moment for each radian beyond the limit of the tilt (of a guide of its roll and of its pitch), N m/rad;
         ``math.inf`` for a joint that does not give way.
-    axial : float
-        Force for each metre beyond the axial clearance, N/m; by default infinite.
+    axial, radial : float
+        Force for each metre beyond the axial clearance, and beyond the radial one (of a guide across it, in the
+        plane), N/m; by default infinite.
 
     Examples
     --------
-    >>> JointStiffness.of_contacts(1e7, 0.02).tilt
-    2000.0
+    >>> JointStiffness.of_contacts(1e7, 0.02)
+    JointStiffness(tilt=2000.0, axial=inf, radial=20000000.0)
     """
 
     tilt: float
     axial: float = math.inf
+    radial: float = math.inf
 
     def __post_init__(self) -> None:
-        for name in ("tilt", "axial"):
+        for name in ("tilt", "axial", "radial"):
             object.__setattr__(self, name, _stiffness(name, getattr(self, name)))
 
     @classmethod
     def of_contacts(cls, radial: float, length: float, axial: float = math.inf) -> JointStiffness:
         """Stiffness of a pin that touches its hole at both ends, ``length`` (m) apart, each with ``radial`` (N/m)."""
-        return cls(0.5 * positive("radial", radial) * positive("length", length) ** 2, axial)
+        each = positive("radial", radial)
+        return cls(0.5 * each * positive("length", length) ** 2, axial, 2.0 * each)
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,8 @@ class JointWear(NamedTuple):
 
     ``moment`` (N m) and ``force`` (axial, N) are the largest; ``contact`` (N) the largest force at one end of the
     bearing; ``sliding`` (m) the distance that its surfaces slide; ``wear`` (N/m) pressure times that distance, with the
-    pressure on half the length of the bearing; ``loss`` (J) the work of friction.
+    pressure on half the length of the bearing; ``loss`` (J) the work of friction; ``push`` (N) the largest force in the
+    plane, where the mechanism does not close without pressing its pins.
     """
 
     joint: tuple[int, int]
@@ -39,6 +40,7 @@ class JointWear(NamedTuple):
     sliding: float
     wear: float
     loss: float
+    push: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,6 +56,9 @@ class BindingReport(Shown):
         the tightness, and comes back behind it; losses, always against the motion.  Infinite where nothing gives way.
     moment, force : ndarray, shape (n, joints)
         Tilting moments and axial forces in the joints, N m and N.
+    push, shift : ndarray, shape (n, joints)
+        Forces of the joints in the plane (N), and shifts of their pins (in the mechanism's unit of length), where the
+        mechanism does not close without them; else zero.
     tilt : ndarray, shape (n, names)
         Relative tilt of the joints in contact, radians; NaN where a joint is open within its limit.
     error : ndarray, shape (n,)
@@ -76,6 +81,8 @@ class BindingReport(Shown):
     force: Array
     tilt: Array
     error: Array
+    push: Array
+    shift: Array
     blocked: NDArray[np.bool_]
     names: tuple[tuple[tuple[int, int], str], ...]
     joints: tuple[tuple[int, int], ...]
@@ -102,7 +109,7 @@ class BindingReport(Shown):
     @property
     def contact(self) -> NDArray[np.bool_]:
         """Joints under load, shape (n, joints)."""
-        return np.asarray((self.moment > 0.0) | (self.force > 0.0))
+        return np.asarray((self.moment > 0.0) | (np.abs(self.force) > 0.0) | (self.push > 0.0))
 
     @property
     def peak_torque(self) -> float:
@@ -166,7 +173,7 @@ class BindingReport(Shown):
             return "Estimated: free, no joint is pressed beyond its limits."
         at, peak = self._place(self.peak_input), f"{self.peak_torque:.4g} {self._effort}"
         if self.blocked.any():
-            return f"Estimated: blocks, at input {at} a misalignment meets neither clearance nor compliance."
+            return f"Estimated: blocks, at input {at} nothing gives way: neither clearance nor compliance."
         if self.answer == "blocks":
             return f"Estimated: blocks, {peak} at input {at} exceed the motor's {self.motor_torque:.4g} {self._effort}."
         given = "" if self.motor_torque is None else f"; the motor gives {self.motor_torque:.4g} {self._effort}"
@@ -202,6 +209,7 @@ class BindingReport(Shown):
         for row in self.wear[:3]:
             told = f"moment {row.moment:.4g} N m"
             told += f", axial force {row.force:.4g} N" if row.force > 0.0 else ""
+            told += f", force in the plane {row.push:.4g} N" if row.push > 0.0 else ""
             told += f", contact {row.contact:.4g} N, wear {row.wear:.4g} N/m" if row.wear > 0.0 else ""
             rows.append((f"joint {row.joint[0]}-{row.joint[1]}", told))
         return rows
@@ -251,6 +259,7 @@ class BindingReport(Shown):
         columns = {"input": self.inputs, **columns, "blocked": self.blocked}
         for k, (a, b) in enumerate(self.joints):
             columns |= {f"moment_{a}_{b}": self.moment[:, k], f"force_{a}_{b}": self.force[:, k]}
+            columns |= {f"push_{a}_{b}": self.push[:, k], f"shift_{a}_{b}": self.shift[:, k]}
         return pd.DataFrame(columns)
 
     def plot(self, *, ax: Any = None) -> gs.Chart:

@@ -1,4 +1,7 @@
-"""The torque that binding costs over a motion: elastic, from the derivative of the least energy, and of friction."""
+"""The torque that binding costs over a motion: elastic, from the derivative of the least energy, and of friction.
+
+In the plane pins shift (`graphsynth.jamming.binding.shifts`); out of it joints tilt, at the poses that are left.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,8 @@ from graphsynth.jamming.binding.parts import (
 )
 from graphsynth.jamming.binding.report import BindingReport, JointWear
 from graphsynth.jamming.binding.rows import Rows, driven_rate, joint_rates, rows_of
-from graphsynth.jamming.joints.closure import force_rows
+from graphsynth.jamming.binding.shifts import Shifted, shifted
+from graphsynth.jamming.joints.closure import ROUND, force_rows
 from graphsynth.jamming.joints.limits import JointLimits, Misalignment
 from graphsynth.jamming.joints.program import JointProblem, check_motion, problem
 
@@ -54,16 +58,19 @@ def binding_torque(
     """Find what misaligned axes cost where the joints' limits are exceeded: energy, contact loads and drive torque.
 
     Every joint is free within its limits and a spring beyond them; links may be beams.  The least elastic energy that
-    closes all loops (small tilts) gives the loads, and its derivative by the input the torque.  See
-    theory/what-binding-costs.
+    closes all loops (small tilts) gives the loads, and its derivative by the input the torque.  Where the mechanism
+    does not close in its plane, pins shift within their radial clearance and are pressed beyond it; so the lengths may
+    be wrong, or there may be a link too many.  See theory/what-binding-costs.
 
     Parameters
     ----------
     motion : Motion
-        Of `graphsynth.simulate`; any planar mechanism.
+        Of `graphsynth.simulate`; any planar mechanism.  For one with more joints than that takes give
+        `unclosed_motion`.
     tilt, joints
         As in `graphsynth.assess_jamming`: misaligned axes, or the tilt of the first driver's axis, radians or text;
-        limits of the joints, or one tilt for all.
+        limits of the joints, or one tilt for all.  Radial clearances of `JointLimits` count where the mechanism does
+        not close without them.
     stiffness : float, JointStiffness, or mapping of (link, link) to one of these, optional
         Of the joints beyond their limits; a number is N m/rad of tilt.  Joints that are not named do not give way.
     links : LinkSection, or mapping of link to LinkSection, optional
@@ -123,6 +130,8 @@ def _report(
     motion: Motion, given: JointProblem, parts: _Parts, size: float, limit: float | None, begin: float
 ) -> BindingReport:
     """Solve all assembled samples and lay out what is found."""
+    plane = shifted(motion, given.limits, parts.springs, size)
+    motion = plane.motion
     keep = np.flatnonzero(motion.assembled)
     poses, rates = motion.poses[keep], motion.velocities[keep]
     moving = np.asarray(np.isfinite(rates).all(axis=(1, 2)))  # not in a dead-centre position, nor at a change point
@@ -130,25 +139,31 @@ def _report(
     loaded = _loaded(given, parts.springs, rows_of(given, parts.springs, parts.beams, poses, rates, size), size)
     rubbing, rate = parts.rubbing, driven_rate(motion, size)[keep]
     sliding = _sliding(given, rubbing, *joint_rates(motion.mechanism, poses, rates), size)
+    loaded = loaded.pressed(given, plane, keep)
     rubs = loaded.contact(given, rubbing) * sliding
     coefficient = np.array([0.0 if own is None else own.coefficient for own in _of(given, rubbing)])
     known = np.where(moving & (rate != 0.0), rate, math.nan)
-    elastic, losses = loaded.slope / known, rubs @ coefficient / np.abs(known)
+    elastic, losses = loaded.slope / known + plane.torque[keep], rubs @ coefficient / np.abs(known)
     elastic[loaded.least.stiff] = math.inf
     # the columns of the report, NaN where the mechanism is not assembled
     columns = {
-        "energy": loaded.least.energy,
+        "energy": loaded.least.energy + plane.energy[keep],
         "elastic_torque": elastic,
         "friction_torque": losses,
         "moment": loaded.moment,
         "force": np.abs(loaded.force),
         "tilt": loaded.tilt,
         "error": loaded.least.error,
+        "push": np.sqrt((loaded.push**2).sum(-1)),
+        "shift": plane.shift[keep][:, list(given.layout.joints)],
     }
+    whole = {name: _spread(values, keep, len(motion.inputs)) for name, values in columns.items()}
+    whole["energy"][plane.blocked] = whole["elastic_torque"][plane.blocked] = math.inf
+    whole["friction_torque"][plane.blocked] = 0.0
     return BindingReport(
         motion=motion,
-        **{name: _spread(values, keep, len(motion.inputs)) for name, values in columns.items()},
-        blocked=np.isin(np.arange(len(motion.inputs)), keep[loaded.least.stiff]),
+        **whole,
+        blocked=plane.blocked | np.isin(np.arange(len(motion.inputs)), keep[loaded.least.stiff]),
         names=given.names,
         joints=given.pairs,
         wear=_wear(given, rubbing, motion.inputs[keep], loaded, sliding),
@@ -157,7 +172,7 @@ def _report(
         problem=given,
         springs=tuple(parts.springs),
         bent=any(beam is not None for beam in parts.beams),
-        notes=_notes(motion, given, known, loaded),
+        notes=_notes(motion, given, known, loaded, plane),
         seconds=perf_counter() - begin,
     )
 
@@ -176,18 +191,37 @@ def _problem(motion: Motion, tilt: Any, joints: Any) -> JointProblem:
 
 
 class _Loaded(NamedTuple):
-    """Solution, derivative of the energy by the input (N,), moments and axial forces (N, joints), tilts (N, blocks)."""
+    """Solution, derivative of the energy by the input (N,), moments and axial forces (N, joints), tilts (N, blocks).
+
+    ``couple``, ``push`` (N, joints, 2): moments of round joints as vectors, and forces in the plane; ``guided``,
+    ``turning`` (N, joints): moments of guides out of the plane and in it.
+    """
 
     least: Least
     slope: Array
     moment: Array
     force: Array
     tilt: Array
+    couple: Array
+    guided: Array
+    push: Array
+    turning: Array
+
+    def pressed(self, given: JointProblem, plane: Shifted, keep: NDArray[np.intp]) -> _Loaded:
+        """Add what presses on the joints in the plane."""
+        own = list(given.layout.joints)
+        return self._replace(push=plane.force[keep][:, own], turning=plane.turning[keep][:, own])
+
+    def ends(self, given: JointProblem, rubbing: Sequence[ContactFriction | None]) -> Array:
+        """Return forces at both ends of all bearings, N, (2, N, joints): half the push and the couple of the moment."""
+        lengths = np.array([math.inf if own is None else own.length for own in _of(given, rubbing)])
+        half, q = 0.5 * self.push, (self.couple @ np.array([[0.0, -1.0], [1.0, 0.0]])) / lengths[:, None]
+        rest = (self.guided + self.turning) / lengths
+        return np.stack([np.sqrt(((half + sign * q) ** 2).sum(-1)) + rest for sign in (1.0, -1.0)])
 
     def contact(self, given: JointProblem, rubbing: Sequence[ContactFriction | None]) -> Array:
         """Sum of all contact forces of every joint, N: both ends of the bearing and its face; (N, joints)."""
-        lengths = np.array([math.inf if own is None else own.length for own in _of(given, rubbing)])
-        return np.asarray(2.0 * self.moment / lengths + np.abs(self.force))
+        return np.asarray(self.ends(given, rubbing).sum(axis=0) + np.abs(self.force))
 
 
 def _of(given: JointProblem, parts: Sequence[Any]) -> list[Any]:
@@ -211,11 +245,16 @@ def _loaded(given: JointProblem, springs: Sequence[JointStiffness], rows: Rows, 
     size = np.where(size > 1e-10 * size.max(axis=1, initial=0.0, keepdims=True), size, 0.0)
     slope = (y * rows.W_rate).sum(axis=1) - (least.g[:, : m.shape[1]] * m_rate).sum(axis=(1, 2))
     slope -= 0.5 * np.einsum("ni,nij,nj->n", y, rows.K_rate, y)
-    moment = np.zeros((count, joints))
+    guided, couple = np.zeros((count, joints)), np.zeros((count, joints, 2))
     for b, place in enumerate(layout.block_joint.tolist()):
-        moment[:, place] = np.hypot(moment[:, place], size[:, b])
+        if layout.block_axis[b] == ROUND:
+            couple[:, place] = np.where(size[:, b, None] > 0.0, m[:, b], 0.0)
+        else:
+            guided[:, place] = np.hypot(guided[:, place], size[:, b])
+    moment = np.hypot(guided, np.hypot(couple[..., 0], couple[..., 1]))
     soft = np.array([springs[layout.joints[place]].tilt for place in layout.block_joint.tolist()])
-    return _Loaded(least, slope, moment, y @ F.T, _tilts(layout.limit, soft, size))
+    tilts, none = _tilts(layout.limit, soft, size), np.zeros_like(couple)
+    return _Loaded(least, slope, moment, y @ F.T, tilts, couple, guided, none, none[..., 0])
 
 
 def _tilts(limit: Array, soft: Array, size: Array) -> Array:
@@ -247,27 +286,32 @@ def _wear(
     given: JointProblem, rubbing: Sequence[ContactFriction | None], u: Array, loaded: _Loaded, sliding: Array
 ) -> tuple[JointWear, ...]:
     """Rows of all joints, those that wear most first; sizes that are not known leave NaN."""
-    contact = loaded.contact(given, rubbing)
+    contact, ends = loaded.contact(given, rubbing), loaded.ends(given, rubbing).max(axis=0, initial=0.0)
+    push = np.sqrt((loaded.push**2).sum(-1))
     found = []
     for place, (pair, own) in enumerate(zip(given.pairs, _of(given, rubbing))):
-        moment, force = (float(np.abs(v[:, place]).max(initial=0.0)) for v in (loaded.moment, loaded.force))
+        moment, force, pressed = (
+            float(np.abs(v[:, place]).max(initial=0.0)) for v in (loaded.moment, loaded.force, push)
+        )
         if own is None:
-            found.append(JointWear(pair, moment, force, *[math.nan] * 4))
+            found.append(JointWear(pair, moment, force, math.nan, math.nan, math.nan, math.nan, pressed))
             continue
-        end = loaded.moment[:, place] / own.length
+        end = ends[:, place]
         way = sliding[:, place]
         worn = float(np.trapezoid(end / (own.radius * own.length) * way, u))
         lost = float(np.trapezoid(own.coefficient * contact[:, place] * way, u))
-        sums = (abs(total) for total in (float(np.trapezoid(way, u)), worn, lost))  # inputs may fall
-        found.append(JointWear(pair, moment, force, float(end.max(initial=0.0)), *sums))
+        slid, worn, lost = (abs(total) for total in (float(np.trapezoid(way, u)), worn, lost))  # inputs may fall
+        found.append(JointWear(pair, moment, force, float(end.max(initial=0.0)), slid, worn, lost, pressed))
     return tuple(sorted(found, key=lambda row: (-np.nan_to_num(row.wear, nan=-1.0), -row.moment)))
 
 
-def _notes(motion: Motion, given: JointProblem, known: Array, loaded: _Loaded) -> tuple[str, ...]:
+def _notes(motion: Motion, given: JointProblem, known: Array, loaded: _Loaded, plane: Shifted) -> tuple[str, ...]:
     notes = []
-    if given.layout.loops == 0:
+    if used := int((plane.shift.max(axis=1, initial=0.0) > 0.0).sum()):
+        notes.append(f"at {used} samples the mechanism closes only with its pins shifted")
+    if given.layout.loops == 0 and not (plane.energy.any() or plane.blocked.any()):
         notes.append("no closed loop of guided joints: nothing can bind")
-    if missing := len(motion.inputs) - len(known):
+    if missing := int((~motion.assembled & ~plane.blocked).sum()):
         notes.append(f"{missing} samples are not assembled: {motion.reason}")
     if still := int(np.isnan(known).sum()):
         notes.append(f"the torque is not known at {still} samples, in dead-centre positions or at change points")

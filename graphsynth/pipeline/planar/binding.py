@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.pipeline.display import table
-from graphsynth.pipeline.planar.stages import Moved, Part, bearings_of
+from graphsynth.pipeline.planar.stages import Moved, Part, given_bearings
 from graphsynth.pipeline.products import Finding, Outcome, Picture, Quantity, Table
 from graphsynth.pipeline.stages import Context
 
 if TYPE_CHECKING:
     from graphsynth.jamming.binding.report import BindingReport
     from graphsynth.kinematics.engine.result import Motion
-    from graphsynth.mechanism.model import Mechanism
     from graphsynth.pipeline.planar.stages_pictures import Best
 
 _COLUMNS = (
@@ -24,6 +23,7 @@ _COLUMNS = (
     "sliding [m] | .4g",
     "wear [N/m] | .4g",
     "lost [J] | .4g",
+    "force in the plane [N] | .4g",
 )
 _NOTE = (
     "Largest values over the range, those that wear most first; estimated, with small tilts. Friction takes a moment "
@@ -54,8 +54,11 @@ def binding(context: Context, moved: Moved) -> tuple[Part, dict[str, Any]]:
 
 def _report(context: Context, motion: Motion) -> BindingReport:
     from graphsynth.jamming.binding import ContactFriction, LinkSection, binding_torque
+    from graphsynth.kinematics.simulation import simulate
 
     bearings, table = context.scene.mechanism.bearings, context.scene.mechanism.binding
+    if table.radial is not None:  # as it closes by itself
+        motion = simulate(motion.mechanism, motion.inputs)
     return binding_torque(
         motion,
         **given_bearings(context, motion.mechanism),
@@ -63,15 +66,6 @@ def _report(context: Context, motion: Motion) -> BindingReport:
         friction=ContactFriction(table.friction, 1e-3 * bearings.radius_mm, 1e-3 * bearings.height_mm),
         motor_torque=table.motor,
     )
-
-
-def given_bearings(context: Context, mechanism: Mechanism) -> dict[str, Any]:
-    """Return tilt, joints and stiffness for `binding_torque`, with the middles of the tolerances of the drawing."""
-    from graphsynth.jamming.joints.drawing import drawn
-
-    limits, tilt, parts = bearings_of(context.scene.mechanism.bearings, mechanism)
-    found = drawn(mechanism, limits, tilt, parts or 0.0)
-    return {"tilt": found.tilts, "joints": found.bearings, "stiffness": context.scene.mechanism.binding.stiffness}
 
 
 def tables(context: Context, loaded: tuple[Outcome, ...], best: Best) -> tuple[Table, ...]:

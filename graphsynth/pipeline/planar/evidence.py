@@ -65,7 +65,7 @@ def binding(context: Any, effort: Effort) -> Problem:
 def binding_in_space(context: Any, effort: Effort) -> Problem:
     """Measure the elastic torque of a mechanism of the scene, links rigid."""
     from graphsynth.evidence.binding import small_tilts_problem
-    from graphsynth.pipeline.planar.binding import given_bearings
+    from graphsynth.pipeline.planar.stages import given_bearings
 
     if getattr(context.scene.mechanism, "binding", None) is None:
         raise GeometryError("the scene has no table [mechanism.binding]")

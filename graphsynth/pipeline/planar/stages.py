@@ -182,9 +182,9 @@ def move(context: Context, built: Built) -> Moved:
 
     table: PlanarTable = context.scene.mechanism
     motion = simulate(built.mechanism, np.linspace(0.0, table.motion.span, table.motion.positions + 1))
-    if not motion.completed:
-        raise Rejected("the range is not completed", motion.reason)
     angle = smallest_transmission(motion)
+    if not motion.completed:
+        motion, angle = _completed(context, motion), 0.0
     if angle < table.motion.min_transmission:
         degrees, least = math.degrees(angle), math.degrees(table.motion.min_transmission)
         raise Rejected("the transmission angle is too small", f"{degrees:.2f}°, at least {least:.10g}° is asked")
@@ -200,6 +200,23 @@ def move(context: Context, built: Built) -> Moved:
         exact("links", built.mechanism.graph.links),
     )
     return Moved(built.name, motion, margins)
+
+
+def _completed(context: Context, motion: Motion) -> Motion:
+    """Return a motion that is completed with its pins shifted, where the scene lets them; else it is `Rejected`."""
+    table = getattr(context.scene.mechanism, "binding", None)
+    if table is not None and table.radial is not None:
+        from graphsynth.jamming.binding.parts import as_stiffness, by_joint
+        from graphsynth.jamming.binding.shifts import shifted
+        from graphsynth.jamming.joints.program import problem
+
+        given = given_bearings(context, motion.mechanism)
+        springs = by_joint(motion.mechanism, "stiffness", given["stiffness"], as_stiffness, given["stiffness"])
+        limits = problem(motion.mechanism, given["joints"], given["tilt"]).limits
+        motion = shifted(motion, limits, springs, 1.0).motion
+    if not motion.completed:
+        raise Rejected("the range is not completed", motion.reason)
+    return motion
 
 
 def assess(context: Context, moved: Moved, *parts: Part) -> Record:
@@ -313,6 +330,20 @@ def bearings_of(table: BearingsTable, mechanism: Mechanism) -> tuple[JointLimits
         direction_range=(0.0, math.tau) if table.any_direction else None,
     )
     return limits, tilt, [part_of(own) for own in table.tolerances]
+
+
+def given_bearings(context: Context, mechanism: Mechanism) -> dict[str, Any]:
+    """Return tilt, joints and stiffness for `binding_torque`, with the middles of the tolerances of the drawing."""
+    from graphsynth.jamming.binding.parts import JointStiffness
+    from graphsynth.jamming.joints.drawing import drawn
+
+    bearings, table = context.scene.mechanism.bearings, context.scene.mechanism.binding
+    limits, tilt, parts = bearings_of(bearings, mechanism)
+    if table.radial is not None:
+        limits = replace(limits, radial_clearance=1e-3 * bearings.clearance_mm, radial_clearance_range=None)
+    found = drawn(mechanism, limits, tilt, parts or 0.0)
+    stiffness = JointStiffness(table.stiffness, radial=math.inf if table.radial is None else table.radial)
+    return {"tilt": found.tilts, "joints": found.bearings, "stiffness": stiffness}
 
 
 def part_of(table: ToleranceTable) -> PartTolerance:

@@ -159,9 +159,13 @@ class BearingsTable:
 
 @dataclass(frozen=True, slots=True)
 class BindingTable:
-    """What gives way where the bearings bind: their stiffness, links as bars (height across the plane); friction."""
+    """What gives way where the bearings bind: their stiffness, links as bars (height across the plane); friction.
+
+    With ``radial`` pins shift in their clearance, and are pressed beyond it, where a mechanism does not close.
+    """
 
     stiffness: Annotated[float, In("N m/rad", above=0)]
+    radial: Annotated[float | None, In("N/m", above=0)] = None
     friction: Annotated[float, In(least=0)] = 0.0
     motor: Annotated[float | None, In("Nm", above=0)] = None
     young: Annotated[float | None, In("GPa", above=0)] = None

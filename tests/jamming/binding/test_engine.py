@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import io
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import graphsynth as gs
+from graphsynth.jamming.binding import unclosed_motion
 from graphsynth.jamming.joints import RIGID, JointLimits, SlideLimits
 from graphsynth.mechanism.joints import Prismatic
 
@@ -71,8 +73,10 @@ class Guide:
         return [*force, *(self.spring.tilt * np.array(beyond))]
 
 
-def engine(motion: gs.Motion, k: int, alpha: float, pins: dict[tuple[int, int], Any]) -> tuple[float, dict[Any, float]]:
-    """Torque about the tilted axis and tilting moments of the joints of a pose."""
+def engine(
+    motion: gs.Motion, k: int, alpha: float, pins: dict[tuple[int, int], Any]
+) -> tuple[float, dict[Any, float], dict[Any, float]]:
+    """Torque about the tilted axis, tilting moments of the joints of a pose, and their forces in the plane."""
     import exudyn.itemInterface as items
     import exudyn.utilities as utilities
 
@@ -89,7 +93,8 @@ def engine(motion: gs.Motion, k: int, alpha: float, pins: dict[tuple[int, int], 
         own = {"position": [*pose[link, :2], 0.0], "rotationMatrix": tilted @ turn if link == driver.link else turn}
         kind = exu.NodeType.RotationRxyz
         bodies[link] = utilities.AddRigidBody(system, inertia, nodeType=kind, gravity=[0.0] * 3, **own)[1]
-    read, held = {}, -1
+    read: dict[Any, Any] = {}
+    pushed, held = {}, -1
     for joint in mechanism.joints:
         ends = ((joint.a, joint.at_a), (joint.b, joint.at_b))  # type: ignore[union-attr]
         marks = [
@@ -111,6 +116,12 @@ def engine(motion: gs.Motion, k: int, alpha: float, pins: dict[tuple[int, int], 
             held = sensor
         else:
             read[joint.pair] = sensor
+            force = {
+                "objectNumber": thing,
+                "storeInternal": True,
+                "outputVariableType": exu.OutputVariableType.ForceLocal,
+            }
+            pushed[joint.pair] = system.AddSensor(items.SensorObject(**force))
     system.Assemble()
     exu.config.suppressWarnings = True
     settings = exu.SimulationSettings()
@@ -123,9 +134,13 @@ def engine(motion: gs.Motion, k: int, alpha: float, pins: dict[tuple[int, int], 
         try:
             system.SolveStatic(settings)
         except Exception:  # its solver has no line search, and may go to and fro between two contacts
-            return math.nan, dict.fromkeys(read, math.nan)
-    moments = {pair: float(np.hypot(*system.GetSensorStoredData(own)[-1][1:3])) for pair, own in read.items()}
-    return -float(system.GetSensorStoredData(held)[-1][3]), moments
+            nothing = dict.fromkeys(read, math.nan)
+            return math.nan, nothing, nothing
+    moments, forces = (
+        {pair: float(np.hypot(*system.GetSensorStoredData(own)[-1][1:3])) for pair, own in part.items()}
+        for part in (read, pushed)
+    )
+    return -float(system.GetSensorStoredData(held)[-1][3]), moments, forces
 
 
 def pins_of(mechanism: gs.Mechanism, seed: int, axial: float, size: float) -> dict[tuple[int, int], Any]:
@@ -168,3 +183,41 @@ def test_against_a_general_engine(name: str, alpha: float, axial: float, size: f
         if pair in pins:
             moments = np.array([own[1][pair] for own in found])
             np.testing.assert_allclose(moments[solved], report.moment[solved, k], atol=alpha**2 * report.moment.max())
+
+
+def pressed(mechanism: gs.Mechanism, inputs: Array, radial: float, clearance: float) -> Any:
+    """Report in the plane, all pins alike but that of the motor, which is rigid; and the engine's pins."""
+    five = mechanism.graph.links == 5
+    motion = unclosed_motion(mechanism, inputs) if five else mechanism.simulate(inputs, events=False)
+    joints = {joint.pair: JointLimits(math.inf, 0.0, radial_clearance=clearance) for joint in mechanism.joints}
+    joints[mechanism.drivers[0].pair] = RIGID
+    springs = {pair: gs.JointStiffness(1.0, 1.0, 2.0 * radial) for pair in joints}
+    springs[mechanism.drivers[0].pair] = gs.JointStiffness(1.0)
+    report = motion.binding(tilt=(), joints=joints, stiffness=springs)
+    pins = {pair: Pin(0.02, clearance, 0.0, radial) for pair in joints if pair != mechanism.drivers[0].pair}
+    return report, pins
+
+
+@pytest.mark.parametrize("name", ["tension", "compression", "three cranks"])
+def test_shifts_against_a_general_engine(three_cranks: Callable[[float], gs.Mechanism], name: str) -> None:
+    """Links in line that are too short and too long, and a crank too many."""
+    mechanism = {
+        "tension": gs.Mechanism.four_bar(0.2, 0.1, 0.15, 0.1496),
+        "compression": gs.Mechanism.four_bar(0.2, 0.1, 0.2004, 0.1),
+        "three cranks": three_cranks(3e-4),
+    }[name]
+    middle = {"tension": 180.0, "compression": 360.0, "three cranks": 60.0}[name]
+    inputs = np.radians(np.linspace(middle - 20.0, middle + 20.0, 21))
+    report, pins = pressed(mechanism, inputs, 1e7, 4e-5)
+    loaded = np.flatnonzero(report.energy > 0.1 * report.energy.max())
+    assert len(loaded) > 2
+    found = [engine(report.motion, int(k), 0.0, pins) for k in loaded]
+    torque = np.array([own[0] for own in found])
+    solved = np.isfinite(torque)
+    assert solved.sum() > 2
+    most = 0.1 * report.push.max()  # a force at the end of the crank; the engine's weak springs change 2e-5 of it
+    np.testing.assert_allclose(torque[solved], report.elastic_torque[loaded][solved], atol=1e-4 * most)
+    for k, pair in enumerate(report.joints):
+        if pair in pins:
+            forces = np.array([own[2][pair] for own in found])[solved]
+            np.testing.assert_allclose(forces, report.push[loaded, k][solved], rtol=1e-4)
