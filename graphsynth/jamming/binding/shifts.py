@@ -71,10 +71,6 @@ def unclosed_motion(mechanism: Mechanism, inputs: Any) -> Motion:
     from graphsynth.kinematics.engine.inputs import monotonic
     from graphsynth.kinematics.engine.result import Closure, Motion
 
-    if not isinstance(mechanism, Mechanism):
-        raise GeometryError(
-            f"{type(mechanism).__name__} is not a Mechanism; a Motion is given to binding_torque itself"
-        )
     if mechanism.pose is None or not mechanism.drivers:
         raise GeometryError("the mechanism has no pose or no driver to start from; give both")
     u, links = monotonic(angles("inputs", inputs)), mechanism.graph.links
