@@ -50,6 +50,7 @@ from .binding.parts import (
     LinkSection as LinkSection,
 )
 from .binding.report import BindingReport as BindingReport, JointWear as JointWear
+from .binding.shifts import unclosed_motion as unclosed_motion
 from .binding.torque import binding_torque as binding_torque
 from .chance.allocation import (
     Allocation as Allocation,
