@@ -50,8 +50,7 @@ from .binding.parts import (
     LinkSection as LinkSection,
 )
 from .binding.report import BindingReport as BindingReport, JointWear as JointWear
-from .binding.shifts import unclosed_motion as unclosed_motion
-from .binding.torque import binding_torque as binding_torque
+from .binding import binding_torque as binding_torque, unclosed_motion as unclosed_motion
 from .chance.allocation import (
     Allocation as Allocation,
     Grade as Grade,
