@@ -44,13 +44,13 @@ from .bearing.limits import (
 )
 from .bearing.parameters import Range as Range, ToleranceBox as ToleranceBox, spread as spread
 from .bearing.sweep import TurnPartition as TurnPartition, sweep_linkage as sweep_linkage, sweep_turn as sweep_turn
+from .binding import binding_torque as binding_torque, unclosed_motion as unclosed_motion
 from .binding.parts import (
     ContactFriction as ContactFriction,
     JointStiffness as JointStiffness,
     LinkSection as LinkSection,
 )
 from .binding.report import BindingReport as BindingReport, JointWear as JointWear
-from .binding import binding_torque as binding_torque, unclosed_motion as unclosed_motion
 from .chance.allocation import (
     Allocation as Allocation,
     Grade as Grade,
