@@ -21,7 +21,7 @@ from graphsynth.dynamics.model import DynamicModel, Rack, Rigid
 from graphsynth.dynamics.motors import electric
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.inputs import coordinates
-from graphsynth.kinematics.engine.program import ROWS
+from graphsynth.kinematics.engine.program import equations
 from graphsynth.mechanism.joints import Cam, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
 
@@ -324,21 +324,15 @@ def joint_rows(joint: Any) -> list[Row]:
         row = [0.0] * 12
         row[codes.PBX], row[codes.PBY], row[codes.TX], row[codes.TY], row[codes.RA] = *joint.centre, *e, joint.radius
         return [(RACK, joint.rack, joint.pinion, row)]
+    own = [joint]
     if isinstance(joint, Rigid):
-        guide = Prismatic(joint.a, joint.b, joint.at_a, joint.at_b, joint.angle_a, joint.angle_b)
-        size = np.array(guide.row())
-        kinds = [*ROWS["R"](size), *ROWS["P"](size)[1:]]
-    else:
-        size = np.array(joint.row())
-        kinds = ROWS[joint.kind](size)
-    more = [*(part for pair in joint.harmonics for part in pair), 0.0] if isinstance(joint, Cam) else []
-    found = []
-    for kind, own in kinds:
-        row = [*joint.at_a, *joint.at_b, 1.0, 0.0, *[0.0] * 6]
-        for column, value in own.items():
-            row[column] = float(value)
-        found.append((kind, joint.a, joint.b, [*row, *more]))
-    return found
+        ends = joint.a, joint.b, joint.at_a, joint.at_b
+        own = [Revolute(*ends), Prismatic(*ends, joint.angle_a, joint.angle_b)]
+    rows, table = zip(*(equations([one], np.array([[one.row()]])) for one in own))
+    kinds, numbers = np.concatenate(rows)[:, 0].tolist(), np.concatenate(table, axis=1)[0].tolist()
+    more = [0.0] if isinstance(joint, Cam) else []
+    found = [(kind, joint.a, joint.b, [*row, *more]) for kind, row in zip(kinds, numbers)]
+    return [*found[:2], *found[3:]] if isinstance(joint, Rigid) else found
 
 
 def driver_row(model: DynamicModel, driver: Driver, centres: Array, slot: int) -> Row:

@@ -25,9 +25,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from graphsynth.core.compilation import named
 from graphsynth.core.errors import GraphError
 from graphsynth.structure.connectivity import bits
-from graphsynth.structure.rigidity import PebbleGame, is_sparse, rigid_bodies
+from graphsynth.structure.rigidity import is_sparse, rigid_bodies
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import Joint, MechanismGraph
@@ -128,22 +129,24 @@ class Fault:
 
 
 class _System:
-    """Bodies, constraints between them, and their assignment to bodies.
+    """Bodies, constraints between them, and what :func:`.pebbles.divide` makes of them.
 
     ``base`` is placed from the start: the frame, or a link of a floating body; ``within`` masks the links that count.
     """
 
     def __init__(self, graph: MechanismGraph, drivers: tuple[Joint, ...], base: int, within: int = -1) -> None:
+        import numpy as np
+
         self.graph = graph
         self.drivers = drivers
-        #: for each link the smallest link of its body
-        self.body_of = list(range(graph.links))
-        self.refused = 0  #: bodies with too many constraints from the start: drivers that close a loop
-        for a, b, mobility in drivers:
-            if mobility == 1:
-                low, high = sorted((self.body_of[a], self.body_of[b]))
-                self.refused |= (low == high or self.refused >> high & 1) << low
-                self.body_of = [low if body == high else body for body in self.body_of]
+        counts = np.array([within >> link & 1 for link in range(graph.links)], dtype=np.bool_)
+        joints = np.array([(*joint, joint in drivers) for joint in graph.joints], dtype=np.int64).reshape(-1, 4)
+        body, group, marks = (np.empty(graph.links, dtype=np.int64) for _ in range(3))
+        (divide,) = named("graphsynth.structure.pebbles", "divide")
+        #: what stands in the way of groups: a code of :mod:`.pebbles`
+        self.fault = int(divide(joints, counts, base, graph.space, body, group, marks))
+        #: for each link the smallest link of its body, the number of its group, and marks of a fault
+        self.body_of, self.group_of, self.marks = body.tolist(), group.tolist(), marks.tolist()
         self.placed = self.body_of[base]
         #: (body, body, mobility left, joint); a driven joint keeps one freedom less.
         self.constraints = [
@@ -151,22 +154,13 @@ class _System:
             for j in graph.joints
             if within >> j.a & within >> j.b & 1 and not (j.mobility == 1 and j in drivers)
         ]
-        self.moving = sorted({own for k, own in enumerate(self.body_of) if within >> k & 1 and own != self.placed})
-        self.game = PebbleGame(graph.space if link in self.moving else 0 for link in range(graph.links))
-
-    def assign(self) -> int:
-        """Assign the constraints; return a bit mask of bodies that have too many, or 0."""
-        refused = self.refused
-        for a, b, mobility, _ in self.constraints:
-            for _ in range(self.graph.space - mobility):
-                # A constraint inside one body is one too many whatever the assignment.
-                if (a == b or not self.game.insert(a, b, 0)) and not refused:
-                    refused = self.game.reach(a, b)
-        return refused
 
     def links_of(self, bodies: Iterable[int]) -> tuple[int, ...]:
         wanted = set(bodies)
         return tuple(link for link, body in enumerate(self.body_of) if body in wanted)
+
+    def marked(self, bit: int) -> tuple[int, ...]:
+        return tuple(link for link, marks in enumerate(self.marks) if marks & bit)
 
     def inner(self, group: int) -> list[tuple[int, int, int]]:
         """Return the constraints ``(body, body, mobility)`` inside a set of bodies."""
@@ -174,20 +168,10 @@ class _System:
 
     def groups(self) -> list[int]:
         """Return the groups as bit masks of bodies, in the order of assembly."""
-        reach = {body: self.game.reach(body) for body in self.moving}
-        left: dict[int, int] = {}
-        for body in self.moving:
-            group = sum(1 << other for other in bits(reach[body]) if other in reach and reach[other] >> body & 1)
-            left[group] = reach[body]
-        placed = 1 << self.placed
-        ordered = []
-        while left:
-            # dicts keep the order of the smallest body
-            group = next(group for group, needs in left.items() if not needs & ~(group | placed))
-            del left[group]
-            placed |= group
-            ordered.append(group)
-        return ordered
+        masks = [0] * (1 + max(self.group_of))
+        for body, number in zip(self.body_of, self.group_of):
+            masks[max(number, 0)] |= 1 << body
+        return masks[1:]
 
 
 def find_fault(mechanism: MechanismGraph, drivers: Iterable[int | tuple[int, int]]) -> Fault | None:
@@ -230,12 +214,13 @@ def _system_of(graph: MechanismGraph, drivers: Iterable[int | tuple[int, int]]) 
 
 
 def _fault(system: _System) -> Fault | None:
-    """Assign the constraints of a fresh system; return what stands in the way of groups."""
+    """Return what stands in the way of groups."""
+    from graphsynth.structure import pebbles
+
     graph, given = system.graph, len(system.drivers)
-    refused = system.assign()
-    too_many = system.links_of(bits(refused & ~(1 << system.placed))) or system.links_of(bits(refused))
-    game = system.game
-    free = system.links_of(body for body in system.moving if any(game.free[k] for k in bits(game.reach(body))))
+    marked, free = system.marked(pebbles.TOO_MANY), system.marked(pebbles.FREE)
+    too_many = tuple(link for link in marked if system.body_of[link] != system.placed) or marked
+    refused = system.fault == pebbles.CROWDED
     if graph.mobility != given:
         text = f"mobility {graph.mobility} needs {graph.mobility} driver{'s' * (graph.mobility != 1)}, not {given}"
         if graph.mobility < 0:
@@ -246,15 +231,9 @@ def _fault(system: _System) -> Fault | None:
     if refused:
         text = f"links {_list(too_many)} have too many constraints with these drivers, and links {_list(free)}"
         return Fault("over-constrained", too_many, text + " remain free; drive another joint")
-    for group in system.groups():
-        # Moving bodies that no assignment can save: more than Pi (|S| - 1) constraints among themselves.
-        game = PebbleGame([graph.space] * graph.links)
-        for a, b, mobility in system.inner(group):
-            for _ in range(graph.space - mobility):
-                if not game.insert(a, b, graph.space):
-                    links = system.links_of(bits(game.reach(a, b)))
-                    text = f"moving links {_list(links)} have too many constraints among themselves; remove a joint"
-                    return Fault("over-constrained", links, text)
+    if system.fault == pebbles.CROWDED_INSIDE:
+        text = f"moving links {_list(marked)} have too many constraints among themselves; remove a joint"
+        return Fault("over-constrained", marked, text)
     return None
 
 
@@ -301,9 +280,7 @@ def _groups(system: _System) -> tuple[AssurGroup, ...]:
         floating: list[AssurGroup] = []
         for rigid in locked:  # bodies rigid among themselves are assembled on the smallest of them
             links = system.links_of(bits(rigid))
-            part = _System(system.graph, system.drivers, links[0], sum(1 << link for link in links))
-            part.assign()
-            floating += _groups(part)
+            floating += _groups(_System(system.graph, system.drivers, links[0], sum(1 << link for link in links)))
         inner, outer, contours, stage = [], [], [], 0
         for a, b, mobility, joint in system.constraints:
             near, far = (a, b) if mask >> a & 1 else (b, a)

@@ -10,7 +10,7 @@ import pytest
 
 from graphsynth.kinematics.engine import outlines
 from graphsynth.kinematics.engine.kernels.dragging import drag
-from graphsynth.kinematics.engine.program import compile_program
+from graphsynth.kinematics.engine.program import compile_program, equations
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.constraints import characteristic_length, jacobian, residual
 from graphsynth.mechanism.joints import Prismatic, Revolute
@@ -18,7 +18,6 @@ from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
-from .planned import equations
 from .random_mechanisms import random_mechanism
 
 pytestmark = pytest.mark.long  # kernels that the native library does not hold are compiled
@@ -35,7 +34,7 @@ def pulled(
     mechanism: Mechanism, pose: Any, link: int, at: Any, target: Any, way: Any
 ) -> tuple[np.ndarray, list[float]]:
     """Pose and what was found after one pull."""
-    rows, table = equations(mechanism)
+    rows, table = equations(mechanism.joints, mechanism.dimensions[None])
     poses, found = np.array(pose, dtype=np.float64), np.zeros(3)
     points = np.asarray(at, dtype=np.float64), np.asarray(target, dtype=np.float64)
     drag(rows, table[0], mechanism.frame, poses, link, *points, way, characteristic_length(mechanism), found)

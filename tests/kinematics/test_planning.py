@@ -1,4 +1,4 @@
-"""Programs of mechanisms: those of the planning kernels beside those of the library."""
+"""Programs of mechanisms: those of the kernels beside those of plain Python, and what every program has to be."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from graphsynth.core.errors import GeometryError
-from graphsynth.kinematics.engine import codes, outlines
+from graphsynth.core.errors import GeometryError, GraphError
+from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
@@ -17,24 +17,23 @@ from graphsynth.structure.assur import find_fault
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis.api import enumerate_chains
 
-from .planned import program
+from .plain_program import plain_program
 from .random_mechanisms import random_mechanism
-
-pytestmark = pytest.mark.long  # kernels that the native library does not hold are compiled
 
 
 def agree(mechanism: Mechanism, dimensions: Any = None) -> bool:
-    """Whether kernels and library make the same program, or both refuse it; numbers equal to rounding."""
-    sizes = mechanism.dimensions[None] if dimensions is None else dimensions
-    fault, link, tables, gears = program(mechanism, sizes)
+    """Whether both make the same program, numbers equal to rounding, or refuse it with the same sentence."""
     try:
-        known = compile_program(mechanism, dimensions)
-    except GeometryError as error:
-        assert fault and (fault == outlines.NO_GROUPS or f"link {link} " in str(error))
+        tables, steps, gears = plain_program(mechanism, dimensions)
+    except (GeometryError, GraphError) as error:
+        with pytest.raises(GeometryError) as found:
+            compile_program(mechanism, dimensions)
+        assert str(found.value).removeprefix("the mechanism cannot be simulated: ") == str(error)
         return False
-    assert fault == outlines.SOLVABLE and tables is not None
-    assert gears.tolist() == known.gears.tolist()
-    for name, own, plain in zip(codes.Tables._fields, tables, known.tables):
+    program = compile_program(mechanism, dimensions)
+    assert [(s.code, s.group, s.links, s.kind, s.core) for s in program.steps] == steps
+    assert program.gears.tolist() == gears
+    for name, own, plain in zip(codes.Tables._fields, program.tables, tables):
         assert own.dtype == plain.dtype and own.shape == plain.shape and own.flags.c_contiguous, name
         if own.dtype == np.float64:  # sums of products are rounded once more or less
             assert np.abs(own - plain).max(initial=0.0) <= 1e-15 * max(1.0, float(np.abs(plain).max(initial=0.0))), name
@@ -43,7 +42,7 @@ def agree(mechanism: Mechanism, dimensions: Any = None) -> bool:
     return True
 
 
-def test_programs_of_random_mechanisms_are_those_of_the_library() -> None:
+def test_programs_of_random_mechanisms_are_those_of_plain_python() -> None:
     random, same = np.random.default_rng(7), 0
     for k in range(60):
         mechanism = random_mechanism(random, sliding=(0.0, 0.2, 0.6)[k % 3])
@@ -78,8 +77,9 @@ def all_drivers(links: int) -> Any:
                     yield graph, (joint.a, joint.b)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("links", [4, 6, 8, pytest.param(10, marks=pytest.mark.slow)])
-def test_programs_of_all_chains_are_those_of_the_library(links: int) -> None:
+def test_programs_of_all_chains_are_those_of_plain_python(links: int) -> None:
     random, count = np.random.default_rng(links), 0
     for graph, driver in all_drivers(links):
         count += 1
@@ -105,3 +105,9 @@ def test_several_drivers_and_drivers_away_from_the_frame() -> None:
         graph = MechanismGraph(links, chosen, frame=int(random.integers(links)))
         found += agree(dressed(graph, chosen[:mobility], 0.3, random))
     assert found >= 5
+
+
+def test_a_loop_of_drivers_is_over_constrained() -> None:
+    graph = MechanismGraph(4, [(0, 2), (0, 3), (2, 3)], frame=1)
+    fault = find_fault(graph, [(0, 3), (0, 2), (2, 3)])
+    assert fault is not None and fault.kind == "over-constrained" and fault.links == (0, 2, 3)

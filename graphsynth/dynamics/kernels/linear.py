@@ -14,14 +14,6 @@ def clear(M):
 
 
 @kernel
-def copy(M, out):
-    """Copy ``M`` into ``out``."""
-    for i in range(M.shape[0]):
-        for j in range(M.shape[1]):
-            out[i, j] = M[i, j]
-
-
-@kernel
 def factorise(M, order):
     """LU factors with row exchange in place; False for a singular matrix."""
     m = M.shape[0]

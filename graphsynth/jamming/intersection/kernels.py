@@ -31,6 +31,13 @@ def above(x):
     return x + (PHI * abs(x) + ETA)
 
 
+@kernel(forceinline=True)
+def put(box, place):
+    """Write a box into a place (a slice assignment compiles to far more)."""
+    for k in range(4):
+        place[k] = box[k]
+
+
 @kernel
 def levels(xl, xh, yl, yh, data):
     """Bounds of both left-hand sides over a box: circle lo, hi, ellipse lo, hi."""
@@ -141,7 +148,7 @@ def inflate(domain, data, out, factor):
 @kernel
 def polish(domain, data, out, row):
     """Shrink the enclosure of the intersection that is proved in ``domain``; domain and enclosure go into ``row``."""
-    row[:4] = domain
+    put(domain, row)
     lo0, hi0, lo1, hi1 = max(domain[0], out[0]), min(domain[1], out[1]), max(domain[2], out[2]), min(domain[3], out[3])
     for _ in range(POLISH):
         if not image(lo0, hi0, lo1, hi1, data, out) < np.inf:
@@ -169,8 +176,8 @@ def search(queue, state, kept, inner, proved, data, tolerance, limit):
     box, out, domain = np.empty(4), np.empty(4), np.empty(4)
     while state[HEAD] < state[TAIL] and state[TESTED] < limit:
         row = queue[state[HEAD]]
-        for k in range(4):
-            box[k] = domain[k] = row[k]
+        put(row, box)
+        put(row, domain)
         state[HEAD] += 1
         state[TESTED] += 1
         if known(box, proved, state[PROVED]):
@@ -183,12 +190,12 @@ def search(queue, state, kept, inner, proved, data, tolerance, limit):
         found = kind == UNIQUE
         if not found and kind == UNDECIDED and norm < 1.0:
             for factor in (2.0, 1.2):
-                domain[:] = box
+                put(box, domain)
                 if inflate(domain, data, out, factor):
                     found = True
                     break
         elif found:
-            domain[:] = box
+            put(box, domain)
         # a new intersection is kept once, with the domain in which it is the only one
         if found and state[PROVED] < proved.shape[0]:
             if not known(out, proved, state[PROVED]):
@@ -201,13 +208,12 @@ def search(queue, state, kept, inner, proved, data, tolerance, limit):
         middle = 0.5 * (box[0] + box[1]) if wide >= high else 0.5 * (box[2] + box[3])
         side = 0 if wide >= high else 2
         if kind == INNER or max(wide, high) <= tolerance or not box[side] < middle < box[side + 1]:
-            kept[state[KEPT]] = box
+            put(box, kept[state[KEPT]])
             inner[state[KEPT]] = kind == INNER
             state[KEPT] += 1
             continue
         for half in range(2):
             row = queue[state[TAIL]]
-            for k in range(4):
-                row[k] = box[k]
+            put(box, row)
             row[side + 1 - half] = middle
             state[TAIL] += 1

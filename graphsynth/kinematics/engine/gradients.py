@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import finite_array
 from graphsynth.core.compilation import named
 from graphsynth.core.errors import GeometryError
-from graphsynth.kinematics.engine import codes
-from graphsynth.kinematics.engine.program import Number, decomposed, joint_rows
+from graphsynth.kinematics.engine.program import decomposed, equations
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Mechanism
 
@@ -186,18 +185,18 @@ def _adjoint(mechanism: Mechanism, sizes: Array) -> _Adjoint:
     pairs = {joint.pair: k for k, joint in enumerate(mechanism.joints)}
     driven = {driver.pair: (k, driver) for k, driver in enumerate(mechanism.drivers)}
     placed, steps = {mechanism.frame}, []
+    known, numbers = equations(mechanism.joints, sizes, mechanism.drivers)
     every: list[int] = []
     rows: list[list[int]] = []
-    numbers: list[list[Number]] = []
+    picked: list[int] = []
 
     def general(group: tuple[int, ...], own: list[int]) -> None:
         place = {link: k for k, link in enumerate(group)}
         first = len(rows)
-        for k in own:
-            joint = mechanism.joints[k]
-            for kind, a, b, parameters in joint_rows(joint, sizes[:, k], driven.get(joint.pair)):
-                rows.append([kind, a, b, place.get(a, -1), place.get(b, -1), k])
-                numbers.append(parameters)
+        for r in (int(r) for k in own for r in np.flatnonzero(known[:, 5] == k)):
+            kind, a, b, _, _, k = known[r].tolist()
+            rows.append([kind, a, b, place.get(a, -1), place.get(b, -1), k])
+            picked.append(r)
         steps.append([_GENERAL, first, len(rows) - first, len(every), 0, 0])
         every.extend(group)
 
@@ -225,12 +224,9 @@ def _adjoint(mechanism: Mechanism, sizes: Array) -> _Adjoint:
         else:
             general(group.links, own)
         placed |= inside
-    width = max([codes.ROW_WIDTH, *map(len, numbers)])
-    table = np.zeros((len(sizes), len(rows), width))
-    for k, parameters in enumerate(numbers):
-        for column, value in enumerate(parameters):
-            table[:, k, column] = value
     ends = np.array([[joint.a, joint.b] for joint in mechanism.joints], dtype=np.int64)
     whole = (np.array(part, dtype=np.int64).reshape(-1, 6) for part in (steps, rows))
     first, second = whole
-    return _Adjoint(first, np.array(every or [0], dtype=np.int64), ends, second, table)
+    return _Adjoint(
+        first, np.array(every or [0], dtype=np.int64), ends, second, np.ascontiguousarray(numbers[:, picked])
+    )

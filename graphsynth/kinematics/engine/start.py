@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.angles import angles
+from graphsynth.core.compilation import named
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.follow import Trace, Tracker
@@ -84,16 +85,12 @@ def lines_of_centres(program: Program, poses: Array) -> Array:
 
     A pose tells them modulo a turn; the turn is that with which the angles of the two wheels fit best.
     """
-    if not len(program.gears):
-        return np.zeros((len(poses), 1))
-    _, a, b, _, _ = program.tables.rows[program.gears].T
-    p, theta = program.tables.row_table[:, program.gears], poses[..., 2]
-    place, turn = poses[..., 0] + 1j * poses[..., 1], np.exp(1j * theta)
-    on_a = place[:, a] + turn[:, a] * (p[..., codes.PAX] + 1j * p[..., codes.PAY])
-    on_b = place[:, b] + turn[:, b] * (p[..., codes.PBX] + 1j * p[..., codes.PBY])
-    phi, ra, rb = np.angle(on_b - on_a), p[..., codes.RA], p[..., codes.SIGN] * p[..., codes.RB]
-    open_by = ra * (theta[:, a] - phi) + rb * (theta[:, b] - phi - p[..., codes.H])
-    return np.ascontiguousarray(phi + math.tau * np.round(open_by / (math.tau * (ra + rb))))
+    phi = np.zeros((len(poses), max(1, len(program.gears))))
+    if len(program.gears):
+        (lines,) = named("graphsynth.kinematics.engine.kernels.advancing", "lines_of_centres")
+        for numbers, pose, own in zip(program.tables.row_table, np.ascontiguousarray(poses), phi, strict=True):
+            lines(program.tables.rows, numbers, pose, own)
+    return phi
 
 
 def with_turns(program: Program, poses: Array, q: Array) -> Program:

@@ -28,7 +28,8 @@ from graphsynth.dynamics.driven.kernels.systems import (
     jacobian,
     kinetic_energy,
 )
-from graphsynth.dynamics.kernels.linear import clear, copy, factorise, norm, substitute
+from graphsynth.dynamics.kernels.linear import clear, factorise, norm, substitute
+from graphsynth.kinematics.engine.kernels.newton import copy
 
 DONE, STEP_TOO_SMALL, TOO_MANY_STEPS, NOT_FINITE, TOO_MANY_EVENTS = 0, 1, 2, 3, 4
 NONE, OUTPUT, DEAD_CENTRE, STALL, LIMIT, FLOW = 0, 1, 2, 3, 4, 5

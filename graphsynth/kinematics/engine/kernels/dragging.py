@@ -16,7 +16,7 @@ from graphsynth.core.compilation import kernel
 from graphsynth.intervals.kernels.nearest import atan2, cos, sin
 from graphsynth.kinematics.engine import codes, outlines
 from graphsynth.kinematics.engine.kernels.advancing import lines_of_centres
-from graphsynth.kinematics.engine.kernels.newton import factor
+from graphsynth.kinematics.engine.kernels.newton import copy, factor
 from graphsynth.kinematics.engine.kernels.rows import nearest_turn, row, world
 
 #: Longest step over the characteristic length, and the shortest.
@@ -230,14 +230,6 @@ def attempt(rows, p, frame, stand, Lc, bench, y):
     for k in range(phi.shape[0]):
         phi[k] = angle[k]
     return False
-
-
-@kernel
-def copy(source, target):
-    """Copy a matrix."""
-    for i in range(source.shape[0]):
-        for j in range(source.shape[1]):
-            target[i, j] = source[i, j]
 
 
 @kernel

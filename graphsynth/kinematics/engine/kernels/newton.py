@@ -12,6 +12,14 @@ ROUNDED = 1e-4
 
 
 @kernel
+def copy(source, target):
+    """Copy a matrix (a slice assignment takes far longer to compile)."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[i, j] = source[i, j]
+
+
+@kernel
 def factor(J, n, pivots):
     """LU in place with row pivoting; returns the determinant (0 if a pivot vanishes)."""
     det = 1.0

@@ -1,13 +1,10 @@
 """From a drawn mechanism to its program: which joints and links each step works on, and the numbers of its rows."""
 
-import math
-
 import numpy as np
 
 from graphsynth.core.compilation import kernel
-from graphsynth.intervals.kernels.nearest import cos, sin
+from graphsynth.intervals.kernels.nearest import cos, hypot, sin
 from graphsynth.kinematics.engine import codes, outlines
-from graphsynth.kinematics.engine.kernels.rows import upper_half
 from graphsynth.structure.pebbles import SOUND, divide
 
 #: Columns of the numbers of a joint.
@@ -336,7 +333,7 @@ def replaced_row(joints, size, code, first, second, link, p):
     pbx, pby, ebx, eby, db, deb = seen(joints, size, second, link)
     p[codes.PAX], p[codes.PAY], p[codes.PBX], p[codes.PBY], p[codes.TX] = pax, pay, pbx, pby, 1.0
     if code == codes.DIST:
-        length = distance(ebx - eax, eby - eay)
+        length = hypot(ebx - eax, eby - eay)
         p[codes.H], p[codes.INVERSE] = length, 1.0 / length
     elif code == codes.ANGLE:
         p[codes.H] = da - dea + deb - db
@@ -344,24 +341,6 @@ def replaced_row(joints, size, code, first, second, link, p):
         p[codes.PAX], p[codes.PAY], p[codes.PBX], p[codes.PBY] = pbx, pby, pax, pay
         p[codes.TX], p[codes.TY] = cos(db), sin(db)
         p[codes.H] = cos(deb) * (eay - eby) - sin(deb) * (eax - ebx)
-
-
-@kernel
-def distance(x, y):
-    """Length of a vector, corrected by what is left of its square [Borges 2020]."""
-    x, y = abs(x), abs(y)
-    h = math.sqrt(x * x + y * y)
-    if not (1e-140 < h < 1e140):
-        big = max(x, y)
-        return big * math.sqrt((x / big) * (x / big) + (y / big) * (y / big))
-    # h^2 - x^2 - y^2 from products of halves, which are exact
-    a, b, c = upper_half(h), upper_half(x), upper_half(y)
-    square, left, right = h * h, x * x, y * y
-    rest = (square - left) - right
-    rest += (a * a - square) + 2.0 * a * (h - a) + (h - a) * (h - a)
-    rest -= (b * b - left) + 2.0 * b * (x - b) + (x - b) * (x - b)
-    rest -= (c * c - right) + 2.0 * c * (y - c) + (y - c) * (y - c)
-    return h - 0.5 * rest / h
 
 
 @kernel
@@ -405,7 +384,7 @@ def sizes_of(drawn, links):
             if count == 0:
                 x, y = numbers[k, c], numbers[k, c + 1]
             count += 1
-            spread = max(spread, distance(numbers[k, c] - x, numbers[k, c + 1] - y))
+            spread = max(spread, hypot(numbers[k, c] - x, numbers[k, c + 1] - y))
     for k in range(joints.shape[0]):
         for c in (AX, AX + 1, BX, BX + 1, RADIUS_A, RADIUS_B):
             largest = max(largest, abs(numbers[k, c]))

@@ -49,7 +49,7 @@ def make_room(size, links, gears, steps, drivers, n):
         np.zeros((links, 11)),
         np.empty((12, n)),
         np.empty(gears),
-        np.empty(steps),
+        np.zeros(steps),
         np.empty((drivers, 3)),
         np.empty(n),
     )

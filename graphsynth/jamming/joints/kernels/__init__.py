@@ -1,0 +1,1 @@
+"""Compiled kernels: how joints share misaligned axes at a pose."""
