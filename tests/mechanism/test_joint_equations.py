@@ -58,7 +58,7 @@ class Rod(joints.PlanarJoint):
 def rod(monkeypatch):
     monkeypatch.setitem(joints.KINDS, "rod", Rod)
     monkeypatch.setitem(
-        program.ROWS, "rod", lambda size: [(codes.DIST, {codes.H: size[6], codes.INVERSE: 1.0 / size[6]})]
+        program.FURTHER, "rod", lambda size: [(codes.DIST, {codes.H: size[6], codes.INVERSE: 1.0 / size[6]})]
     )
 
 

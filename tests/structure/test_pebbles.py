@@ -35,7 +35,9 @@ def agree(graph: MechanismGraph, pairs: list[tuple[int, int]]) -> bool:
     return False
 
 
-@pytest.mark.parametrize("links", [4, 6, pytest.param(8, marks=pytest.mark.long), pytest.param(10, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "links", [4, 6, pytest.param(8, marks=pytest.mark.long), pytest.param(10, marks=pytest.mark.slow)]
+)
 def test_groups_of_all_chains_are_those_of_plain_python(links: int) -> None:
     count = 0
     for chain in enumerate_chains(links):

@@ -2,23 +2,23 @@
 
 #include "support.h"
 
-/* -- memory: blocks of powers of two, each kind in a list of free ones; what is larger grows the memory ------------- */
+/* -- memory: blocks of four lengths to every power of two, each kind in a list of free ones; new ones at the end ---- */
 
 typedef union Block { union Block *next; struct { uint32_t kind; } head; char room[16]; } Block;
-enum { LEAST = 5, PAGE = 1 << 16 };
+enum { PAGE = 1 << 16 };
 
 extern char __heap_base;
 static uintptr_t top;
-static Block *spare[32];
+static Block *spare[108];
 
 __attribute__((export_name("allocate"))) void *malloc(size_t size) {
     if (size > (1u << 31) - sizeof(Block)) return NULL;
-    size_t need = size + sizeof(Block);
-    uint32_t kind = need <= 1u << LEAST ? LEAST : 32 - __builtin_clz((uint32_t)need - 1);
+    uint32_t last = (uint32_t)(size + sizeof(Block)) - 1, step = last < 64 ? 4 : 29 - __builtin_clz(last);
+    uint32_t kind = 4 * (step - 4) + (last >> step);
     Block *block = spare[kind];
     if (block) spare[kind] = block->next;
     else {
-        size_t length = (size_t)1 << kind;
+        size_t length = (size_t)((last >> step) + 1) << step;
         if (!top) top = ((uintptr_t)&__heap_base + 15) & ~(uintptr_t)15;
         uint64_t end = (uint64_t)top + length, have = (uint64_t)__builtin_wasm_memory_size(0) * PAGE;
         if (end > UINT32_MAX) return NULL;

@@ -6,7 +6,7 @@ docs/explanation/planar-engine.md, "Groups, and what is eliminated".  The kernel
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -29,6 +29,9 @@ IntArray = NDArray[np.int64]
 #: Columns of a dimension set that are lengths.
 _LENGTHS = [k for k, name in enumerate(COLUMNS) if name in ("ax", "ay", "bx", "by", "radius_a", "radius_b")]
 _PLANNING = "graphsynth.kinematics.engine.kernels.planning"
+#: Equations of kinds of joints that the kernels do not know, of mobility 2: from its numbers, each an array over the
+#: sets, to code and parameters beside the two points.
+FURTHER: dict[str, Callable[[Array], list[tuple[int, dict[int, Array]]]]] = {}
 #: What a fault of one link means.
 _FAULTS = {
     outlines.NO_LENGTH: "link {} has length 0 between its two joints; give it a positive length",
@@ -110,6 +113,7 @@ def compile_program(mechanism: Mechanism, dimensions: Array | None = None) -> Pr
     eliminated = np.zeros((len(sizes), used[outlines.GONE], codes.ELIM_WIDTH))
     drives = np.zeros((len(sizes), used[outlines.DRIVES], codes.DRIVE_WIDTH))
     fill(given, found, numbers, eliminated, drives)
+    _further(mechanism.joints, sizes, found.source[:, 1], rows, numbers)
     need = np.zeros(links, dtype=np.bool_)
     need[rows[gears, 1:3].ravel()] = True
     tables = codes.Tables(
@@ -139,7 +143,8 @@ def _shapes(mechanism: Mechanism) -> list[tuple[int, ...]]:
 def drawn(joints: Sequence[JointGeometry], sizes: Array, drivers: Sequence[Driver]) -> outlines.Drawn:
     """Return what the kernels read of joints with dimension sets (sets, joints, 10), and of drivers."""
     number = {joint.pair: k for k, joint in enumerate(joints)}
-    table = np.array([(outlines.JOINTS.index(j.kind), j.a, j.b) for j in joints], dtype=np.int64).reshape(-1, 3)
+    kinds = {kind: k for k, kind in enumerate(outlines.JOINTS)} | dict.fromkeys(FURTHER, outlines.CAMMED)
+    table = np.array([(kinds[j.kind], j.a, j.b) for j in joints], dtype=np.int64).reshape(-1, 3)
     own = [joint.harmonics if isinstance(joint, Cam) else () for joint in joints]
     waves = np.zeros((len(own), 2 * max(map(len, own), default=0)))
     for k, harmonics in enumerate(own):
@@ -160,7 +165,19 @@ def equations(joints: Sequence[JointGeometry], sizes: Array, drivers: Sequence[D
     rows, width = np.zeros((count, 6), dtype=np.int64), codes.ROW_WIDTH + given.waves.shape[1]
     table = np.zeros((len(sizes), count, width))
     joint_rows(given, rows, table)
+    _further(joints, sizes, rows[:, 5], rows, table)
     return rows, table
+
+
+def _further(joints: Sequence[JointGeometry], sizes: Array, joint_of: IntArray, rows: IntArray, table: Array) -> None:
+    """Write the equations of `FURTHER` kinds into rows that the kernels took for those of cams."""
+    for r in np.flatnonzero(rows[:, 0] == codes.CAM).tolist() if FURTHER else ():
+        k = int(joint_of[r])
+        if joints[k].kind in FURTHER:
+            ((rows[r, 0], own),) = FURTHER[joints[k].kind](sizes[:, k].T)
+            table[:, r, codes.TX :] = 0.0
+            for column, value in ({codes.TX: np.ones(len(sizes))} | own).items():
+                table[:, r, column] = value
 
 
 @lru_cache(maxsize=512)
