@@ -121,7 +121,7 @@ def page_computations() -> Recorded:
             for target in ([2.0, 1.0], [1.0, 2.0]):
                 at = np.array([0.3, 0.2])
                 dragging.drag(rows, table[0], 0, near, 2, at, np.array(target), way, length[0], found[:3].copy())
-            _tilted(mechanism, np.ascontiguousarray(pose[None]), kept)
+        _tilted(mechanism, np.ascontiguousarray(pose[None]), kept)
     return kept
 
 

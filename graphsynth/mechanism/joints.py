@@ -5,9 +5,8 @@ Complex notation below: link k carries the point p to ``r_k + exp(i theta_k) p``
 
 A new kind of joint is a class here, among `KINDS` and in `JointGeometry`: ``values`` are the left sides of its
 equations in the arithmetic of what is `Seen`, ``gradients`` their derivatives.  Its equations for the kernels stand in
-``EQUATIONS`` of `graphsynth.kinematics.engine.outlines` and ``joint_row`` of the planning kernels there, or in
-``FURTHER`` of `graphsynth.kinematics.engine.program`; its symbol in `graphsynth.drawing.symbols`, its reactions in
-`graphsynth.dynamics.reactions`.
+``EQUATIONS`` and ``joint_row`` of the planning kernels of `graphsynth.kinematics.engine`, or in ``FURTHER`` of its
+``program``; its symbol in `graphsynth.drawing.symbols`, its reactions in `graphsynth.dynamics.reactions`.
 """
 
 from __future__ import annotations
