@@ -4,6 +4,7 @@ import itertools
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -336,7 +337,8 @@ def test_tubes_of_chained_dyads_hold_every_member():
 @pytest.mark.parametrize("width", [0.02, pytest.param(0.03, marks=pytest.mark.slow)])
 def test_chained_dyads_are_decided_for_wide_boxes(width):
     """A six-bar of two dyads with 14 toleranced coordinates, at half its limit."""
-    mechanism = embody(next(iter(enumerate_chains(6))), seed=0).mechanism
+    # kept as a file, for a search finds another one where roundings differ
+    mechanism = Mechanism.from_json((Path(__file__).parent / "six_bar.json").read_text(encoding="utf-8"))
     (driver,), motion = mechanism.drivers, simulate(mechanism, TURN)
     tilt = Misalignment(driver.base, driver.link, 0.00595)
     assert assess_coupled(motion, LIMITS, tilt).smallest_scale > 2.0
