@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.shown import Shown
 from graphsynth.design.task.aims import TimedAim, beside, extreme
+from graphsynth.design.task.bounds import broken_bounds, missed_wishes, places_of
 from graphsynth.design.task.model import Moved
 from graphsynth.design.task.plans import Plan
 from graphsynth.design.task.problem import TaskProblem
@@ -43,7 +44,6 @@ from graphsynth.kinematics.dimensional.verify import (
 )
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.joints import Prismatic
-from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.mechanism.scaling import rounded
 
@@ -55,8 +55,6 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 #: What is said of targets, not of bounds.
 _MISSED = " is missed"
-#: Relative difference of a length from that of a given bar.
-_FIT = 1e-3
 #: Samples of a motion that is certified, and boxes it may take.
 _PROVED, _BOXES = 181, 20_000
 #: Distance of the bounds of the margin of binding, and the time of its proof.
@@ -147,6 +145,8 @@ class DesignedMechanism(Shown):
         Proof that the motion is one branch over the whole range; None if it was not tried.
     carriers : mapping of str to int
         Link of every name of the task.
+    wishes : mapping of str to float
+        Soft bounds that are missed, and by how much: radians, parts of a length, parts of the size of the task.
     """
 
     mechanism: Mechanism
@@ -162,6 +162,7 @@ class DesignedMechanism(Shown):
     score: float
     certificate: MotionCertificate | None
     carriers: Mapping[str, int]
+    wishes: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def key(self) -> str:
@@ -184,6 +185,7 @@ class DesignedMechanism(Shown):
             ("errors", ", ".join(f"{error:.3g}" for error in self.errors)),
             ("transmission angle", f"{math.degrees(self.transmission):.1f} deg"),
             ("size", f"{self.size:.4g}"),
+            *((f"wish {name}", f"missed by {by:.2g}") for name, by in self.wishes.items()),
             ("motion", "certified" if self.certified else "estimated"),
         ]
         return f"Mechanism of {self.links} links", rows
@@ -200,12 +202,14 @@ def judged(task: DesignTask, found: Candidate) -> DesignedMechanism:
     carriers = dict(zip(task.names, found.plan.carriers))
     errors = _errors(task, motion, carriers, found.starts) if done else (math.inf,) * len(task.targets)
     angle, ratio = smallest_transmission(motion), length_ratio(motion.mechanism)
-    places = _places(motion)
+    places = places_of(motion)
     wrong = {
         **faults(motion, task.drive == "rotation"),
-        "the transmission angle is too small": not angle >= task.transmission - SLACK,
-        "the length ratio is too large": not ratio <= task.length_ratio * (1.0 + SLACK),
-        **_bounds(task, motion, places, found.plan),
+        "the transmission angle is too small": "transmission" not in task.soft
+        and not angle >= task.transmission - SLACK,
+        "the length ratio is too large": "length_ratio" not in task.soft
+        and not ratio <= task.length_ratio * (1.0 + SLACK),
+        **broken_bounds(task, motion, places, found.plan),
     }
     for target, error in zip(task.targets, errors):
         name = type(target).__name__.removesuffix("Target").lower().replace("poses", "motion")
@@ -215,6 +219,7 @@ def judged(task: DesignTask, found: Candidate) -> DesignedMechanism:
         scale = largest_scale(motion, task.joint_tilt, task.misalignment, relative_gap=_GAP, seconds=_SECONDS)
         margin = scale.low
         wrong["its joints bind at the misalignment"] = not margin >= 1.0
+    wishes = missed_wishes(task, places, motion.mechanism, (angle, ratio)) if done else {}
     reasons = tuple(reason for reason, is_so in wrong.items() if is_so)
     size = float(abs(complex(*np.ptp(places.reshape(-1, 2), axis=0)))) if done else math.inf
     worst = max(error / target.tolerance * target.weight for target, error in zip(task.targets, errors))
@@ -222,10 +227,24 @@ def judged(task: DesignTask, found: Candidate) -> DesignedMechanism:
         worst = found.error  # a curve is as good as its mean distance
     links, weight = found.mechanism.graph.links, task.rank
     score = weight["error"] * worst + weight["links"] * links + weight["size"] * size / task.size
+    score += sum(task.soft[name] * 100.0 * by for name, by in wishes.items())
     score -= weight["transmission"] * (angle if done else 0.0)
     score -= weight["jam"] * (min(margin, 4.0) if margin == margin else 0.0)
     return DesignedMechanism(
-        found.mechanism, motion, errors, not reasons, reasons, links, size, angle, ratio, margin, score, None, carriers
+        found.mechanism,
+        motion,
+        errors,
+        not reasons,
+        reasons,
+        links,
+        size,
+        angle,
+        ratio,
+        margin,
+        score,
+        None,
+        carriers,
+        wishes,
     )
 
 
@@ -235,87 +254,6 @@ def proved(answer: DesignedMechanism, span: float) -> MotionCertificate:
 
     motion = simulate(answer.mechanism, np.linspace(0.0, span, _PROVED))
     return certify(motion, max_boxes=_BOXES, seconds=10.0)
-
-
-def _places(motion: Motion) -> Array:
-    """Places of all joints and points over the motion (samples, places, 2)."""
-    own = [motion.point(joint.a, joint.at_a).position for joint in motion.mechanism.joints]
-    return np.stack([*own, *(motion.point(name).position for name in motion.mechanism.points)], axis=1)
-
-
-def _bounds(task: DesignTask, motion: Motion, places: Array, plan: Plan) -> dict[str, bool]:
-    """Tell which bounds of the task are broken."""
-    slack, mechanism = SLACK * task.size, motion.mechanism
-    broken: dict[str, bool] = {}
-
-    def outside(box: tuple[float, ...], points: Array) -> bool:
-        low, high = np.nanmin(points.reshape(-1, 2), axis=0), np.nanmax(points.reshape(-1, 2), axis=0)
-        return bool((low < np.array(box[:2]) - slack).any() or (high > np.array(box[2:]) + slack).any())
-
-    if task.box is not None:
-        broken["it leaves the box"] = outside(task.box, places)
-    frame = [k for k, joint in enumerate(mechanism.joints) if mechanism.frame in joint.pair]
-    if task.pivot_region is not None:
-        broken["a pivot leaves its region"] = outside(task.pivot_region, places[:1, frame])
-    for joint, region in plan.regions:
-        leaves = outside(region, places[:1, [joint]])
-        broken["a pivot leaves its region"] = broken.get("a pivot leaves its region", False) or leaves
-    lengths = side_lengths(mechanism) or [1.0]
-    if task.lengths is not None:
-        broken["a length is out of its bounds"] = bool(
-            min(lengths) < task.lengths[0] * (1 - SLACK) or max(lengths) > task.lengths[1] * (1 + SLACK)
-        )
-        names = [*mechanism.points]
-        arms = [places[0, joint] - places[0, len(mechanism.joints) + names.index(name)] for name, joint in plan.idling]
-        short = any(math.hypot(*arm) < task.lengths[0] * (1 - SLACK) for arm in arms)
-        broken["a point lies at a joint, so that links do nothing"] = short
-    if task.bars:
-        lengths = side_lengths(mechanism, {*range(mechanism.graph.links)} - {mechanism.frame}) or [1.0]
-        for bar in task.bars:
-            k = min(range(len(lengths)), key=lambda k: abs(math.log(lengths[k] / bar)), default=-1)
-            fits = k >= 0 and abs(math.log(lengths.pop(k) / bar)) <= _FIT
-            broken["a given bar is not used"] = broken.get("a given bar is not used", False) or not fits
-    if task.crank is not None or task.crank_start is not None:
-        broken |= _crank_bounds(task, motion)
-    if task.symmetric:
-        broken["its curve is not symmetric"] = not _symmetric(motion, task.symmetric_point)
-    if task.linear and task.stroke is not None:
-        law = mechanism.drivers[0].law
-        stroke = abs(law.rate) if isinstance(law, Linear) else math.nan
-        broken["the stroke is out of its bounds"] = not (
-            task.stroke[0] * (1 - SLACK) <= stroke <= task.stroke[1] * (1 + SLACK)
-        )
-    return broken
-
-
-def _crank_bounds(task: DesignTask, motion: Motion) -> dict[str, bool]:
-    """Tell whether the driven link has not its length or begins elsewhere; of the motion as it is."""
-    mechanism, driven = motion.mechanism, motion.mechanism.drivers[0].link
-    own = [k for k, joint in enumerate(mechanism.joints) if driven in joint.pair and joint.kind == "R"]
-    fixed = [k for k, joint in enumerate(mechanism.joints) if mechanism.frame in joint.pair]
-    at = _places(motion)[0] @ [1.0, 1.0j]
-    pivot = next((k for k in own if k in fixed), -1)
-    ways = [at[k] - at[pivot] for k in own if k != pivot] if pivot >= 0 else []
-    broken: dict[str, bool] = {}
-    if task.crank is not None and ways:
-        broken["the crank has not its length"] = abs(math.log(abs(ways[0]) / task.crank)) > _FIT
-    if task.crank_start is not None:
-        base = at[next(k for k in fixed if k != pivot)] - at[pivot] if task.crank_from == "frame" else 1.0
-        low, high = task.crank_start
-        off = math.remainder(float(np.angle(ways[0] / base)) - 0.5 * (low + high), math.tau)
-        broken["the crank begins elsewhere"] = abs(off) > 0.5 * (high - low) + SLACK
-    return broken
-
-
-def _symmetric(motion: Motion, point: str) -> bool:
-    """Whether a point of a four-bar, its crank pin and the pivot of its follower are equally far from a joint."""
-    mechanism = motion.mechanism
-    tracing = mechanism.points[point].link
-    far = [link for link in range(4) if link not in (mechanism.frame, mechanism.drivers[0].link, tracing)]
-    middle = next(j for j in mechanism.joints if {*j.pair} == {tracing, far[0]})
-    at = middle.at_a if middle.a == tracing else middle.at_b
-    lengths = [math.dist(at, mechanism.points[point].at), *side_lengths(mechanism, [tracing, far[0]])]
-    return max(lengths) - min(lengths) <= SLACK * max(lengths)
 
 
 def signature(task: DesignTask, answer: DesignedMechanism) -> Array:

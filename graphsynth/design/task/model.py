@@ -295,7 +295,8 @@ class Model:
         ends = [(joint.a, joint.b) for joint in self.plan.design.graph.joints]
         margins = np.zeros((*frames.shape[:2], len(forms)))
         sines = transmission_sines(forms, table, ends, frames, margins).min(axis=(1, 2))
-        return np.asarray(100.0 * np.maximum(least - np.nan_to_num(sines), 0.0))
+        weight = 100.0 * self.task.soft.get("transmission", 1.0)
+        return np.asarray(weight * np.maximum(least - np.nan_to_num(sines), 0.0))
 
 
 def _rods(plan: Plan) -> list[Rod]:

@@ -54,6 +54,9 @@ def fitting(task: DesignTask, design: Design) -> Iterator[Plan]:
         return
     if task.crank_start is not None and sum(design.kinds[k] == "R" for k in design.joints_of(design.drivers[0][1])) < 2:
         return  # a driven link without a second joint that turns has no direction
+    turning = [sum(design.kinds[k] == "R" for k in design.joints_of(link)) for link in range(design.graph.links)]
+    if sum(n >= 3 for link, n in enumerate(turning) if link != design.graph.frame) < len(task.plates):
+        return
     pins = None
     if task.drive == "cylinder":
         (own,) = design.driver_joints

@@ -95,23 +95,29 @@ class TaskProblem:
             if not moved.complete.all():
                 return Exact([], np.zeros(0), np.zeros((0, model.size)), None)
             times = [aim.times(moved, u, own) for aim, own in zip(self.aims, times)]
-            worst = [rows.times.ravel() for rows in sampled_wishes(model, moved, u, math.inf)]
+            every = sampled_wishes(model, moved, u, math.inf) + sampled_wishes(model, moved, u, 1.0, soft=True)
+            worst = [rows.times.ravel() for rows in every]
             near = [at + step * _AROUND[:, None] / (len(_AROUND) // 2) ** k for at in worst]
             more = np.concatenate([own.ravel() for own in (*times, *near) if own is not None])
             moved = model.move(u, more)
         found = [aim.times(moved, u, own) for aim, own in zip(self.aims, times)]
         seen = [aim.looked(moved, own) for aim, own in zip(self.aims, found)]
-        every = [(aim.rows(own, *at, u), *at) for aim, own, at in zip(self.aims, found, seen)]
-        every += [(rows, *moved.at(rows.times)) for rows in sampled_wishes(model, moved, u, math.inf)]
-        pulled = [(values[0], model.through_ties(x[None], slopes)[0]) for values, slopes in self._pulled(every, u)]
+        looked = [(aim.rows(own, *at, u), *at) for aim, own, at in zip(self.aims, found, seen)]
+        looked += [(rows, *moved.at(rows.times)) for rows in sampled_wishes(model, moved, u, 1.0, soft=True)]
+        aimed = len(looked)
+        looked += [(rows, *moved.at(rows.times)) for rows in sampled_wishes(model, moved, u, math.inf)]
+        pulled = [(values[0], model.through_ties(x[None], slopes)[0]) for values, slopes in self._pulled(looked, u)]
         errors = [
             (values.reshape(rows.values.shape[1:]), slopes.reshape(*rows.values.shape[1:], -1))
-            for (values, slopes), (rows, _, _) in zip(pulled, every[: len(found)])
+            for (values, slopes), (rows, _, _) in zip(pulled, looked[:aimed])
         ]
+        if model.task.soft:
+            values, slopes = direct_wishes(model, u, 1.0, self.lengths, soft=True)
+            errors += [(values, model.through_ties(x[None], slopes))] if values.size else []
         direct, steep = direct_wishes(model, u, math.inf, self.lengths)
         steep = model.through_ties(x[None], steep)
-        bounds = np.concatenate([*(values for values, _ in pulled[len(found) :]), direct[0]])
-        steep = np.concatenate([*(slopes for _, slopes in pulled[len(found) :]), steep[0]])
+        bounds = np.concatenate([*(values for values, _ in pulled[aimed:]), direct[0]])
+        steep = np.concatenate([*(slopes for _, slopes in pulled[aimed:]), steep[0]])
         good = moved.complete.all() and np.isfinite(steep).all() and all(np.isfinite(J).all() for _, J in errors)
         return Exact(errors, bounds, steep, found if good else None)
 

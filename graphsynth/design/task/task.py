@@ -21,6 +21,8 @@ Turning = Literal["either", "counter-clockwise", "clockwise"]
 _SENSES = {"either": 0, "counter-clockwise": 1, "clockwise": -1}
 #: Lengths of links unless they are given, in sizes of the task.
 _SHORT, _LONG = 0.1, 6.0
+#: Bounds that may be wishes.
+SOFT = ("transmission", "length_ratio", "lengths", "box")
 #: What answers are ranked by, and how much each counts: errors in tolerances, links, size of the task, radians,
 #: the margin of binding (at most 4).
 RANKED = {"error": 1.0, "links": 0.05, "size": 0.02, "transmission": 0.1, "jam": 0.05}
@@ -37,6 +39,17 @@ def _start(name: str, given: float | str | Sequence[float | str] | None) -> tupl
     if not low <= high <= low + math.tau:
         raise GeometryError(f"{name} = {given!r}: the second limit must not be below the first, nor a turn beyond it")
     return low, high
+
+
+def _plate(name: str, sides: Sequence[float]) -> tuple[float, float, float]:
+    """Read the three sides of a triangle, which may be flat."""
+    try:
+        a, b, c = (positive(f"{name}[{k}]", side) for k, side in enumerate(sides))
+    except (TypeError, ValueError):
+        raise GeometryError(f"{name} = {sides!r} must be three distances of its joints: 1-2, 2-3, 3-1") from None
+    if 2.0 * max(a, b, c) > (a + b + c) * (1.0 + 1e-9):
+        raise GeometryError(f"{name} = {sides!r}: no side of a triangle is longer than both others; correct them")
+    return a, b, c
 
 
 Start = Kept[float | str | Sequence[float | str] | None, tuple[float, float] | None]
@@ -88,12 +101,19 @@ class DesignTask(Shown):
         follower equally far from the joint of coupler and follower (lambda-type linkages).
     bars : sequence of float
         Lengths of bars that are there and shall be used: each is a distance of two joints on a moving link.
+    plates : sequence of (float, float, float)
+        Links with three joints that are there and shall be used: distances of the first joint from the second, of the
+        second from the third, of the third from the first.  Either side may be up.
     length_ratio : float
         Longest over shortest of these distances; those of points from the joints of their link count as long ones.
     transmission : float or str
         Smallest transmission angle over the motion.
     misalignment, joint_tilt : float or str, optional
         Tilt of the driver's axis that must not make the joints bind, and that which every joint takes up (0.3 degrees).
+    soft : mapping of str to float
+        Bounds that are wishes, of "transmission", "length_ratio", "lengths", "box", each with its weight: a hundredth
+        by which one is broken (of a radian, of a length, of the size of the task) counts as much as so many tolerances
+        of a target with the weight 1.
     rank : mapping of str to float
         What counts how much in the ranking, beside the defaults: "error", "links", "size", "transmission", "jam".
 
@@ -122,10 +142,12 @@ class DesignTask(Shown):
     turning: Turning = "either"
     symmetric: bool = False
     bars: Sequence[float] = ()
+    plates: Sequence[tuple[float, float, float]] = ()
     length_ratio: float = 8.0
     transmission: Kept[float | str, float] = Kept(angle, math.radians(25.0))
     misalignment: Kept[float | str | None, float | None] = Kept(optional(angle), None)
     joint_tilt: Kept[float | str, float] = Kept(angle, math.radians(0.3))
+    soft: Mapping[str, float] = field(default_factory=dict)
     rank: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -166,6 +188,9 @@ class DesignTask(Shown):
             positive("crank", self.crank)
         self._shaped()
         put(self, "bars", tuple(positive(f"bars[{k}]", bar) for k, bar in enumerate(self.bars)))
+        put(self, "plates", tuple(_plate(f"plates[{k}]", plate) for k, plate in enumerate(self.plates)))
+        if self.plates and max(self.links) < 6:
+            raise GeometryError("no link of four-bars but the frame has three joints; allow six links for plates")
         for name in ("misalignment", "joint_tilt"):
             if getattr(self, name) is not None:
                 positive(name, getattr(self, name))
@@ -175,6 +200,9 @@ class DesignTask(Shown):
             raise GeometryError(f"length_ratio = {self.length_ratio} must be 1 or more")
         if not 0.0 <= self.transmission < 0.5 * math.pi:
             raise GeometryError(f"transmission = {self.transmission:.6g} must lie in [0, pi/2); give radians")
+        for name, value in self.soft.items():
+            choice("soft", name, SOFT)
+            positive(f"soft[{name!r}]", value)
         for name, value in self.rank.items():
             choice("rank", name, tuple(RANKED))
             finite(f"rank[{name!r}]", value)
@@ -242,7 +270,8 @@ class DesignTask(Shown):
     def sized(self) -> bool:
         """Whether the task knows a length: else a mechanism does it in any size."""
         lengths = any(isinstance(t, PathTarget | PosesTarget) or getattr(t, "slides", False) for t in self.targets)
-        return lengths or any((self.every_pivot, self.bars, self.crank, self.box, self.pivot_region, self.stroke))
+        given = self.every_pivot, self.bars, self.plates, self.crank, self.box, self.pivot_region, self.stroke
+        return lengths or any(given)
 
     @property
     def names(self) -> dict[str, bool]:

@@ -6,6 +6,8 @@ What depends on the motion is looked at where it is worst; the rest depends on t
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,17 +23,27 @@ _BEYOND, _SPARE, _UNIT = 1.03, 0.003, 0.01
 _HAIR, _LEAST, _VERGE = 1e-7, 0.02, 0.004
 
 
-def sampled_wishes(model: Model, moved: Moved, u: Unknowns, strict: float) -> list[Rows]:
+def sampled_wishes(model: Model, moved: Moved, u: Unknowns, strict: float, soft: bool = False) -> list[Rows]:
     """Return transmission angles of dyads, rods of sliders and cylinders, and the box.
 
     ``strict``: weight of the penalties; infinite for the numbers themselves, which then are negative where a bound is
-    kept.
+    kept.  ``soft``: only of the bounds that are wishes, which are not among those numbers.
     """
-    found = [_transmission(model, moved, u, corner, strict) for corner in model.corners]
-    found += [_sliding(model, moved, u, rod, strict) for rod in model.rods]
-    if model.task.box is not None:
-        found.append(_box(model, moved, u, model.task.box, strict))
+    found: list[Rows] = []
+    if (own := _weight(model, "transmission", strict, soft)) > 0.0:
+        found += [_transmission(model, moved, u, corner, own) for corner in model.corners]
+        found += [_sliding(model, moved, u, rod, own) for rod in model.rods]
+    if model.task.box is not None and (own := _weight(model, "box", strict, soft)) > 0.0:
+        found.append(_box(model, moved, u, model.task.box, own))
     return found
+
+
+def _weight(model: Model, name: str, strict: float, soft: bool) -> float:
+    """Return the weight of a bound, its own if it is a wish; 0 if it is not asked for."""
+    own = model.task.soft.get(name)
+    if own is None:
+        return 0.0 if soft else strict
+    return 0.0 if strict == math.inf else own
 
 
 def _transmission(model: Model, moved: Moved, u: Unknowns, corner: Corner, strict: float) -> Rows:
@@ -49,7 +61,7 @@ def _transmission(model: Model, moved: Moved, u: Unknowns, corner: Corner, stric
     mu = two * np.conj(one) / np.maximum(np.abs(two * one), 1e-300)
     peaks, near, share = _peaks(moved, np.abs(mu.real))
     row, least = np.arange(len(mu))[:, None], math.sin(model.task.transmission)
-    floor = max(least, _VERGE) if exact else max(_BEYOND * least, _LEAST)
+    floor = max(least, _VERGE) if exact else _asked(least)
     most = math.sqrt(1.0 - floor**2) - exact * _HAIR
     mu, one, two = mu[row, near], one[row, near], two[row, near]
     unit = 1.0 if exact else 1.0 - most
@@ -70,6 +82,11 @@ def _transmission(model: Model, moved: Moved, u: Unknowns, corner: Corner, stric
     return Rows(moved.inputs[near], values, loads, direct, 1.0 if exact else strict / _UNIT, mix=np.ones((1, 3)))
 
 
+def _asked(least: float) -> float:
+    """Return the sine that penalties ask for: a little more than the least, and less than 1."""
+    return max(min(_BEYOND * least, 0.5 * (1.0 + least)), _LEAST)
+
+
 def _sliding(model: Model, moved: Moved, u: Unknowns, rod: Rod, strict: float) -> Rows:
     """Return by how much the sine of the angle between a rod and the guide of its slider is too large, at most."""
     exact, row = strict == math.inf, np.arange(len(u.places))[:, None]
@@ -80,7 +97,7 @@ def _sliding(model: Model, moved: Moved, u: Unknowns, rod: Rod, strict: float) -
     own = turned * (way / np.maximum(np.abs(way), 1e-300) * np.exp(-1j * angle))[:, None]
     peaks, near, share = _peaks(moved, np.abs(own.imag))
     least = math.sin(model.task.transmission)
-    most = math.sqrt(1.0 - (least if exact else max(_BEYOND * least, _LEAST)) ** 2) - exact * _HAIR
+    most = math.sqrt(1.0 - (least if exact else _asked(least)) ** 2) - exact * _HAIR
     unit = 1.0 if exact else 1.0 - most
     over = (peaks - most) / unit
     at = own[row, near]
@@ -154,36 +171,44 @@ def _box(model: Model, moved: Moved, u: Unknowns, box: tuple[float, ...], strict
     return Rows(times, values, loads, direct, 1.0 if exact else strict / _UNIT)
 
 
-def direct_wishes(model: Model, u: Unknowns, strict: float, lengths: Lengths) -> tuple[Array, Array]:
+def direct_wishes(
+    model: Model, u: Unknowns, strict: float, lengths: Lengths, soft: bool = False
+) -> tuple[Array, Array]:
     """Lengths, pivots and the stroke: numbers (sets, m) and their derivatives (sets, m, size).
 
-    ``strict`` as of `sampled_wishes`; what shall be equal then comes twice, with both signs.
+    ``strict``, ``soft`` as of `sampled_wishes`; what shall be equal then comes twice, with both signs.
     """
     task, sets, exact = model.task, len(u.places), strict == math.inf
     beyond, spare = (1.0 + _HAIR, _HAIR) if exact else (_BEYOND, _SPARE)
-    values: list[Array] = []  # (sets, some) each
-    slopes: list[Array] = []
+    values: list[Array] = [np.zeros((sets, 0))]  # (sets, some) each
+    slopes: list[Array] = [np.zeros((sets, 0, model.size))]
+    hard = 1.0 if exact else strict / _UNIT
 
-    def add(value: Array, slope: Array) -> None:
-        active = exact | (value > 0.0)
-        values.append(np.where(active, value, 0.0))
-        slopes.append(slope * active[..., None])
+    def add(value: Array, slope: Array, name: str = "") -> None:
+        weight = hard if exact and name not in task.soft else _weight(model, name, strict, soft) / _UNIT
+        if weight > 0.0:
+            active = exact | (value > 0.0)
+            values.append(weight * np.where(active, value, 0.0))
+            slopes.append(weight * slope * active[..., None])
 
     def equal(value: Array, slope: Array) -> None:
         both = (1.0, -1.0) if exact else (1.0,)
-        values.extend(sign * value[:, None] for sign in both)
-        slopes.extend(sign * slope[:, None] for sign in both)
+        values.extend(sign * hard * value[:, None] for sign in both)
+        slopes.extend(sign * hard * slope[:, None] for sign in both)
 
     sides, row = lengths.pairs[: lengths.sides], np.arange(sets)
     length, by = lengths.logarithms(u)
     own, own_by = length[:, : len(sides)], by[:, : len(sides)]
     short = own.argmin(axis=1)
-    add(length - length[row, short][:, None] - math.log(task.length_ratio / beyond), by - by[row, short][:, None])
+    ratio = length - length[row, short][:, None] - math.log(task.length_ratio / beyond)
+    add(ratio, by - by[row, short][:, None], "length_ratio")
     if task.lengths is not None:
-        add(math.log(task.lengths[0]) + spare - own, -own_by)
-        add(own - math.log(task.lengths[1]) + spare, own_by)
+        add(math.log(task.lengths[0]) + spare - own, -own_by, "lengths")
+        add(own - math.log(task.lengths[1]) + spare, own_by, "lengths")
         arms = lengths.idling
         add(math.log(task.lengths[0]) + spare - length[:, arms], -by[:, arms])
+    if soft:
+        return np.concatenate(values, axis=1), np.concatenate(slopes, axis=1)
     if task.crank is not None and (k := _crank(model, sides)) >= 0:
         equal(length[:, k] - math.log(task.crank), by[:, k])
     used = np.zeros((sets, len(sides)), dtype=np.bool_)
@@ -193,6 +218,8 @@ def direct_wishes(model: Model, u: Unknowns, strict: float, lengths: Lengths) ->
         k = away.argmin(axis=1)
         used[row, k] = True
         equal(np.where(np.isfinite(away[row, k]), length[row, k] - math.log(bar), 1.0), by[row, k])
+    for value, slope in plates_of(model, u):
+        equal(value, slope)
     for joint, region in _regions(model):
         if (at := model.column(joint)) >= 0:
             for axis in (0, 1):
@@ -205,8 +232,50 @@ def direct_wishes(model: Model, u: Unknowns, strict: float, lengths: Lengths) ->
             slope = np.zeros((sets, 1, model.size))
             slope[:, 0, model.stroke_at] = sign / u.stroke
             add(sign * (np.log(np.maximum(u.stroke[:, None], 1e-300)) - math.log(bound)) + spare, slope)
-    weight = 1.0 if exact else strict / _UNIT
-    return weight * np.concatenate(values, axis=1), weight * np.concatenate(slopes, axis=1)
+    return np.concatenate(values, axis=1), np.concatenate(slopes, axis=1)
+
+
+def plates_of(model: Model, u: Unknowns) -> Iterator[tuple[Array, Array]]:
+    """Yield how links with three joints differ from given ones, the nearest taken: (sets,), derivatives (sets, size).
+
+    Of each the logarithm of the first side, and the third joint as the first two see it, real and imaginary part.
+    """
+    every = _triples(model)
+    if not model.task.plates or not len(every):
+        return
+    z, row, taken = u.places @ [1.0, 1.0j], np.arange(len(u.places)), np.zeros((len(u.places), len(every)))
+    first, second, third = (z[:, every[:, 1 + k]] for k in range(3))
+    side = np.where(second == first, 1e-12, second - first)
+    seen = (third - first) / side
+    for a, b, c in model.task.plates:
+        x = (a * a + c * c - b * b) / (2.0 * a * a)
+        corner = complex(x, math.sqrt(max((c / a) ** 2 - x * x, 0.0)))
+        away = np.log(np.abs(side) / a)
+        misses = [np.abs(seen - q) ** 2 + away**2 + taken for q in (corner, corner.conjugate())]
+        k = np.minimum(*misses).argmin(axis=1)
+        taken[every[None, :, 0] == every[k, 0][:, None]] = np.inf
+        q = np.where(misses[0][row, k] <= misses[1][row, k], corner, corner.conjugate())
+        at, unit = seen[row, k], 1.0 / side[row, k]
+        off = at - q
+        slopes = np.zeros((3, len(z), model.size))
+        for joint, by_side, by in zip(every[k, 1:].T, (-unit, unit, 0.0 * unit), ((at - 1.0) * unit, -at * unit, unit)):
+            column = np.array([model.column(int(own)) for own in joint])
+            free = column >= 0
+            for axis, turn in ((0, 1.0), (1, 1.0j)):
+                parts = (turn * by_side).real, (turn * by).real, (turn * by).imag
+                for n, part in enumerate(parts):
+                    slopes[n, row[free], column[free] + axis] += part[free]
+        yield from zip((away[row, k], off.real, off.imag), slopes, strict=True)
+
+
+def _triples(model: Model) -> NDArray[np.intp]:
+    """Return moving links with three joints that turn, and these in every order: (n, 4)."""
+    design = model.plan.design
+    found = []
+    for link in range(model.links):
+        own = [k for k in design.joints_of(link) if design.kinds[k] == "R"]
+        found += [(link, *order) for order in permutations(own, 3) if link != design.graph.frame]
+    return np.array(found, dtype=np.intp).reshape(-1, 4)
 
 
 def _regions(model: Model) -> list[tuple[int, Box]]:

@@ -127,7 +127,7 @@ def tables(context: Context, designs: Designs) -> tuple[Table, ...]:
             *a.errors,
             a.transmission,
             a.size,
-            "yes" if a.accepted else "; ".join(a.reasons),
+            "; ".join(("yes", *map("misses the wish {}".format, a.wishes))) if a.accepted else "; ".join(a.reasons),
         )
         for place, a in enumerate(designs.answers, 1)
     ]

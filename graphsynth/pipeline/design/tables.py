@@ -219,6 +219,19 @@ class RankTable:
     jam: float = 0.05
 
 
+Weight = Annotated[float | None, In(above=0)]
+
+
+@dataclass(frozen=True, slots=True)
+class SoftTable:
+    """Bounds that are wishes, each with its weight: tolerances for every hundredth by which it is broken."""
+
+    transmission: Weight = None
+    length_ratio: Weight = None
+    lengths: Weight = None
+    box: Weight = None
+
+
 @dataclass(frozen=True, slots=True)
 class DesignTable:
     """``[mechanism]`` with ``module = "design"``; lengths are in one unit of your choice.
@@ -253,6 +266,8 @@ class DesignTable:
     transmission: Annotated[float, In("deg", least=0, below=90)] = 25.0 * DEGREE
     misalignment: Annotated[float | None, In("deg", above=0)] = None
     joint_tilt: Annotated[float, In("deg", above=0)] = 0.3 * DEGREE
+    plates: tuple[tuple[float, float, float], ...] = ()  # distances of three joints of a link: 1-2, 2-3, 3-1
+    soft: SoftTable = field(default_factory=SoftTable)
     rank: RankTable = field(default_factory=RankTable)
     begin: tuple[str, ...] = ()  # files of mechanisms to begin with
     kept: str = ""  # folder for the best mechanisms so far, written while it searches
@@ -273,7 +288,12 @@ class DesignTable:
         tables: tuple[Any, ...] = (*self.paths, *self.poses, *self.functions, *self.dwells, *self.swings)
         targets: list[Target] = [table.target(turn) for table in tables]
         start = self.crank_start * 2 if len(self.crank_start) == 1 else self.crank_start or None
-        shared = {own.name for own in fields(self)} & {own.name for own in fields(DesignTask)} - {"crank_start", "rank"}
+        shared = {own.name for own in fields(self)} & {own.name for own in fields(DesignTask)} - {
+            "crank_start",
+            "rank",
+            "soft",
+        }
         more: dict[str, Any] = {name: getattr(self, name) for name in shared}
         more["drive_pivot"] = self.drive_pivot or None
-        return DesignTask(targets=targets, crank_start=start, rank=asdict(self.rank), **more)
+        soft = {name: weight for name, weight in asdict(self.soft).items() if weight is not None}
+        return DesignTask(targets=targets, crank_start=start, rank=asdict(self.rank), soft=soft, **more)

@@ -13,7 +13,11 @@ import graphsynth as gs
 from graphsynth.core.errors import GeometryError
 from graphsynth.core.limits import Clock, here, told
 from graphsynth.design import DesignedMechanism, DesignTask, PathTarget, SwingTarget, design
+from graphsynth.design.task.model import Model
 from graphsynth.design.task.plans import Plan, plans
+from graphsynth.design.task.problem import TaskProblem
+from graphsynth.design.task.starts import placed_starts, random_starts
+from graphsynth.design.task.wishes import plates_of
 
 
 @pytest.mark.long
@@ -136,3 +140,82 @@ def test_words_that_do_not_fit_are_refused() -> None:
             DesignTask(targets=[path], **more)
     with pytest.raises(GeometryError, match="symmetric curve"):
         DesignTask(targets=[SwingTarget(least=1.0)], links=[4], symmetric=True)
+
+
+@pytest.mark.slow
+def test_a_given_plate_is_used() -> None:
+    """A lever with its third joint on the line of the others, found among the distances of joints of moving links."""
+    path = PathTarget.segment((0, 0), (4, 0), count=8)
+    found = design(DesignTask(targets=[path], links=[6], plates=[(2.0, 1.0, 3.0)]), count=1)
+    assert found.accepted
+    mechanism, sides = found[0].mechanism, []
+    for link in {*range(6)} - {mechanism.frame}:
+        own = [joint.at_a if joint.a == link else joint.at_b for joint in mechanism.joints if link in joint.pair]
+        if len(own) == 3:
+            sides.append(sorted(math.dist(own[k], own[k - 1]) for k in range(3)))
+    assert min(np.abs(np.array(own) - [1.0, 2.0, 3.0]).max() for own in sides) < 3e-3
+
+
+def test_derivatives_of_what_plates_differ() -> None:
+    """By differences, where both plates lie on links of their own."""
+    path = PathTarget.segment((0, 0), (4, 0), count=8)
+    task, random = (
+        DesignTask(targets=[path], links=[6], plates=[(2.0, 1.5, 1.0), (1.0, 2.0, 3.0)]),
+        np.random.default_rng(1),
+    )
+    model = Model(task, list(plans(task, 6))[5], random)
+    X = model.write(random_starts(model, 5, random))
+    values, slopes = zip(*plates_of(model, model.read(X)))
+    assert len(values) == 6 and not np.array_equal(values[0], values[3])
+    for column in range(model.size):
+        ends = []
+        for step in (1e-6, -1e-6):
+            moved = X.copy()
+            moved[:, column] += step
+            ends.append(np.stack([value for value, _ in plates_of(model, model.read(moved))]))
+        assert (ends[0] - ends[1]) / 2e-6 == pytest.approx(np.stack(slopes)[:, :, column], abs=1e-6)
+
+
+@pytest.mark.slow
+def test_a_soft_bound_is_a_wish() -> None:
+    """A transmission angle that no four-bar with this path was found to keep rejects none, and costs what it lacks."""
+    path = PathTarget.segment((0, 0), (4, 0), count=8)
+    task = DesignTask(targets=[path], links=[4], transmission="80 deg", soft={"transmission": 0.01})
+    found = design(task, count=1)
+    assert found.accepted
+    answer, angle = found[0], found[0].transmission
+    assert angle < task.transmission and answer.wishes["transmission"] == pytest.approx(task.transmission - angle)
+    free = design(replace(task, transmission=0.0, soft={}), count=1)[0]
+    assert angle > free.transmission + math.radians(3.0)  # the wish was heard
+
+
+@pytest.mark.long
+def test_a_wish_counts_by_its_weight_alone() -> None:
+    """Squares of the error grow with the square of its weight, whatever the weight of bounds; it is no bound."""
+    path, squares, bounds = PathTarget.segment((0, 0), (4, 0), count=8), [], []
+    for soft in ({"transmission": 0.1}, {"transmission": 0.2}, {"transmission": 0.4}, {}):
+        task = DesignTask(targets=[path], links=[4], transmission="85 deg", soft=soft)
+        random = np.random.default_rng(3)
+        problem = TaskProblem(Model(task, next(plans(task, 4)), random, sense=1))
+        X, times = placed_starts(problem, random_starts(problem.model, 300, random), 6, random)
+        squares.append(problem.linearise(X, times, 1e-12)[0].error[0] ** 2)
+        bounds.append({k: problem.exactly(x, None).bounds for k, x in enumerate(X)})
+    assert 0.0 < squares[1] - squares[0] == pytest.approx((squares[2] - squares[1]) / 4.0, rel=1e-6)
+    assert squares[3] == pytest.approx(squares[0] - (squares[1] - squares[0]) / 3.0, rel=1e-6)
+    moving = [k for k, own in bounds[3].items() if len(own)]
+    assert moving and all(len(bounds[0][k]) == len(bounds[3][k]) - 1 for k in moving)
+
+
+@pytest.mark.parametrize(
+    "more, words",
+    [
+        ({"plates": [(1, 1, 3)], "links": [6]}, "no side of a triangle is longer"),
+        ({"plates": [(1, 1)], "links": [6]}, "three distances of its joints"),
+        ({"plates": [(1, 1, 1)], "links": [4]}, "allow six links for plates"),
+        ({"soft": {"crank": 1.0}}, "soft = 'crank'"),
+        ({"soft": {"box": 0.0}}, "must be positive"),
+    ],
+)
+def test_plates_and_wishes_that_cannot_be(more: dict[str, Any], words: str) -> None:
+    with pytest.raises(GeometryError, match=words):
+        DesignTask(targets=[PathTarget.segment((0, 0), (4, 0))], **more)
