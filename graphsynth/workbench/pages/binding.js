@@ -22,10 +22,10 @@
      binding.close()         gives its memory back
 
    `factor`: the least factor on all limits with which the pose can be assembled; above 1 it binds, Infinity: no factor
-   helps.  `allowed`: how many times as large the misalignment may be.  `used`: the part of its limit that a joint uses at
-   that factor, 1 where it is at its limit; `price`: the share of the joint in it; `first`: the joint with the largest one,
-   which binds first, or null (-1 in `over`).  `what`: "tilt", "roll", "pitch" or "end".  `used` and `prices` of `over` are
-   n x joints x 3: tilt or roll, pitch, end float. */
+   helps; NaN where the pose is not assembled.  `allowed`: how many times as large the misalignment may be.  `used`: the
+   part of its limit that a joint uses at that factor, 1 where it is at its limit; `price`: the share of the joint in it;
+   `first`: the joint with the largest one, which binds first, or null (-1 in `over`).  `what`: "tilt", "roll", "pitch" or
+   "end".  `used` and `prices` of `over` are n x joints x 3: tilt or roll, pitch, end float. */
 
 const Binding = (() => {
   const PLACE = "jamming.joints.kernels.sharing.";
@@ -95,6 +95,12 @@ const Binding = (() => {
       };
       const given = { data: Float64Array.from(poses), shape: [n, this.links, 3] };
       this.call("share", this.seats, this.incidence, given, found.factors, found.used, found.prices);
+      /* nothing is known where the mechanism is not assembled */
+      for (let i = 0; i < n; i++) {
+        if (given.data.subarray(3 * this.links * i, 3 * this.links * (i + 1)).every(Number.isFinite)) continue;
+        found.factors.data.fill(NaN, 2 * i, 2 * i + 2);
+        for (const part of [found.used, found.prices]) part.data.fill(0, 3 * joints * i, 3 * joints * (i + 1));
+      }
       return { factors: found.factors.data, used: found.used.data, prices: found.prices.data };
     }
 
@@ -137,7 +143,7 @@ const Binding = (() => {
         }
         return wide;
       };
-      const worst = factors.reduce((best, value, i) => (value > factors[best] ? i : best), 0);
+      const worst = factors.reduce((best, value, i) => (value > factors[best] || Number.isNaN(factors[best]) ? i : best), 0);
       return { factors, used: spread(used), prices: spread(prices), first, worst };
     }
 

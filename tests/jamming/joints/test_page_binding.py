@@ -34,7 +34,7 @@ async function main() {
   const found = JSON.parse(fs.readFileSync(jobs)).map(({ drawn, limits, tilt, poses }) => {
     const binding = Binding.open(module, drawn, limits, tilt);
     if (binding.fault) return { fault: binding.fault };
-    const flat = Float64Array.from(poses.flat(2)), begin = process.hrtime.bigint();
+    const flat = Float64Array.from(poses.flat(2), (x) => x ?? NaN), begin = process.hrtime.bigint();
     const over = binding.over(flat, poses.length), seconds = Number(process.hrtime.bigint() - begin) / 1e9;
     const at = poses.map((pose) => binding.at(Float64Array.from(pose.flat())));
     const python = binding.python();
@@ -140,7 +140,12 @@ def test_the_page_takes_bearings_and_says_what_does_not_fit(tmp_path: Path) -> N
     base, link = joints[0].a, joints[0].b
     jobs = [{**given, "tilt": tilt}, {**given, "tilt": {"joint": 9, "alpha": 0.01}}, {**given, "tilt": {"joint": 0}}]
     jobs.append({**given, "limits": [{"tilt": -1.0}] * len(joints), "tilt": tilt})
-    good, *bad = in_page(tmp_path, jobs)
+    lost = motion.poses.astype(object)
+    lost[1] = None
+    jobs.append({**given, "poses": lost.tolist(), "tilt": tilt})
+    good, *bad, part = in_page(tmp_path, jobs)
+    assert part["over"]["factors"][1] is None and part["over"]["factors"][2:] == good["over"]["factors"][2:]
+    assert part["over"]["worst"] != 1 and part["over"]["first"][1] == -1
     known = assess_coupled(motion, Bearing(), Misalignment(base, link, 0.012))
     np.testing.assert_allclose(good["over"]["factors"], 1.0 / known.allowed_scale, rtol=1e-10)
     assert [found["fault"] for found in bad] == ["tilt", "tilt", "limits"]
