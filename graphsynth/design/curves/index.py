@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from functools import cached_property
@@ -130,6 +131,7 @@ class CurveIndex:
         closed: bool | None = None,
         timed: bool = False,
         only: Callable[[Design], bool] | None = None,
+        within: float = math.inf,
         candidates: int = CANDIDATES,
     ) -> list[CurveMatch]:
         """Find the curves nearest to a wanted one, best first.
@@ -146,6 +148,8 @@ class CurveIndex:
             The points belong to uniform inputs: of a full rotation if closed, else of the range.
         only : callable, optional
             Says of a `Design` (graph, drivers, kinds of joints) whether its mechanisms may be found.
+        within : float
+            Largest range of the driver over which an open curve is drawn: radians, or a slide.
         candidates : int
             Closed curves whose distance is computed: more miss fewer, see the theory; open ones eight times as many.
 
@@ -160,7 +164,7 @@ class CurveIndex:
             Fewer than three points (five with inputs), all at one place, numbers that are not finite.
         """
         wanted = TimedCurve(curve, closed) if timed else WantedCurve(curve, closed)
-        return self._found(wanted, count, only, candidates)
+        return self._found(wanted, count, only, within, candidates)
 
     def find_motion(
         self,
@@ -191,7 +195,7 @@ class CurveIndex:
         GeometryError
             Fewer than five poses, all at one place, numbers that are not finite.
         """
-        return self._found(WantedMotion(poses, closed), count, only, candidates)
+        return self._found(WantedMotion(poses, closed), count, only, math.inf, candidates)
 
     def starts(
         self,
@@ -210,22 +214,24 @@ class CurveIndex:
     # --- the search
 
     def _found(
-        self, wanted: Wanted, count: int, only: Callable[[Design], bool] | None, candidates: int
+        self, wanted: Wanted, count: int, only: Callable[[Design], bool] | None, within: float, candidates: int
     ) -> list[CurveMatch]:
         count, candidates = whole("count", count, 1, 10**5), whole("candidates", candidates, 1, 10**7)
         most = max(candidates * (1 if wanted.closed else _OPEN), count + _SPARE)
-        near = self._nearest(wanted, most, only)[: count + _SPARE]
+        near = self._nearest(wanted, most, only, within)[: count + _SPARE]
         found = [self._matched(int(number), wanted) for number in near]
         return sorted((match for match in found if match is not None), key=lambda match: match.error)[:count]
 
-    def _nearest(self, wanted: Wanted, most: int, only: Callable[[Design], bool] | None) -> NDArray[np.int64]:
+    def _nearest(
+        self, wanted: Wanted, most: int, only: Callable[[Design], bool] | None, within: float
+    ) -> NDArray[np.int64]:
         """Rows in the order of the distance of what is stored, of those with the nearest sizes."""
         rows, tree = self._tree(wanted.column, wanted.closed)
-        if only is None and len(rows):
+        if only is None and within == math.inf and len(rows):
             near = [tree.query(own, k=np.arange(1, min(most, len(rows)) + 1))[1] for own in wanted.sizes()]
         else:
             allowed = np.array([only is None or bool(only(family.design)) for family in self.families])
-            own = np.flatnonzero(allowed[self._family[rows]])
+            own = np.flatnonzero(allowed[self._family[rows]] & (self._range[rows] <= within))
             near = []
             for sizes in wanted.sizes():
                 far = ((tree.data[own] - sizes) ** 2).sum(axis=1)
@@ -237,6 +243,10 @@ class CurveIndex:
     @cached_property
     def _family(self) -> NDArray[np.uint16]:
         return np.concatenate([shard.columns["mechanism"]["family"] for shard in self.shards])
+
+    @cached_property
+    def _range(self) -> NDArray[np.float32]:
+        return np.concatenate([np.ptp(shard.columns["mechanism"]["inputs"], axis=1) for shard in self.shards])
 
     def _tree(self, column: str, closed: bool) -> tuple[NDArray[np.int64], cKDTree]:
         """Rows of closed or open curves, and a tree of the sizes of their coefficients in a column."""

@@ -1,4 +1,4 @@
-"""A closed path as a whole: distances of the curve from the outline and of the outline from the curve.
+"""A path as a whole: distances of the curve from the outline and of the outline from the curve.
 
 Both are cut at equal lengths; nearest points that run the same way are found anew after each step [Besl & McKay 1992],
 and only the distance across counts [Chen & Medioni 1992].  Theory: docs/explanation/embodiment.md, "Closed paths".
@@ -53,10 +53,11 @@ class Polygon(NamedTuple):
 
 
 class ContourAim(PointAim):
-    """A named point draws a closed outline, however fast; looked at at all samples of the motion.
+    """A named point draws a path, however fast; looked at at all samples of the motion.
 
     ``turned``: distance, over the size, that counts like an angle of a radian between directions when nearest points
-    are looked for.  Points of the curve shall lie on the polygon but for its sagitta, given points on the curve.
+    are looked for.  Points of a closed curve shall lie on the polygon but for its sagitta, an open one may go on; given
+    points shall lie on the curve.
     """
 
     def __init__(self, model: Model, target: PathTarget, turned: float) -> None:
@@ -68,9 +69,10 @@ class ContourAim(PointAim):
         part = (np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[k]
         self.outline, self.given = Polygon.of((target.goal[k] + part * side[k])[None]), Polygon.of(target.goal[None])
         self.band = bands(target.goal)[k]
-        self.count = _EQUAL + len(model.inputs) - 1
-        self.weight = target.weight / target.tolerance / math.sqrt(2.0 * self.count)
-        self.heavy = math.sqrt(self.count / len(target.goal))
+        self.closed, n = target.closed, len(target.goal)
+        self.count = _EQUAL + len(model.inputs) - 1 if self.closed else 0
+        self.weight = target.weight / target.tolerance / math.sqrt(2.0 * self.count or n)
+        self.heavy = math.sqrt(self.count / n) if self.closed else 1.0
 
     def times(self, moved: Moved, u: Unknowns, before: Array | None) -> Array:
         """Nothing is kept from step to step: as many zeros as there are distances."""
@@ -89,42 +91,46 @@ class ContourAim(PointAim):
         arm = turn * self.place(u)
         h = np.diff(self.model.inputs)
         z, v = own[..., 0] + 1j * own[..., 1] + arm, speed[..., 0] + 1j * speed[..., 1] + 1j * speed[..., 2] * arm
-        curve = _Cubics(z[:, :-1], z[:, 1:], v[:, :-1] * h, v[:, 1:] * h)
+        curve = _Cubics(z[:, :-1], z[:, 1:], v[:, :-1] * h, v[:, 1:] * h, self.closed)
         at = curve.spread()
         polygon = Polygon.of(curve.at(at)[0])
         there, back = _nearest(polygon, self.outline, self.given, self.turned)
-        foot = self.outline.foot(polygon.z, there)
-        away = polygon.z - foot
-        away *= np.maximum(1.0 - self.band[there] / np.maximum(np.abs(away), 1e-300), 0.0)
-        back_at = curve.nearest(at[np.arange(sets)[:, None], back], self.given.z)
-        e = np.concatenate([away, self.heavy * (curve.at(back_at)[0] - self.given.z)], axis=1) / self.size
+        places = curve.nearest(at[np.arange(sets)[:, None], back], self.given.z)
+        e = self.heavy * (curve.at(places)[0] - self.given.z) / self.size
+        if self.closed:
+            away = polygon.z - self.outline.foot(polygon.z, there)
+            away *= np.maximum(1.0 - self.band[there] / np.maximum(np.abs(away), 1e-300), 0.0) / self.size
+            e, places = np.concatenate([away, e], axis=1), np.concatenate([at, places], axis=1)
         far = np.abs(e)
         way = np.where(far > _NONE, e / np.maximum(far, _NONE), 0.0)
         way[:, self.count :] *= self.heavy
         loads, direct = self.blank(sets, 2, n)
         self.put(loads, direct, arm, turn)
-        low, part = curve.split(np.concatenate([at, back_at], axis=1))
+        low, part = curve.split(places)
         return Rows(times, far[:, None], loads, direct, self.weight, picks=Picks(low, part, _parts(way)))
 
 
 class _Cubics(NamedTuple):
-    """Closed curves in cubics (sets, n): both ends and the velocities there; places are in cubics."""
+    """Curves in cubics (sets, n): both ends and the velocities there; places are in cubics."""
 
     a: Complex
     b: Complex
     p: Complex
     q: Complex
+    closed: bool = True
 
     def split(self, at: Array) -> tuple[Whole, Array]:
         """Return cubics and parts of them."""
-        low = np.floor(at).astype(np.intp)
-        return low % self.a.shape[1], at - low
+        low, n = np.floor(at).astype(np.intp), self.a.shape[1]
+        if not self.closed:
+            low = np.clip(low, 0, n - 1)
+        return low % n, at - low
 
     def at(self, at: Array) -> tuple[Complex, Complex]:
         """Return points and velocities at places (sets, m)."""
         k, x = self.split(at)
         row, y = np.arange(len(k))[:, None], 1.0 - x
-        a, b, p, q = (own[row, k] for own in self)
+        a, b, p, q = (own[row, k] for own in self[:4])
         z = y * y * ((1 + 2 * x) * a + x * p) + x * x * ((1 + 2 * y) * b - y * q)
         return z, 6 * x * y * (b - a) + y * (1 - 3 * x) * p + x * (3 * x - 2) * q
 
@@ -132,7 +138,7 @@ class _Cubics(NamedTuple):
         """Return places (sets, _EQUAL + n) of equal distance along the curves and where cubics begin, in order."""
         sets, n = self.a.shape
         fine, _ = self.at(np.tile(np.arange(n * _CHORDS) / _CHORDS, (sets, 1)))
-        share = np.cumsum(np.abs(np.roll(fine, -1, axis=1) - fine), axis=1)
+        share = np.cumsum(np.abs(np.diff(fine, axis=1, append=self.b[:, -1:])), axis=1)
         share /= np.maximum(share[:, -1:], 1e-300)
         row, wanted = np.arange(sets)[:, None], (np.arange(_EQUAL) + 0.5) / _EQUAL
         k = np.searchsorted((share + row).ravel(), (wanted + row).ravel()).reshape(sets, -1) - row * n * _CHORDS
@@ -145,7 +151,7 @@ class _Cubics(NamedTuple):
     def bends(self, at: Array) -> Complex:
         """Return accelerations at places (sets, m)."""
         k, x = self.split(at)
-        a, b, p, q = (own[np.arange(len(k))[:, None], k] for own in self)
+        a, b, p, q = (own[np.arange(len(k))[:, None], k] for own in self[:4])
         return 6.0 * (1.0 - 2.0 * x) * (b - a) + (6.0 * x - 4.0) * p + (6.0 * x - 2.0) * q
 
     def nearest(self, at: Array, goal: Complex) -> Array:
@@ -155,6 +161,7 @@ class _Cubics(NamedTuple):
             along, square = (np.conj(v) * (goal - z)).real, np.abs(v) ** 2
             steep = np.maximum(square - (np.conj(self.bends(at)) * (goal - z)).real, 0.1 * square)
             at = at + np.clip(along / np.maximum(steep, 1e-300), -0.5, 0.5)
+            at = at if self.closed else np.clip(at, 0.0, self.a.shape[1])
         return at
 
 

@@ -56,7 +56,7 @@ class TaskProblem:
 
     def __init__(self, model: Model, few: int = 0, turned: float = 0.0) -> None:
         self.model = model
-        outlines = [own for own in model.task.targets if isinstance(own, PathTarget) and own.outline and turned > 0.0]
+        outlines = [own for own in model.task.targets if isinstance(own, PathTarget) and own.drawn and turned > 0.0]
         made = {id(own): ContourAim(model, own, turned) for own in outlines}
         self.aims: list[Aim] = aims_of(model, few, made)
         self.lengths = Lengths(model)

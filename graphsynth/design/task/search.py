@@ -235,6 +235,7 @@ class _Run:
         self.pieces, self.stopped = 0, ""
         self.tries: Counter[tuple[Chain, float]] = Counter()
         self.outlines = any(isinstance(target, PathTarget) and target.outline for target in task.targets)
+        self.turned = _TURNED[1] if self.outlines else 0.0  # in the last stage; open paths there at exact points
         self.near, self.even = (_OUTLINED, _OUTLINED) if self.outlines else (_NEAR, _EVEN)
         self.grows = any(isinstance(target, PathTarget) for target in task.targets)
         self.before, self.idle = 0, 0  # accepted before the last wave, waves without another one
@@ -347,7 +348,7 @@ class _Run:
     def _settled(self, candidate: Candidate) -> Candidate:
         """Return a candidate at its least sum of squares, its motion and bounds taken exactly."""
         with suppress(GraphsynthError):
-            problem = TaskProblem(_modelled(self.task, self.seed, candidate.origin)[0], 0, _TURNED[1])
+            problem = TaskProblem(_modelled(self.task, self.seed, candidate.origin)[0], 0, self.turned)
             x, error = settled(problem, candidate.x)
             error += float(problem.model.untransmitted(x[None])[0])
             if error < candidate.error:
@@ -361,7 +362,7 @@ class _Run:
         if answer.accepted:
             return
         with suppress(GraphsynthError):
-            problem = TaskProblem(_modelled(self.task, self.seed, candidate.origin)[0], 0, _TURNED[1])
+            problem = TaskProblem(_modelled(self.task, self.seed, candidate.origin)[0], 0, self.turned)
             x, error = levelled(problem, candidate.x)
             if not error < math.inf:
                 return

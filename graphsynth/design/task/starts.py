@@ -38,7 +38,7 @@ _HELD, _TRIED, _TOGETHER = 30.0, 2, 128
 #: One of so many random candidates has one joint far away, up to so many times: long links are nearly guides.
 _STRETCHED, _FAR = 3, 30.0
 #: Matches of an index for every one that is wanted within a range; by how much the range may be too short; samples.
-_RANGES, _SLACK, _STEPS = 3, 0.03, 60
+_RANGES, _SLACK, _STEPS = 6, 0.03, 60
 
 
 class Starts(Protocol):
@@ -81,7 +81,9 @@ def index_starts(index: CurveIndex, count: int = 32) -> Starts:
             return few and turns == (task.drive in ("rotation", "rocking"))
 
         rocking = task.drive == "rocking"
-        every = index.find(_pairs(path.goal), _RANGES * count if rocking else count, closed=path.closed, only=fits)
+        most = (1.0 + _SLACK) * task.span if rocking else math.inf
+        wanted = _RANGES * count if rocking else count
+        every = index.find(_pairs(path.goal), wanted, closed=path.closed, only=fits, within=most)
         begun = (within(match, task.span) if rocking else match.mechanism for match in every)
         return [
             Mechanism(m.graph, m.joints, m.drivers, {path.point: m.points["P"]}, m.pose)

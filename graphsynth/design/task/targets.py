@@ -30,6 +30,8 @@ Tolerance = Kept[float | str, float]
 _COUNT = 48
 #: Part of its range by which a function may differ at both ends and yet has the same value there.
 _SAME = 1e-9
+#: Points of an open path without times beyond which it is a curve.
+_DENSE = 64
 #: Most points, poses or values of a target.
 MOST = 400
 
@@ -152,6 +154,11 @@ class PathTarget(TimedTarget):
     def outline(self) -> bool:
         """Whether it is a whole curve, however fast it is run through."""
         return self.closed and self.inputs is None
+
+    @property
+    def drawn(self) -> bool:
+        """Whether it is an outline, or an open path of so many points that they tell where it goes between them."""
+        return self.inputs is None and (self.closed or len(self.points) > _DENSE)
 
     @property
     def goal(self) -> NDArray[np.complex128]:

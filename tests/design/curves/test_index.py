@@ -122,6 +122,15 @@ def test_only_some_mechanisms_are_asked_for(index: CurveIndex) -> None:
     assert index.find(curve, 5, only=lambda design: False) == []
 
 
+def test_open_curves_within_a_range_of_the_driver(index: CurveIndex) -> None:
+    angles = np.linspace(0.0, math.tau, 100)
+    curve = np.column_stack([angles, 0.4 * np.sin(angles) ** 2])
+    every = index.find(curve, len(index), closed=False, candidates=len(index))
+    wanted = [match.number for match in every if abs(np.ptp(match.entry.row["inputs"])) <= 2.0][:5]
+    some = index.find(curve, 5, closed=False, within=2.0, candidates=len(index))
+    assert [match.number for match in some] == wanted and len(wanted) == 5 and wanted != [m.number for m in every[:5]]
+
+
 def test_the_nearest_are_those_of_brute_force(index: CurveIndex) -> None:
     angles = np.linspace(0.0, math.tau, 200)
     for curve in (

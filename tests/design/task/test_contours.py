@@ -32,10 +32,11 @@ def drawn(count: int) -> Any:
     return gs.simulate(HIDDEN, np.linspace(0.0, math.tau, count + 1)).point("P").position[:-1] @ [1.0, 1.0j]
 
 
-def modelled(goal: np.ndarray, turned: float) -> tuple[TaskProblem, np.ndarray]:
-    """Return the problem of drawing a closed path by four-bars, and the hidden one as a vector."""
+def modelled(goal: np.ndarray, turned: float, **more: Any) -> tuple[TaskProblem, np.ndarray]:
+    """Return the problem of drawing a path by four-bars, closed if nothing else is said, and the hidden one."""
     motion = gs.simulate(HIDDEN, np.linspace(0.0, math.tau, 9))
-    task = DesignTask(targets=[PathTarget(points=[(p.real, p.imag) for p in goal], closed=True)], links=[4])
+    path = PathTarget(points=[(p.real, p.imag) for p in goal], closed=not more)
+    task = DesignTask(targets=[path], links=[4], **more)
     pose = tuple((float(x), float(y), float(a)) for x, y, a in motion.poses[0])
     hidden = gs.Mechanism(HIDDEN.graph, HIDDEN.joints, HIDDEN.drivers, HIDDEN.points, pose)
     design = Design(hidden.graph, (hidden.drivers[0].pair,), ("R",) * 4)
@@ -76,6 +77,31 @@ def test_distances_are_those_of_brute_force() -> None:
     assert count == len(at) and np.abs(values[:count] - far).max() < 0.01 * far.max()
     back = np.abs(goal[:, None] - curve).min(axis=1) / aim.size * math.sqrt(count / len(goal))
     assert np.abs(values[count:] - back).max() < 1e-3 * back.max()
+
+
+def test_an_open_path_is_looked_for_along_the_curve_which_may_go_on() -> None:
+    """A third of the curve, in a range that is longer: exact on the hidden one, elsewhere the distances of brute force.
+
+    Beyond the ends of the range there is no curve.
+    """
+    every = drawn(2000)
+    part = every[100:600:6]
+    problem, X = modelled(part, 0.05, drive="rocking", span=2.2)
+    assert isinstance(problem.aims[0], ContourAim) and problem.linearise(X[:1], None, 0.2)[0].error[0] < 1e-3
+    goal = 1.02 * part + 0.03 - 0.02j
+    problem, X = modelled(goal, 1e-9, drive="rocking", span=2.2)
+    aim, u = problem.aims[0], problem.model.read(X[:1])
+    moved = problem.model.move(u)
+    assert isinstance(aim, ContourAim)
+    values = aim.rows(aim.times(moved, u, None), *aim.looked(moved, np.zeros((1, 0))), u).values[0, 0]
+    reached = every[: round(2.2 / math.tau * 2000) + 1]
+    far = np.abs(goal[:, None] - reached).min(axis=1) / aim.size
+    assert len(values) == len(goal) and np.abs(values - far).max() < 0.02 * far.max()
+    (_, r, J), _ = problem.linearise(X[1:3], None, 0.2)
+    for way in np.random.default_rng(2).normal(0.0, 1.0, (4, X.shape[1])):
+        plus, minus = (problem.linearise(X[1:3] + 1e-5 * sign * way, None, 0.2)[0].error ** 2 for sign in (1.0, -1.0))
+        slope = 2.0 * np.einsum("sm,smi,i->s", r, J, way)
+        assert (plus - minus) / 2e-5 == pytest.approx(slope, rel=0.05, abs=0.05 * np.abs(slope).max())
 
 
 @pytest.mark.parametrize("curve", [lambda t: np.exp(1j * t), lambda t: 3.0 * np.cos(t) + 1j * np.sin(t)])
