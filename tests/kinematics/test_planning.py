@@ -42,6 +42,7 @@ def agree(mechanism: Mechanism, dimensions: Any = None) -> bool:
     return True
 
 
+@pytest.mark.long
 def test_programs_of_random_mechanisms_are_those_of_plain_python() -> None:
     random, same = np.random.default_rng(7), 0
     for k in range(60):
