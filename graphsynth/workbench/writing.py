@@ -142,9 +142,10 @@ def mathematics() -> str:
 
 def later_scripts() -> dict[str, str]:
     """Return the scripts that the page asks for when they are needed, by name."""
-    from graphsynth.workbench import chains
+    from graphsynth.workbench import chains, targets
 
-    return {"chains-data": chains.script(), **{f"{name}.wasm": script(name) for name in names() if name in _LATER}}
+    modules = {f"{name}.wasm": script(name) for name in names() if name in _LATER}
+    return {"chains-data": chains.script(), "curves-data": targets.script(), **modules}
 
 
 def languages() -> dict[str, dict[str, str]]:

@@ -28,6 +28,8 @@
       found.push([`v ${id}`, Bench.word("chart.v", { p }), moves.map(own => Math.hypot(...own.velocity)), ""]);
       found.push([`a ${id}`, Bench.word("chart.a", { p }), moves.map(own => Math.hypot(...own.acceleration)), ""]);
     }
+    const judged = app.jamming && app.jamming.whole();
+    if (judged) found.push(["binding", Bench.word("chart.binding"), Array.from(judged.factors), ""]);
     links.forEach((id, k) => {
       if (id === Bench.GROUND) return;
       const values = rows.map(i => (swept.poses[3 * (i * n + k) + 2] * 180) / Math.PI);
@@ -93,6 +95,6 @@
       place.replaceChildren(select, root);
     };
     app.on("sheet view rest", build);
-    app.on("pose", () => { if (move) move(); });
+    app.on("pose", () => { if (move && !app.motion.waits) move(); });
   };
 })();

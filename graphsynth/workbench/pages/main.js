@@ -17,6 +17,7 @@
     driver: "M17 7A7 7 0 1 0 19 12M19 12L21.5 9M19 12L16 10M12 12h.1",
     trace: "M3 17C7 3 12 3 13 10C14 18 19 18 21 9M13 10m-2 0a2 2 0 1 0 4 0a2 2 0 1 0 -4 0",
     picture: "M3 5H21V19H3ZM3 16L8 11L12 15L15 12L21 17M15.5 8.5m-1.5 0a1.5 1.5 0 1 0 3 0a1.5 1.5 0 1 0 -3 0",
+    target: "M4 14C4 6 10 3 15 5C21 8 20 18 14 19C8 20 4 19 4 14M12 12h.1M12 12m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0",
     measure: "M3 15L15 3L21 9L9 21ZM7 11L9 13M10 8L13 11M13 5L15 7",
   };
   const icon = name => Bench.svg("svg", { viewBox: "0 0 24 24", width: 22, height: 22, "aria-hidden": "true" }, Bench.svg("path", { d: ICONS[name] }));
@@ -132,6 +133,7 @@
       const { options } = app;
       app.view.build(app.sheet, { selection: app.selection, names: options.names, grid: options.grid, faulty: app.faulty });
       Bench.paintPicture(app);
+      Bench.paintTarget(app);
       Bench.paintCurves(app, app.motion);
       Bench.paintPose(app, app.motion);
       stage.over();
@@ -173,6 +175,7 @@
     menus(app);
     Bench.listen(app);
     for (const element of document.querySelectorAll("[data-mode]")) if (element !== document.body) element.addEventListener("click", () => app.setMode(element.dataset.mode));
+    app.jamming = new Bench.Jamming(app, $("binding"));
     Bench.charts(app, $("charts"));
     app.work = Work.start(Mathematics);
     try {

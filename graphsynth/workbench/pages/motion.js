@@ -52,8 +52,12 @@
       return this.swept;
     }
 
+    /** Whether what is beside the drawing may wait for a later picture: numbers and charts follow every third one. */
+    get waits() { return this.playing && this.beat % 3 !== 0; }
+
     row(link) { return Array.from(this.engine.pose.subarray(3 * link, 3 * link + 3)); }
     show() {
+      this.beat = (this.beat || 0) + 1;
       this.app.pose = Float64Array.from(this.engine.pose);
       this.app.changed("pose");
     }

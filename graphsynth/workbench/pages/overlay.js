@@ -100,7 +100,7 @@
         parts.push(svg("path", { class: "pull", d: Bench.pathOf([motion.pulled.from, motion.pulled.to].map(at => app.view.px(at))) }));
       }
     }
-    app.view.layers.motion.replaceChildren(...parts);
+    if (parts.length || app.view.layers.motion.firstChild) app.view.layers.motion.replaceChildren(...parts);
   };
 
   /** The longest arrow over a sweep, so that arrows grow and shrink with the motion. */

@@ -55,6 +55,7 @@
       if (event.button !== 0) { this.action = this.pan(place); return; }
       const { app } = this, tool = Bench.TOOLS[app.tool];
       if (app.mode === "run") this.action = this.drag(place, event);
+      else if (app.tool === "target") this.action = this.trail(place);
       else if (tool.picks === 0) this.action = this.choose(place, event);
       else this.action = this.press(place, event);
       event.preventDefault();
@@ -90,6 +91,21 @@
       const { action } = this;
       this.action = null;
       if (action && action.cancel) action.cancel();
+    }
+
+    /** A curve that is wanted, drawn in one stroke. */
+    trail(start) {
+      const { app, view } = this, way = [start];
+      const shown = () => this.over(Bench.svg("path", { class: "target", d: Bench.pathOf(way) }));
+      return {
+        move: place => {
+          const last = way[way.length - 1];
+          if (Math.hypot(place[0] - last[0], place[1] - last[1]) > 3 && way.length < 2000) way.push(place);
+          shown();
+        },
+        up: () => { this.over(); Bench.answerTarget(app, way.map(place => { const { x, y } = view.place(place); return [x, y]; })); },
+        cancel: () => this.over(),
+      };
     }
 
     /** A place for the tool: press and release at two places, or click twice. */

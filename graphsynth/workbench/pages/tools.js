@@ -89,6 +89,7 @@
     trace: { key: "k", picks: 1, apply: trace },
     measure: { key: "m", picks: 2 },
     picture: { key: "i", picks: 2 },
+    target: { key: "w", picks: 0 },
   };
 
   /** Where a place snaps to: {x, y, kind}.  Points first, then the angle from where a line begins, then the grid. */

@@ -10,7 +10,7 @@
       this.camera = { x: 0, y: 0, scale: 2 };
       this.width = this.height = 1;
       this.layers = {};
-      for (const name of ["under", "grid", "links", "curves", "marks", "points", "motion", "over"]) {
+      for (const name of ["under", "grid", "target", "links", "curves", "marks", "points", "motion", "binding", "over"]) {
         root.append(this.layers[name] = svg("g", { "data-layer": name }));
       }
       this.pose = null;

@@ -35,13 +35,9 @@ const Work = (() => {
       const motion = await Kernels.load("motion"), sketch = await Kernels.load("sketch");
       return Turning.found(motion, links, joints, more.places || Layout.places(sketch, links, joints).places, more);
     },
-    /* The sweep of a mechanism that stands in a pose. */
-    async sweep([drawn, pose, n, driver]) {
-      const engine = Engine.open(await Kernels.load("motion"), drawn);
-      try {
-        engine.place(pose);
-        return engine.sweep(n, driver);
-      } finally { engine.close(); }
+    /* Mechanisms for a closed curve. */
+    async target([curve], tell) {
+      return Curves.found(await Kernels.load("motion"), curve, tell);
     },
   };
 
@@ -50,7 +46,7 @@ const Work = (() => {
   /* In the worker: what it is asked, one after another. */
   function serve(port) {
     port.onmessage = async ({ data: { id, name, args, scripts } }) => {
-      if (scripts) { for (const [kind, ...rest] of scripts) (kind === "chains" ? Chains : Kernels).register(...rest); return; }
+      if (scripts) { for (const [kind, ...rest] of scripts) ({ chains: Chains, curves: Curves, kernels: Kernels })[kind].register(...rest); return; }
       try { port.postMessage({ id, found: await run(name, args, told => { port.postMessage({ id, told }); return true; }) }); } catch (error) {
         port.postMessage({ id, error: String(error && error.message || error) });
       }
@@ -83,7 +79,7 @@ const Work = (() => {
       run(name, args, tell = () => {}) {
         if (!open()) return run(name, args, told => { tell(told); return new Promise(go => setTimeout(() => go(true))); });
         const named = ([kind, name]) => (kind === "kernels" ? name : kind);
-        const fresh = [...Kernels.scripts(), ...Chains.scripts()].filter(one => !handed.has(named(one)));
+        const fresh = [...Kernels.scripts(), ...Chains.scripts(), ...Curves.scripts()].filter(one => !handed.has(named(one)));
         if (fresh.length) worker.postMessage({ scripts: fresh });
         for (const one of fresh) handed.add(named(one));
         return new Promise((yes, no) => { waiting.set(++count, { yes, no, tell }); worker.postMessage({ id: count, name, args }); });

@@ -1,0 +1,166 @@
+// Tilt an axis and see which joint binds where: the kernels judge the pose that is shown and the whole motion.
+"use strict";
+
+(function () {
+  const { make, svg } = Bench, DEGREE = Math.PI / 180;
+  /** Pixels of the handle for one radian of tilt. */
+  const HANDLE = 900;
+
+  /** The joints that can be asked about: [number, words]. */
+  function joints(app, data) {
+    const ids = Object.keys(app.sheet.links), name = k => Bench.linkName(app.sheet, ids[k]);
+    return data.joints.map((joint, k) => [k, Bench.word("jam.joint", { kind: joint.kind, a: name(joint.a), b: name(joint.b) })])
+      .filter(([k]) => ["R", "P", "pin-slot"].includes(data.joints[k].kind));
+  }
+
+  Bench.Jamming = class {
+    constructor(app, place) {
+      Object.assign(this, { app, place, on: false, module: null, seats: null, sheet: null, over: null, now: null });
+      Object.assign(this, { joint: null, alpha: 1 * DEGREE, direction: 0, tilt: 0.5 * DEGREE, end: 0 });
+      app.on("sheet rest tool", () => this.build());
+      app.on("pose sheet rest view", () => this.show());
+    }
+
+    get motion() { return this.app.motion; }
+    /** The seats of the drawing as it is now, for the kernels. */
+    open() {
+      const { app } = this;
+      if (this.seats && this.sheet === app.sheet) return this.seats;
+      this.close();
+      this.sheet = app.sheet;
+      this.data = Bench.written(app.sheet);
+      const known = joints(app, this.data).map(([k]) => k), driver = this.data.drivers[0];
+      if (!known.includes(this.joint)) {
+        const driven = driver ? this.data.joints.findIndex(j => [j.a, j.b].includes(driver.base) && [j.a, j.b].includes(driver.link)) : -1;
+        this.joint = driven >= 0 ? driven : known[0];
+      }
+      const limits = this.data.joints.map(({ kind }) => ({ R: { tilt: this.tilt, end: this.end } })[kind] ||
+        (kind === "P" || kind === "pin-slot" ? { roll: this.tilt, pitch: this.tilt, end: this.end } : null));
+      const { a, b } = this.data.joints[this.joint], frame = Bench.linkNumber(app.sheet, Bench.GROUND);
+      const base = b === frame ? b : a;
+      this.seats = Binding.open(this.module, this.data, limits, { joint: this.joint, alpha: this.alpha, direction: this.direction, base });
+      return this.seats;
+    }
+    close() {
+      if (this.seats) this.seats.close();
+      Object.assign(this, { seats: null, over: null, now: null });
+    }
+    /** The judgement over the whole motion. */
+    whole() {
+      const swept = this.on && this.motion.driven ? this.motion.sweep() : null, seats = swept && this.open();
+      if (!seats || seats.fault) return null;
+      if (!this.over || this.over.swept !== swept) this.over = { swept, ...seats.over(swept.poses, swept.inputs.length) };
+      return this.over;
+    }
+
+    async turn(on) {
+      const { app } = this;
+      try {
+        if (on) {
+          await Bench.need("binding.wasm");
+          this.module = await Kernels.load("binding");
+        }
+      } catch (fault) { app.fault(fault instanceof Bench.Fault ? fault : new Bench.Fault("fault.job", { error: fault.message })); return; }
+      this.on = on;
+      this.close();
+      app.changed("rest");
+    }
+    set(more) {
+      Object.assign(this, more);
+      this.close();
+      this.app.changed("rest");
+    }
+
+    /** What is asked, and the answer. */
+    build() {
+      const { app, place, motion } = this, ready = motion && motion.ready && motion.engine.joints.length > 2;
+      place.closest("section").hidden = !ready;
+      if (!ready) { this.close(); place.replaceChildren(); return; }
+      const parts = [Bench.check("jam.on", this.on, on => this.turn(on))];
+      if (this.on) {
+        this.open();
+        const angle = (text, least) => {
+          const value = Number(text.replace(",", ".").replace(/[°\s]/g, ""));
+          if (!(value >= least && value <= 30) || !text.trim()) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });
+          return value * DEGREE;
+        };
+        const shown = value => String(Number((value / DEGREE).toPrecision(6)));
+        parts.push(Bench.choice("jam.axis", String(this.joint), joints(app, this.data).map(([k, text]) => [String(k), text]), own => this.set({ joint: Number(own) })),
+          Bench.field(app, "jam.alpha", shown(this.alpha), text => this.set({ alpha: angle(text, 0) }), { unit: "°" }),
+          Bench.field(app, "jam.direction", shown(this.direction), text => {
+            const value = Number(text.replace(",", ".").replace("−", "-").replace(/[°\s]/g, ""));
+            if (!Number.isFinite(value)) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });
+            this.set({ direction: value * DEGREE });
+          }, { unit: "°" }),
+          Bench.field(app, "jam.limit", shown(this.tilt), text => this.set({ tilt: angle(text, 0) }), { unit: "°" }),
+          Bench.field(app, "jam.end", String(this.end), text => {
+            const value = Bench.parseLength(text, app.sheet.unit);
+            if (!(value >= 0)) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });
+            this.set({ end: value });
+          }, { unit: app.sheet.unit }),
+          this.answer = make("div", { id: "jammed", "aria-live": "polite" }), this.summary(),
+          make("div", { class: "acts" }, Bench.button("jam.prove", () => this.prove(), { "data-prove": true })));
+      }
+      place.replaceChildren(...parts.filter(Boolean));
+      this.show();
+    }
+
+    summary() {
+      const over = this.whole();
+      if (!over) return null;
+      const { inputs } = over.swept, worst = over.factors[over.worst], bound = Array.from(over.factors).filter(own => own > 1).length;
+      const text = bound === 0 ? Bench.word("jam.never", { factor: Bench.shown(worst, 3) })
+        : Bench.word("jam.part", { share: Bench.shown((100 * bound) / inputs.length, 3), at: Bench.shownInput(this.motion, inputs[over.worst]), factor: this.factor(worst) });
+      return make("div", { class: "acts" }, make("p", { class: bound ? "warn" : "soft", id: "jamWhole" }, text),
+        make("button", { type: "button", on: { click: () => { this.motion.to(inputs[over.worst]); this.app.changed("rest"); } } }, Bench.word("jam.worst")));
+    }
+    factor(value) { return Number.isFinite(value) ? Bench.shown(value, 3) : "∞"; }
+
+    /** The answer at the pose that is shown, and its marks on the drawing. */
+    show() {
+      const layer = this.app.view.layers.binding, { motion } = this;
+      if (!this.on || !motion || !motion.ready) { if (layer.firstChild) layer.replaceChildren(); return; }
+      const seats = this.open();
+      if (seats.fault || !this.answer) { layer.replaceChildren(); return; }
+      const now = this.now = seats.at(motion.engine.pose), words = new Map(joints(this.app, this.data));
+      const text = now.binds ? Bench.word("jam.binds", { factor: this.factor(now.factor), joint: words.get(now.first) || "–" })
+        : Bench.word("jam.free", { factor: Bench.shown(now.allowed, 3), joint: words.get(now.first) || "–" });
+      this.answer.replaceChildren(make("p", { class: now.binds ? "warn" : "" }, text));
+      const at = k => { const { a, at_a: own } = this.data.joints[k]; return this.app.view.px(Bench.carried(motion.row(a), own)); };
+      const rings = now.joints.filter(({ joint }) => joint !== this.joint).map(({ joint, used, price }) => {
+        const [cx, cy] = at(joint), kind = joint === now.first ? (now.binds ? "used first binds" : "used first") : "used";
+        const say = Bench.word("jam.used", { joint: words.get(joint), used: Bench.shown(100 * used * now.factor, 3), price: Bench.shown(100 * price, 3) });
+        return svg("circle", { class: kind, "data-joint": joint, cx, cy, r: 13, "stroke-width": 2 + 5 * Math.min(1, price) }, svg("title", {}, say));
+      });
+      layer.replaceChildren(...rings, ...this.handle(at(this.joint)));
+    }
+
+    /** The axis that leans, seen from above: dragged, it leans more, or elsewhere. */
+    handle([x, y]) {
+      const { a, b } = this.data.joints[this.joint], frame = Bench.linkNumber(this.app.sheet, Bench.GROUND), turn = this.motion.row(b === frame ? b : a)[2];
+      const long = this.alpha * HANDLE + 18, to = this.direction + turn, tip = [x + long * Math.cos(to), y - long * Math.sin(to)];
+      const grip = svg("circle", { class: "lean", cx: tip[0], cy: tip[1], r: 9 }, svg("title", {}, Bench.word("jam.lean")));
+      grip.addEventListener("pointerdown", event => {
+        event.stopPropagation();
+        event.preventDefault();
+        const root = this.app.view.root, box = root.getBoundingClientRect();
+        const move = own => {
+          const dx = own.clientX - box.left - x, dy = y - (own.clientY - box.top);
+          Object.assign(this, { alpha: Math.min(30 * DEGREE, Math.max(0, (Math.hypot(dx, dy) - 18) / HANDLE)), direction: Math.atan2(dy, dx) - turn });
+          this.close();
+          this.show();
+        };
+        const up = () => { root.ownerDocument.removeEventListener("pointermove", move); root.ownerDocument.removeEventListener("pointerup", up); this.app.changed("rest"); };
+        root.ownerDocument.addEventListener("pointermove", move);
+        root.ownerDocument.addEventListener("pointerup", up);
+      });
+      return [svg("path", { class: "leans", d: Bench.pathOf([[x, y], tip]) }), grip];
+    }
+
+    /** The program that proves it with the library. */
+    prove() {
+      document.getElementById("snippet").value = this.open().python();
+      document.getElementById("python").showModal();
+    }
+  };
+})();
