@@ -145,7 +145,7 @@ class Person:
 
 def four_bar(person):
     """Draw a crank-rocker of 0-1-2-3 with mouse or fingers: the crank turns fully."""
-    person.look_at(0, 40, 4)
+    person.look_at(0, 40, 2.2 if person.mobile else 4)
     person.tool("link")
     person.drag((-40, 0), (-40, 20))
     person.tool("plate")
