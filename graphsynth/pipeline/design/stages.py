@@ -223,11 +223,12 @@ def _caption(designs: Designs, answer: DesignedMechanism) -> str:
 
 
 def _swing(designs: Designs, answer: DesignedMechanism, name: str) -> str:
-    """How far a link turns on the frame, if a target names it."""
-    if designs.task.names.get(name, True) or name in designs.task.sliding:
+    """How far a link turns on the frame, or against another one, if a target names it."""
+    own = (t for t in designs.task.targets if isinstance(t, LinkTarget) and t.link == name and not t.slides)
+    if (target := next(own, None)) is None:
         return ""
-    angle = np.unwrap(answer.motion.poses[:, answer.carriers[name], 2])
-    return f", which turns through {math.degrees(float(np.ptp(angle))):.4g}°"
+    against = f" against {target.base}" if target.base else ""
+    return f", which turns through {np.ptp(_output(designs, answer, target)):.4g}°{against}"
 
 
 def _drawn_targets(designs: Designs) -> tuple[Shape, ...]:
