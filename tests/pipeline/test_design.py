@@ -190,7 +190,7 @@ def test_the_best_so_far_are_kept_while_it_searches(tmp_path: Path, monkeypatch:
 
     monkeypatch.setattr(search._Run, "_enough", killed)
     with pytest.raises(MemoryError):
-        execute(scene(("records",), paths=[SEGMENT], kept=str(tmp_path)))
+        execute(scene(("records",), paths=[SEGMENT], kept=str(tmp_path), seconds=600))
     (file,) = tmp_path.glob("mechanism-*.toml")
     assert file.name == "mechanism-1.toml" and "P" in gs.Mechanism.from_toml(file.read_text()).points
 
