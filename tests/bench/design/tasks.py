@@ -152,10 +152,10 @@ def _dwell(tolerance: float) -> DesignTask:
 
 
 def _wiper(tolerance: float) -> DesignTask:
-    swing = SwingTarget(least="107.5 deg", most="107.5 deg", time_ratio=1.0, link="blade", tolerance=tolerance)
-    return DesignTask(
-        targets=[swing], links=[4], pivots=[(0, 0), (320, 60)], box=(-150, -200, 450, 350), transmission="28 deg"
+    swing = SwingTarget(
+        least="107.5 deg", most="107.5 deg", time_ratio=1.0, link="blade", pivot=(320, 60), tolerance=tolerance
     )
+    return DesignTask(targets=[swing], links=[4], drive_pivot=(0, 0), box=(-150, -200, 450, 350), transmission="28 deg")
 
 
 def _quick(tolerance: float) -> DesignTask:
@@ -172,12 +172,11 @@ def _leg(tolerance: float) -> DesignTask:
 def _bucket(tolerance: float) -> DesignTask:
     target = FunctionTarget(
         inputs=[0, 0.25, 0.5, 0.75, 1], outputs=np.radians([0, 41.25, 82.5, 123.75, 165]).tolist(), link="bucket",
-        tolerance=tolerance,
+        pivot=(0, 0), tolerance=tolerance,
     )  # fmt: skip
-    pivots = [(0, 0), (0.4, 0.06), (1.7, 0.35)]
     return DesignTask(
-        targets=[target], drive="cylinder", links=[6], pivots=pivots, box=(-0.9, -0.9, 2, 1.2), stroke=(0.5, 1.1),
-        lengths=(0.2, 1.9),
+        targets=[target], drive="cylinder", links=[6], drive_pivot=(1.7, 0.35), pivots=[(0.4, 0.06)],
+        box=(-0.9, -0.9, 2, 1.2), stroke=(0.5, 1.1), lengths=(0.2, 1.9),
     )  # fmt: skip
 
 
