@@ -41,6 +41,8 @@ Array = NDArray[np.float64]
 _RIGID = JointStiffness(math.inf)
 #: Elastic tilts beyond this are no small ones any more (radians).
 _SMALL = 0.1
+#: Shifts of pins beyond this, over the size of the mechanism, are no work of clearances and contacts.
+_FAR = 0.02
 
 
 @checked
@@ -309,6 +311,8 @@ def _notes(motion: Motion, given: JointProblem, known: Array, loaded: _Loaded, p
     notes = []
     if used := int((plane.shift.max(axis=1, initial=0.0) > 0.0).sum()):
         notes.append(f"at {used} samples the mechanism closes only with its pins shifted")
+    if (way := float(plane.shift.max(initial=0.0)) / motion.Lc) > _FAR:
+        notes.append(f"pins are pressed {100.0 * way:.2g} % of the mechanism's size aside: it would break before that")
     if given.layout.loops == 0 and not (plane.energy.any() or plane.blocked.any()):
         notes.append("no closed loop of guided joints: nothing can bind")
     if missing := int((~motion.assembled & ~plane.blocked).sum()):

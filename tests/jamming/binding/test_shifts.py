@@ -174,6 +174,12 @@ def test_a_guide_is_held_and_lengths_have_their_unit() -> None:
     np.testing.assert_allclose(found[0].elastic_torque, found[1].elastic_torque, rtol=1e-6, atol=1e-9)
 
 
+def test_far_beyond_its_range_it_would_break() -> None:
+    motion = parallelogram(0.02).simulate(U, modes={0: 1}, events=False)
+    report = motion.binding(**limits(motion.mechanism, 1e-4))
+    assert any("would break" in note for note in report.notes)
+
+
 def test_what_is_refused() -> None:
     mechanism = parallelogram()
     motion = mechanism.simulate(U, events=False)
