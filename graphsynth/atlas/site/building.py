@@ -166,8 +166,8 @@ def _stored(catalogue: Catalogue, keys: dict[int, str]) -> dict[int, tuple[int, 
         try:
             mechanism = Mechanism.from_json(own.text)
             frame = mechanism.graph.frame
-            fits = frame is not None and mechanism.graph.without_frame() == MechanismGraph.from_key(keys[own.chain_id])
-            if fits and mechanism.drivers:
+            fits = mechanism.graph.without_frame() == MechanismGraph.from_key(keys[own.chain_id])
+            if frame is not None and fits and mechanism.drivers:
                 drivers = [driver.link if driver.base == frame else driver.base for driver in mechanism.drivers]
                 found[own.chain_id] = frame, drivers, fragment(_traced(mechanism))
         except GraphsynthError:
@@ -177,13 +177,15 @@ def _stored(catalogue: Catalogue, keys: dict[int, str]) -> dict[int, tuple[int, 
 
 def _traced(mechanism: Mechanism) -> Mechanism:
     """Return a mechanism with a point in the middle of up to two links that have no joint on the frame."""
+    from graphsynth.mechanism.model import TracePoint
+
     frame, points = mechanism.graph.frame, dict(mechanism.points)
     for link in range(mechanism.graph.links):
         ends = [joint for joint in mechanism.joints if link in (joint.a, joint.b)]
         if link != frame and len(points) < 2 and all(frame not in (joint.a, joint.b) for joint in ends):
             places = [joint.at_a if joint.a == link else joint.at_b for joint in ends]
             x, y = (sum(place[c] for place in places) / len(places) for c in (0, 1))
-            points[f"P{len(points) + 1}"] = (link, (x, y))
+            points[f"P{len(points) + 1}"] = TracePoint(link, (x, y))
     return replace(mechanism, points=points)
 
 
