@@ -3,8 +3,8 @@
     python catalog/build_shipped.py
 
 All planar chains of mobility-1 joints with mobility 1 to 4 and at most ten links, fractionated ones included.  One
-mechanism of each chain of mobility 1 with at most eight links has dimensions with which it turns; the four-bar linkage
-also has a verdict on jamming.
+mechanism of each chain with at most eight links has dimensions with which it turns, where drivers on one link move it
+(in five chains of mobility 3 and 4 none do); the four-bar linkage also has a verdict on jamming.
 
 The check compares the structural content exactly (digest of all rows, and the statement beside it), and which
 mechanisms were evaluated, with every status, unit and guarantee.  The digits of dimensions are found by optimisation;
@@ -35,7 +35,7 @@ def build(path: Path) -> None:
 def evaluate(path: Path) -> None:
     """Give the smaller chains dimensions."""
     with Catalogue(path) as catalogue:
-        catalogue.evaluate(EVALUATED, [1])
+        catalogue.evaluate(EVALUATED, MOBILITIES)
         catalogue.evaluate([4], [1], jamming=JAMMING)
 
 
