@@ -109,7 +109,9 @@ def build(wanted: str, path: Path) -> None:
         for source in ("runtime.c", "support.h"):
             (folder / source).write_bytes((FOLDER / source).read_bytes())
         subprocess.run([sys.executable, "-m", "ziglang", *options.split()], cwd=folder, check=True)
-        path.write_bytes((folder / "out.so").read_bytes())
+        part = path.with_suffix(".part")
+        part.write_bytes((folder / "out.so").read_bytes())
+        part.replace(path)  # a process that has the old one loaded keeps it
 
 
 def main() -> None:
