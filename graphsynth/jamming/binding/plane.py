@@ -3,7 +3,7 @@
 Unknowns are the poses of the links, z = (x, y, Lc theta).  Rows that are held (drivers, rigid joints, guides) are
 solved exactly, and the energy of the contacts is minimised on what they leave free, by Newton's method in a trust
 region: the bending of the held rows and of the contacts counts, so that links in line are found.  See
-theory/what-binding-costs 9.
+theory/what-binding-costs 10.
 """
 
 from __future__ import annotations

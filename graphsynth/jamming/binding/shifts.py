@@ -106,7 +106,7 @@ def at_rest(motion: Motion) -> Shifted:
 
 
 def shifted(motion: Motion, limits: Sequence[Limits], springs: Sequence[JointStiffness], unit: float) -> Shifted:
-    """Follow a motion through the samples at which it is not assembled; see theory/what-binding-costs 9."""
+    """Follow a motion through the samples at which it is not assembled; see theory/what-binding-costs 10."""
     clearance = np.array([own.radial_clearance for own in limits])
     stiff = np.array([own.radial for own in springs])
     soft = (clearance > 0.0) | np.isfinite(stiff)

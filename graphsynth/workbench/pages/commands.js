@@ -23,7 +23,8 @@
     }),
     all: app => app.select([...Object.keys(app.sheet.points), ...Object.keys(app.sheet.links).filter(id => id !== Bench.GROUND)]),
     fit: app => {
-      app.view.fit(Bench.boxWithPaths(app));
+      app.view.fit(Bench.boxWithPaths(app), document.getElementById("player").offsetHeight);
+      app.fitted = { sheet: app.sheet, camera: JSON.stringify(app.view.camera) };
       app.changed("view");
     },
     fresh: app => {

@@ -160,7 +160,12 @@
     });
     let later = 0;
     app.on("sheet", () => { clearTimeout(later); later = setTimeout(() => Bench.keep(app), 500); });
-    new ResizeObserver(() => { app.view.resize(); soon(); }).observe(app.view.root);
+    new ResizeObserver(() => {
+      app.view.resize();
+      // what was shown whole, and has not been changed or moved since, is shown whole again
+      if (app.fitted && app.fitted.sheet === app.sheet && app.fitted.camera === JSON.stringify(app.view.camera)) Bench.do.fit(app);
+      else soon();
+    }).observe(app.view.root);
   }
 
   async function start() {

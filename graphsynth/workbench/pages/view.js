@@ -33,14 +33,14 @@
       return { x: camera.x + (x - this.width / 2) / camera.scale, y: camera.y - (y - this.height / 2) / camera.scale };
     }
 
-    /** Show a box, with a margin; a drawing of one point is shown at the scale there is. */
-    fit(box) {
+    /** Show a box, with a margin, above the pixels that are covered; a drawing of one point is shown at the scale there is. */
+    fit(box, covered = 0) {
       if (!box) return;
-      const wide = box[2] - box[0], high = box[3] - box[1];
-      this.camera.x = (box[0] + box[2]) / 2;
-      this.camera.y = (box[1] + box[3]) / 2;
-      const room = 0.68, scale = Math.min((this.width * room) / (wide || 1e-9), (this.height * room) / (high || 1e-9));
+      const wide = box[2] - box[0], high = box[3] - box[1], free = Math.max(1, this.height - covered);
+      const room = 0.68, scale = Math.min((this.width * room) / (wide || 1e-9), (free * (covered ? 0.8 : room)) / (high || 1e-9));
       if (wide || high) this.camera.scale = Math.min(1e9, Math.max(1e-6, scale));
+      this.camera.x = (box[0] + box[2]) / 2;
+      this.camera.y = (box[1] + box[3]) / 2 - covered / (2 * this.camera.scale);
     }
 
     /** Zoom about a place in pixels. */
