@@ -54,8 +54,8 @@ def pytest_make_collect_report(collector: pytest.Collector) -> Generator[None, p
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """All workers must have the same order; long examples of docstrings, and files that need extras, are marked."""
-    items.sort(key=lambda item: item.path)
+    """All workers have the same order, of whole subjects first, since a file stays on one of them; set marks."""
+    items.sort(key=lambda item: (len(item.path.parts), item.path))
     for item in items:
         if item.name in _LONG:
             item.add_marker("long")

@@ -47,6 +47,7 @@ def test_it_is_complete_and_small(shipped):
     assert shipped.path.stat().st_size < 1_000_000
 
 
+@pytest.mark.long
 def test_the_builder_makes_the_same_today(shipped, script, tmp_path):
     script.build(tmp_path / "x.sqlite")
     with Catalogue(tmp_path / "x.sqlite") as fresh:

@@ -72,6 +72,7 @@ def test_platform_without_inertia(benchmark):
     assert found.angle[-1] == pytest.approx(9.2851768505979327, rel=1e-12)
 
 
+@pytest.mark.long
 def test_reactions_of_a_turn(benchmark):
     theta = np.linspace(0.0, math.tau, 10_000)
     found = repeat(benchmark, lambda: reactions(Braider(), theta, 1.803, 0.0))
@@ -87,6 +88,7 @@ def test_platform_with_outputs(benchmark):
     assert found.speed[-1] == pytest.approx(END, rel=2e-11)
 
 
+@pytest.mark.long
 def test_platform_with_outputs_by_scipy(benchmark):
     """LSODA of scipy on the same equations and Jacobian, compiled, at about the same error."""
     from numba import njit

@@ -139,6 +139,7 @@ def test_four_bar_beside_exudyn_at_equal_error(four_bar_runs, capsys, step):
     report(capsys, f"exudyn step {step:g} s", ours, (abs(found.poses[-1, 1, 2] - G1_END), found.seconds))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("step", [1e-3, 1e-4])
 def test_four_bar_beside_mujoco_at_equal_error(four_bar_runs, capsys, step):
     pytest.importorskip("mujoco")

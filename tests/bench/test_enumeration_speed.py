@@ -59,6 +59,7 @@ def test_list_chains_to_disk(benchmark, fresh, links, count):
     assert repeat(benchmark, lambda: listing(links, fresh()), rounds=1 if links == 16 else 5) == count
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("links", "count"), [(12, 6856), (14, 318162)])
 def test_list_chains_as_graphs(benchmark, links, count):
     assert repeat(benchmark, lambda: sum(1 for _ in enumerate_chains(links))) == count
@@ -121,6 +122,7 @@ def best(function, times=3):
     return min(seconds), result
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("links", "count"), [(12, 6856), (14, 318162)])
 def test_ratio_to_geng(capsys, baseline, fresh, links, count):
     """Print how many times faster than geng with a C filter; geng and the filter have a core each."""

@@ -45,6 +45,7 @@ def test_inverse(benchmark, sigma):
     assert (got.status <= 3).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", PLATFORMS)
 def test_all_modes(benchmark, name):
     got = repeat(benchmark, lambda: PLATFORMS[name].direct_batch(ANGLES))

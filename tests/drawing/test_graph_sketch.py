@@ -72,6 +72,7 @@ def test_two_views_side_by_side_in_every_kind_of_file(tmp_path: Path) -> None:
         save(tmp_path / "x.bmp", [sketch], [pose])
 
 
+@pytest.mark.long
 def test_svg_pictures_load_no_matplotlib() -> None:
     """The writers of SVG and HTML stay with numpy."""
     code = (

@@ -27,6 +27,7 @@ def rectangles(axes):
     return [p.get_bbox() for p in axes.patches if type(p).__name__ == "Rectangle"]
 
 
+@pytest.mark.long
 def test_boxes_of_the_crossings():
     problem = circle_ellipse(5, 6, 4, 1, "0.1")
     boxes = krawczyk_boxes(problem, tolerance=0.05)
@@ -118,6 +119,7 @@ def test_cylinders_in_space_without_and_with_jamming():
             space_picture(*arguments)
 
 
+@pytest.mark.long
 def test_areas_with_the_windows_of_the_source():
     curve = area_curve(f=np.radians(np.linspace(90, 450, 181)))
     figure = drawn(area_picture(curve))
@@ -142,6 +144,7 @@ def bands(axes):
     return [(p.get_x(), p.get_x() + p.get_width(), p.get_facecolor()[:3]) for p in axes.patches]
 
 
+@pytest.mark.long
 def test_report_shows_what_is_proved():
     report = assess_jamming(ToleranceBox(alpha="1/30", azimuth="0 +- 0.05"), samples=91)
     figure = drawn(report_picture(report))

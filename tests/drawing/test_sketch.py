@@ -64,6 +64,7 @@ def test_a_path_breaks_where_the_mechanism_cannot_be_assembled() -> None:
     assert "nan" not in sketch.svg()
 
 
+@pytest.mark.long
 @given(st.text(max_size=20), st.floats(-1e6, 1e6))
 def test_any_text_and_number_stay_well_formed(text: str, value: float) -> None:
     clean = "".join(c for c in text if c.isprintable())

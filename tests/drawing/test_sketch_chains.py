@@ -86,6 +86,7 @@ def check(sketch: JointLayout) -> None:
     assert closest >= 0.3 * sum(lengths) / len(lengths)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("links", "chains", "planar"), [(4, 1, 1), (6, 2, 2), (8, 16, 16), (10, 230, 219)])
 def test_every_planar_chain_has_no_crossing_and_room(links: int, chains: int, planar: int) -> None:
     sketches = [layout(chain) for chain in enumerate_chains(links)]
@@ -166,6 +167,7 @@ def test_one_crossing_pair_leaves_a_planar_graph() -> None:
     assert not sketch.planar and sketch.crossings > 0
 
 
+@pytest.mark.long
 def test_forces_count_their_own_crossings() -> None:
     """The count behind the choice agrees with the exact one on every non-planar chain."""
     for chain in enumerate_chains(10):

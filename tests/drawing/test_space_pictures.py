@@ -75,6 +75,7 @@ def covered(svg):
                       if (a[0] < b[1]).all() and (b[0] < a[1]).all()]  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("view", [(-70.0, 25.0), (-60.0, 25.0), (10.0, 40.0), (120.0, 60.0), (-90.0, 90.0)])
 def test_labels_stand_on_no_line_and_on_no_other_label(view):
     """Four axes, each off in its own direction, and long labels; from above the axes are points."""

@@ -113,6 +113,7 @@ def test_automatic_form_goes_on_where_the_engine_does_not_start():
 CASES = [*((6, seed) for seed in range(4)), *((8, seed) for seed in range(8))]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("links", "seed"), CASES)
 def test_reactions_against_fifty_digits(links, seed):
     model, start, points, _ = random_model(links, seed)

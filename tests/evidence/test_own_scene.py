@@ -54,6 +54,7 @@ def test_bearings_are_those_of_the_scene(tmp_path):
     assert max(row.error for row in problem.of("samples")) < 0.01
 
 
+@pytest.mark.long
 def test_loads_are_those_of_the_scene(tmp_path):
     problem = planar.linkage_dynamics(stated(tmp_path, loads={"bar_kg_per_m": 1.0, "speed_rad_s": 5.0}), QUICK)
     assert "own of the scene" in problem.question and "so it shares code" in problem.note

@@ -222,6 +222,7 @@ def test_a_proof_of_something_else_is_a_failure(monkeypatch):
         assert {row.status for row in by(problem, method)} == {RowStatus.FAILED}
 
 
+@pytest.mark.long
 def test_near_a_double_root_doubles_give_up_and_say_so():
     problem = double_root_problem(QUICK)
     assert all(row.good for row in by(problem, "sextic and Newton"))

@@ -171,6 +171,7 @@ class Page(HTMLParser):
         self.text += data
 
 
+@pytest.mark.long
 def test_page_stands_alone(folder):
     text = (folder / "accuracy.html").read_text(encoding="utf-8")
     page = Page()
@@ -183,6 +184,7 @@ def test_page_stands_alone(folder):
     assert "<numbers>" not in text
 
 
+@pytest.mark.long
 def test_failures_are_drawn_above_everything_that_has_an_error():
     axes = work_precision_picture(PROBLEM).axes[0]
     crosses = [line for line in axes.lines if line.get_marker() == "x" and len(line.get_xdata())]
@@ -295,6 +297,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_measuring(tmp_path, c
         assert error.count("\n") == 1 and str(folder).split("/below")[0] in error
 
 
+@pytest.mark.long
 def test_ctrl_c_at_the_terminal(small, monkeypatch, tmp_path, capsys):
     stopped = (plan(problem_of_test), plan(problem_that_is_stopped))
     monkeypatch.setattr("graphsynth.pipeline.system.plans_of", lambda name, structure: stopped)

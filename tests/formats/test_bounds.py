@@ -90,6 +90,7 @@ NAMES = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=8
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [name for name, entry in formats.FORMATS.items() if entry.mechanisms])
 @settings(max_examples=25)
 @given(drawn=mechanisms(4, 6, prismatic=True), names=st.lists(NAMES, max_size=3, unique=True))

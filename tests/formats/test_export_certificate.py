@@ -26,6 +26,7 @@ def certificate(start):
     return certify_export(g1(), start, np.linspace(0.0, 2.0, 5), [MujocoSettings(h) for h in STEPS], 1e-4)
 
 
+@pytest.mark.long
 def test_record_is_complete(certificate):
     record = json.loads(certificate.to_json())
     assert record["verdict"] == "yes" and record["engine"] == "MuJoCo" and record["cuts"] == [[2, 3]]

@@ -23,6 +23,7 @@ def start():
     return consistent_start(g1(), modes={0: 1}, keep={(0, 1): 0.0}, keep_rates={(0, 1): 10.0})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("settings", "error"),
     [

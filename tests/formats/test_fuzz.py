@@ -193,6 +193,7 @@ def fuzz(read: Callable[[bytes], object], valid: list[bytes], seed: int, count: 
     return accepted, longest
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_mutations_are_read_or_refused(name: str) -> None:
     accepted, longest = fuzz(lambda data: formats.read_text(data, name), samples(name), 7, 1000)
@@ -232,6 +233,7 @@ def test_a_hundred_thousand_mutations_given_to_a_class(kind: str) -> None:
     assert longest < 1.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_what_is_read_can_be_written_and_read_again(name: str) -> None:
     source, valid = random.Random(3), samples(name)

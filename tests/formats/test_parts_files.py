@@ -120,6 +120,7 @@ def test_the_bill_is_read_again(made, tmp_path):
     assert float(rows[1]["area"]) == pytest.approx(made.bill[1].area, rel=1e-5)
 
 
+@pytest.mark.long
 def test_step_has_the_exact_volume(tmp_path):
     cad = pytest.importorskip("build123d")
     made = MADE["slider"]

@@ -38,6 +38,7 @@ def checked(text: str, folder: Path) -> list[str]:
     return done.stdout.splitlines()
 
 
+@pytest.mark.long
 def test_every_public_name_has_a_type(tmp_path: Path) -> None:
     names = public_names()
     packages = sorted({name.rpartition(".")[0] for name in names})
@@ -50,12 +51,14 @@ def test_every_public_name_has_a_type(tmp_path: Path) -> None:
     assert [line for line in said if ": error:" in line] == []
 
 
+@pytest.mark.long
 def test_a_wrong_call_is_seen(tmp_path: Path) -> None:
     said = checked('import graphsynth as gs\n\nx: str = gs.count_chains("twelve", nonsense=3)\n', tmp_path)
     assert sum(": error:" in line and "script.py" in line for line in said) >= 2, said
     assert any("str" in line for line in said) and any("nonsense" in line for line in said)
 
 
+@pytest.mark.long
 def test_angles_are_given_as_texts_and_read_as_numbers(tmp_path: Path) -> None:
     said = checked(
         """from graphsynth.design import DesignTask, DwellTarget, PathTarget, PosesTarget, SwingTarget

@@ -36,6 +36,7 @@ FLUSH = """
 """
 
 
+@pytest.mark.long
 @needs_control_word
 @pytest.mark.parametrize(
     ("change", "word"),

@@ -80,6 +80,7 @@ def apply(name, lo, hi):
     return low, high
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_errors_stay_below_what_is_proved(name):
     assert PROVED[name] <= ERROR[name] / 2.0

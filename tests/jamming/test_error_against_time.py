@@ -59,6 +59,7 @@ def test_arcs():
         Effort(rounds=0)
 
 
+@pytest.mark.long
 def test_a_shared_misalignment():
     problem = lambda_problem(TiltedFourBar(), Bearing(), effort=Effort(rounds=1, quick=True))
     coarse, _, fine = (row.error for row in problem.of("samples"))

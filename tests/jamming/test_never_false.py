@@ -20,6 +20,7 @@ from known_verdicts import check_box, check_limits, check_sweep, count_undecided
 KINDS = ("moderate", "extreme", "change point")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_known_verdicts(kind):
     assert count_undecided(50, 1, kind) <= 1  # margins from 1e-9 to 0.3
@@ -51,11 +52,13 @@ def boxes(count, seed):
         yield check_box(rng, box, condition)
 
 
+@pytest.mark.long
 def test_boxes_hold_their_members():
     found = [one.verdict for one in boxes(40, 4)]
     assert {Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED, Verdict.CERTIFIED_JAMMED_FOR_SOME} <= set(found)
 
 
+@pytest.mark.long
 def test_sweeps_and_limits_hold_their_members():
     for k, drawing in enumerate(drawn(8, 8)):
         check_sweep(*drawing)

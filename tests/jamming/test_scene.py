@@ -84,6 +84,7 @@ def compared(**changes):
     return found.rows, found.note, said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("alpha", [1 / 30, 0.3])
 def test_the_scene_tells_exact_closure_beside_small_tilts(alpha):
     (alone, shared), note, (finding,) = compared(alpha=alpha)

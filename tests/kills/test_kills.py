@@ -26,6 +26,7 @@ def campaign(*options: str) -> dict[str, object]:
     return report
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("quick", ["count", "run"])
 def test_a_few_kills(quick: str) -> None:
     report = campaign("--kills", "2", "--seed", "8", "--only", quick)

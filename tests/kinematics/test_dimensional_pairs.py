@@ -97,6 +97,7 @@ def test_rule_of_kinds() -> None:
     assert by_pair(FIXED_AXES, {(0, 1): "P"})[1, 4] == "pin-slot"
 
 
+@pytest.mark.long
 def test_a_pin_in_a_slot_by_choice() -> None:
     found = embody(APART, joints={(1, 3): "pin-slot"})
     assert found.accepted and found.mechanism is not None

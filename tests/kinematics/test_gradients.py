@@ -123,6 +123,7 @@ def precise(own: Mechanism, pose: np.ndarray, coordinates: list) -> dict[tuple[i
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     ["four-bar", "slider-crank", "slider driven", "floating driver", "planet", "slot", "cam", "class III",

@@ -122,6 +122,7 @@ def test_floats_are_inside_of_intervals_and_near_many_digits(joint):
                 assert Interval(one).lo <= number <= Interval(one).hi
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("joint", SOME, ids=lambda joint: joint.kind)
 def test_derivatives_are_those_of_the_values(joint):
     """Automatic derivatives of the values over a box, and formulas, against the derivatives that the class states."""

@@ -35,6 +35,7 @@ def table(report: Any, title: str) -> Any:
     return next(t for t in report["tables"] if t.title.startswith(title))
 
 
+@pytest.mark.long
 def test_published_values(report: Any) -> None:
     (record,) = report["records"]
     assert record.status == "assessed" and record.good
@@ -124,6 +125,7 @@ def test_an_antenna_whose_legs_do_not_reach() -> None:
     assert math.isnan(float(table(report, "Both cranks").rows[-1][1]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("mechanism", "words"),
     [

@@ -153,6 +153,7 @@ def test_mistakes_are_told_with_their_place(mechanism: dict[str, Any], words: st
         execute(scene(**mechanism))
 
 
+@pytest.mark.long
 def test_the_chart_of_a_stroke_shows_its_limits_and_the_caption_what_is_reached() -> None:
     swing = {"least_deg": 50, "most_deg": 55, "time_ratio": 1, "link": "blade"}
     report = execute(scene(("tables", "animations", "plots"), swings=[swing], pivots=[[0, 0], [4, 1]]))

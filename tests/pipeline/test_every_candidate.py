@@ -58,6 +58,7 @@ def both() -> Any:
     return execute(Scene.from_mapping(scene))
 
 
+@pytest.mark.long
 def test_both_are_assessed_and_ranked(both: Any) -> None:
     records = both["records"]
     assert [record.status for record in records] == ["assessed", "assessed"]
@@ -154,6 +155,7 @@ def test_the_unit_of_length_is_a_pivot_a_pin_or_a_wheel() -> None:
     assert _crank(wheels(PinSlot(2, 1, (0.01, 0.0), (0.5, 0.0)))) == 0.5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["four-link", "geared-five-link", "two-dof-seven-link"])
 def test_a_question_is_run_to_verdicts(name: str, tmp_path: Path) -> None:
     """A file of a structural question is enough: all its mechanisms have a verdict, and shares are exact."""

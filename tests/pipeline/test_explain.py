@@ -48,6 +48,7 @@ LISTED = [
 OF_THE_PAGE = {"jinja2", "markupsafe"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", LISTED)
 def test_a_shipped_scene_loads_exactly_what_is_on_its_list(name: str, tmp_path: Path) -> None:
     modules = loaded(name, tmp_path)
@@ -112,6 +113,7 @@ def least_seconds(arguments: list[str], times: int = 7) -> float:
     return least
 
 
+@pytest.mark.long
 def test_start_up_is_quick() -> None:
     """Beside four modules of the standard library: processor time beyond that of an empty program."""
     empty = least_seconds(["-c", "pass"])

@@ -73,6 +73,7 @@ def test_the_first_screen_says_what_the_library_finds(cost: gs.BindingReport) ->
         np.testing.assert_allclose([float(cell) for cell in row[1:]], own[1:], rtol=1e-3)
 
 
+@pytest.mark.long
 def test_two_presses_and_a_weak_motor() -> None:
     """The short rod blocks a weak motor, the long one does not; each sentence names its mechanism."""
     files = tuple(f"mechanisms/press_with_{rod}_rod.toml" for rod in ("short", "long"))
@@ -84,12 +85,14 @@ def test_two_presses_and_a_weak_motor() -> None:
     assert "press_with_long_rod: Estimated: binds" in findings[1].text
 
 
+@pytest.mark.long
 def test_the_curve_has_the_words_of_the_table() -> None:
     report = execute(changed(["binding_tables", "binding_curves"]))
     (picture,), (table,) = report["binding_curves"], report["binding_tables"]
     assert picture.caption == table.findings[0].text and "<svg" in picture.svg
 
 
+@pytest.mark.long
 def test_a_fit_counts_with_its_middle(cost: gs.BindingReport) -> None:
     """The crank pin has the clearance of its fit instead of that of the other bearings; a large tilt has a note."""
     fit = {"kind": "fit", "joint": [1, 2], "fit": "30 F7/h6", "height_mm": 40}

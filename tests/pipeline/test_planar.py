@@ -101,6 +101,7 @@ def test_a_motor_brings_it_near_its_speed_without_load(tmp_path: Path) -> None:
     assert 0.0 < found["ripple of the speed"] < 0.1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "own",
     [
@@ -246,6 +247,7 @@ def question(products: list[str], **mechanism: Any) -> dict[str, Any]:
     }
 
 
+@pytest.mark.long
 def test_a_question_is_answered_with_mechanisms_of_the_size_asked_for(tmp_path: Path) -> None:
     report = run(
         Scene.from_mapping(question(["records", "ranking", "mechanisms", "mechanism_pictures", "plots"])), tmp_path
@@ -260,6 +262,7 @@ def test_a_question_is_answered_with_mechanisms_of_the_size_asked_for(tmp_path: 
     assert json.loads((tmp_path / "scene.json").read_text())["notes"] == []
 
 
+@pytest.mark.long
 def test_goals_that_nothing_meets_and_one_that_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     tables = question(
         ["records"], embody={"min_transmission_deg": 88, "max_length_ratio": 2, "tries": 1, "effort": 0.1}
@@ -282,6 +285,7 @@ def test_goals_that_nothing_meets_and_one_that_fails(monkeypatch: pytest.MonkeyP
     assert records[1].reason == "ZeroDivisionError: two"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("target", "largest"),
     [

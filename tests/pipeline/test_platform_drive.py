@@ -91,6 +91,7 @@ def test_dead_centres_are_the_printed_ones(report: Any) -> None:
     assert angles == pytest.approx([9.35025947738, 9.28633740927, 9.28519324711, 9.28517685060], abs=2e-11)
 
 
+@pytest.mark.long
 def test_limit_is_of_first_order(report: Any) -> None:
     assert report["limit"].order[0] > 0.85 and report["limit"].order[1:] == pytest.approx(1.0, abs=0.01)
     assert report["limit"].steps.max() < 1.6 * report["limit"].steps.min()

@@ -52,6 +52,7 @@ def changed(**risk: object) -> Scene:
     return replace(Scene.from_mapping(raw), folder=SCENE.parent)
 
 
+@pytest.mark.long
 def test_the_risk_alone() -> None:
     (risk, quantities) = execute(changed(distribution="uniform", width=0.05))["tables"]
     assert risk.rows[0][0] == "proved bounds" and " % to " in risk.rows[0][1]

@@ -65,6 +65,7 @@ def test_ctrl_c_and_again(springs: Path, tmp_path: Path, options: tuple[str, ...
     assert (tmp_path / "out" / "results.csv").read_bytes() == (tmp_path / "straight" / "results.csv").read_bytes()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cut", [1, 2, 40, 150, 300, 700, 1500])
 def test_a_file_cut_anywhere_is_continued_to_the_same_bytes(springs: Path, tmp_path: Path, cut: int) -> None:
     run(springs, out=tmp_path)
@@ -95,6 +96,7 @@ def stop_after(path: Path, lines: int) -> None:
     path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:lines]))
 
 
+@pytest.mark.long
 def test_another_question_or_a_strange_file_is_refused_and_fresh_replaces_it(springs: Path, tmp_path: Path) -> None:
     run(springs, out=tmp_path)
     path = tmp_path / "candidates.jsonl"

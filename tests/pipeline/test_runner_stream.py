@@ -67,6 +67,7 @@ def test_ranking_in_the_report_counts_reasons(springs: Path, tmp_path: Path) -> 
     assert set(ranking.numbers) == {n for n in range(1, 21) if n % 3 and n != 7}
 
 
+@pytest.mark.long
 def test_the_same_bytes_for_one_worker_two_workers_and_threads(springs: Path, tmp_path: Path) -> None:
     run(springs, out=tmp_path / "one")
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
@@ -155,6 +156,7 @@ values = st.recursive(
 )
 
 
+@pytest.mark.long
 @given(values, st.floats(allow_nan=False))
 def test_values_survive_the_journal(value: object, number: float) -> None:
     record = Record(1, "k", margins=(Quantity("q", number, "mm", "certified", 0.5),))

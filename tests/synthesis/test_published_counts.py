@@ -66,7 +66,7 @@ def test_chains(row):
 def listed():
     found = [row for row in rows("chains") if row.values[0]["count"] < 10_000]
     return [
-        pytest.param(*row.values, id=row.id, marks=pytest.mark.long if row.values[0]["count"] > 1_000 else row.marks)
+        pytest.param(*row.values, id=row.id, marks=pytest.mark.slow if row.values[0]["count"] > 5_000 else row.marks)
         for row in found
     ]
 

@@ -53,6 +53,7 @@ def labels(window):
 # --- browsing
 
 
+@pytest.mark.long
 def test_the_first_page_shows_all_chains_with_sketches(page):
     window = page()
     until(window, "document.querySelectorAll('#list .thumb svg').length === 19")
@@ -223,6 +224,7 @@ def test_names_and_uses_are_found(page):
     assert "Klann" in text and "patent" in text
 
 
+@pytest.mark.long
 def test_evaluations_are_shown_and_what_lacks_is_not_computed(window, tmp_path):
     with Catalogue.build(tmp_path / "own.sqlite", links=[4, 6]) as own:
         own.evaluate(links=[4])

@@ -99,6 +99,7 @@ def test_the_workbench_is_part_of_the_site(report):
     assert (folder / "index.html").is_file() and (folder / "chains-data.js").is_file()
 
 
+@pytest.mark.long
 def test_the_page_is_the_same_whoever_works(report, catalogue, tmp_path):
     with ThreadPoolExecutor(2) as executor:
         again = build_site(catalogue, tmp_path / "again", executor=executor)
@@ -116,6 +117,7 @@ def test_nothing_comes_from_elsewhere(report):
             assert not re.search(r"\bfetch\(|XMLHttpRequest|type=.?module|\bimport\(", text), path.name
 
 
+@pytest.mark.long
 def test_large_families_are_not_in_the_first_load(catalogue, tmp_path, monkeypatch):
     from graphsynth.atlas.site import building
 
@@ -126,6 +128,7 @@ def test_large_families_are_not_in_the_first_load(catalogue, tmp_path, monkeypat
     assert (small.page.parent / "data" / "family-1-8.js").is_file()
 
 
+@pytest.mark.long
 def test_an_old_page_is_replaced_and_anything_else_is_refused(catalogue, tmp_path):
     place = tmp_path / "page"
     build_site(catalogue, place)
@@ -144,6 +147,7 @@ def test_an_old_page_is_replaced_and_anything_else_is_refused(catalogue, tmp_pat
         build_site(catalogue, tmp_path / "no" / "such" / "folder")
 
 
+@pytest.mark.long
 def test_a_failed_build_leaves_the_old_page(catalogue, tmp_path, monkeypatch):
     from graphsynth.atlas.site import building
 
@@ -170,6 +174,7 @@ def test_unfinished_catalogues_are_refused(tmp_path):
     assert not (tmp_path / "page").exists()
 
 
+@pytest.mark.long
 def test_the_command_writes_the_page(catalogue, tmp_path, capsys):
     assert main(["catalog", "site", str(catalogue.path), "-o", str(tmp_path / "a"), "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
@@ -180,6 +185,7 @@ def test_the_command_writes_the_page(catalogue, tmp_path, capsys):
     shutil.rmtree(tmp_path / "a")
 
 
+@pytest.mark.long
 def test_evaluations_of_the_catalogue_are_handed_over(tmp_path):
     path = tmp_path / "own.sqlite"
     with Catalogue.build(path, links=[4]) as own:
@@ -190,6 +196,7 @@ def test_evaluations_of_the_catalogue_are_handed_over(tmp_path):
     assert data["evaluations"] == {"0": [[frame, str(driver), "jamming", "free", 0.25, "rad", "certified"]]}
 
 
+@pytest.mark.long
 def test_stored_dimensions_are_handed_to_the_workbench(tmp_path):
     with Catalogue.build(tmp_path / "own.sqlite", links=[4, 6]) as own:
         own.evaluate(links=[4])
@@ -216,6 +223,7 @@ def test_stored_dimensions_are_handed_to_the_workbench(tmp_path):
     assert (moved.graph.frame, [own.link for own in moved.drivers]) == (frame, drivers)
 
 
+@pytest.mark.long
 def test_other_mobilities_and_fractionated_chains(tmp_path):
     with Catalogue.build(tmp_path / "two.sqlite", links=[5, 7], mobility=2, fractionated=True) as own:
         page = build_site(own, tmp_path / "page")

@@ -35,6 +35,7 @@ def right(built, tmp_path_factory):
     return path
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", sorted(WRONG))
 def test_damage_is_one_sentence(right, tmp_path, altered, capsys, kind):
     path, page = tmp_path / "x.sqlite", tmp_path / "page"

@@ -101,6 +101,7 @@ def edited(**new: object):
     return lambda data: json.dumps(json.loads(data) | new).encode()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "change"),
     [

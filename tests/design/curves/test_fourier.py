@@ -72,6 +72,7 @@ def test_repeated_points_count_for_nothing_and_a_point_has_no_curve() -> None:
     assert np.abs(both[0] - plain).max() < 1e-15 and not both[1].any()
 
 
+@pytest.mark.long
 @given(st.integers(0, 10**6), st.integers(3, 40), st.booleans())
 def test_no_motion_changes_sizes_or_distances(seed: int, corners: int, closed: bool) -> None:
     z = polygon(seed, corners, closed)
@@ -93,6 +94,7 @@ def test_sizes_are_never_farther_apart_than_the_curves(seed: int, closed: bool) 
     assert bound <= apart + 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(12))
 def test_alignment_is_the_best_of_a_dense_search(seed: int) -> None:
     one, two = (unit_of(polygon(3 * seed + k, 9, True), True) for k in (1, 2))

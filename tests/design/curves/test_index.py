@@ -122,6 +122,7 @@ def test_only_some_mechanisms_are_asked_for(index: CurveIndex) -> None:
     assert index.find(curve, 5, only=lambda design: False) == []
 
 
+@pytest.mark.long
 def test_open_curves_within_a_range_of_the_driver(index: CurveIndex) -> None:
     angles = np.linspace(0.0, math.tau, 100)
     curve = np.column_stack([angles, 0.4 * np.sin(angles) ** 2])
@@ -143,6 +144,7 @@ def test_the_nearest_are_those_of_brute_force(index: CurveIndex) -> None:
         assert len({match.number for match in every}) == 5
 
 
+@pytest.mark.long
 def test_starts_begin_a_search(index: CurveIndex) -> None:
     random = np.random.default_rng(5)
     found = 0

@@ -16,6 +16,7 @@ def paths():
     return task, begin, follow(begin, task.end)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("k", [0, 7, 30])
 def test_both_end_at_the_same_root(paths, k):
     task, begin, ends = paths

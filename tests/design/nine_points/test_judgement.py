@@ -61,6 +61,7 @@ def positions(rng):
             return A, B, E, F, E + (F - E) * (P - C) / (D - C)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(4))
 def test_judged_as_a_sweep_shows(seed):
     rng = np.random.default_rng(seed)

@@ -79,6 +79,7 @@ def test_links_that_collide_only_at_their_joints(graph):
     agrees(Stacking(graph.links, graph.frame, pins, pins, []))
 
 
+@pytest.mark.long
 @given(stackings())
 @settings(max_examples=40, deadline=None)
 def test_layers_are_least_by_brute_force(stacking):

@@ -82,6 +82,7 @@ def outside_slots(made, inputs):
                 yield joint
 
 
+@pytest.mark.long
 @given(testing.mechanisms(4, 6, prismatic=True))
 @settings(max_examples=5, deadline=None)
 def test_what_is_certified_is_never_contradicted(mechanism):
@@ -269,6 +270,7 @@ def test_guides_of_a_cylinder_move_along_its_axis_until_the_slot_is_clear_of_its
     assert [((pin.at / 50 - complex(*eye.at_b)) / way).imag for pin in guides] == pytest.approx([0, 0], abs=1e-12)
 
 
+@pytest.mark.long
 def test_a_pin_by_default_is_small_enough_for_the_holes():
     # crank and slotted link sweep over each other's pivots: with a pin that fits, this is what is wrong
     with pytest.raises(

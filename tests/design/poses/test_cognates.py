@@ -149,6 +149,7 @@ def worst(cognate, motion):
     return np.abs(motion.point("P").position - again.point("P").position).max() / size
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", SIX_BARS)
 def test_six_bars(kind):
     joints, frame, driven, tracer, free = SIX_BARS[kind]

@@ -39,6 +39,7 @@ def planted(kind, seed):
             return z, poses
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", CHAINS)
 @pytest.mark.parametrize("seed", range(4))
 def test_planted_ones_are_found(kind, seed):

@@ -46,6 +46,7 @@ def modelled(goal: np.ndarray, turned: float, **more: Any) -> tuple[TaskProblem,
     return TaskProblem(model, 0, turned), model.write(shaken(given, 12, np.random.default_rng(1)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [20, 64])
 def test_a_hidden_curve_comes_back_to_rounding_though_its_points_are_a_polygon(count: int) -> None:
     problem, X = modelled(drawn(count), 0.05)

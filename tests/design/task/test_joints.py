@@ -52,6 +52,7 @@ def test_a_function_between_two_moving_links(slides: bool) -> None:
     assert min(errors if slides else errors[:1]) == pytest.approx(found[0].errors[0], abs=1e-9) and min(errors) < 1e-3
 
 
+@pytest.mark.long
 def test_speeds_of_outputs_are_those_of_their_values() -> None:
     """By differences: of an angle, and of a block that slides on a turning link."""
     crank_slide = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)

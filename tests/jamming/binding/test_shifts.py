@@ -44,6 +44,7 @@ def in_line(u: Array, clearance: float, pins: int, series: float) -> tuple[Array
     return 0.5 * series * over**2, -series * over * FRAME * CRANK * np.sin(u) / way
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("clearance", [0.0, 1e-4, 0.99 * ERROR / 4.0, 1.01 * ERROR / 4.0])
 @pytest.mark.parametrize("mode", [1, -1])
 def test_a_length_error_blocks_unless_the_clearances_along_the_line_absorb_it(clearance: float, mode: int) -> None:
@@ -77,6 +78,7 @@ def test_without_stiffness_it_is_free_or_blocks() -> None:
     assert any("not assembled" in note for note in tight.notes)  # no clearance, no stiffness: as before
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("error", "clearance"), [(0.0, 0.0), (2e-4, 0.0), (2e-4, 2e-5), (2e-4, 5.1e-5)])
 def test_a_crank_too_many(three_cranks: Cranks, error: float, clearance: float) -> None:
     """The middle crank presses against both others: two pins in series each, the outer ones side by side."""
@@ -174,6 +176,7 @@ def test_a_guide_is_held_and_lengths_have_their_unit() -> None:
     np.testing.assert_allclose(found[0].elastic_torque, found[1].elastic_torque, rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.long
 def test_far_beyond_its_range_it_would_break() -> None:
     motion = parallelogram(0.02).simulate(U, modes={0: 1}, events=False)
     report = motion.binding(**limits(motion.mechanism, 1e-4))

@@ -54,6 +54,7 @@ def exhaustive(allowed: float) -> float:
     return min(cost for cost, upper in every_choice() if upper <= allowed)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("allowed", [0.05, 1e-3, 0.0])
 @pytest.mark.parametrize("listed", [200_000, 1])
 def test_no_dearer_than_an_exhaustive_search(allowed: float, listed: int, monkeypatch: pytest.MonkeyPatch) -> None:

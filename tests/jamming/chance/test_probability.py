@@ -63,6 +63,7 @@ def test_two_quantities_linear() -> None:
         assert found.upper - found.lower <= 1e-6
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("normal", [False, True])
 def test_two_quantities_curved(normal: bool) -> None:
     """Clearance and tilt of the motor axis, against quadrature with 30 digits."""

@@ -155,6 +155,7 @@ def test_closed_form_of_one_bearing_at_every_position():
     assert undecided <= 0.02 * count
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("links", [4, 8])
 def test_random_tilts_and_wrenches_stay_outside(links):
     """Of 20000 tilts that close none is below a proved bound, of 20000 wrenches in equilibrium none above."""

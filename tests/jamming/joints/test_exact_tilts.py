@@ -72,6 +72,7 @@ def test_two_certificates_of_one_bearing_never_contradict(lengths, alpha):
     assert "small tilts" in assess_coupled(motion, joints, Misalignment(0, 1, alpha)).model
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("alpha", "margin"), [(1 / 30, 0.01), (0.1, 0.06)])
 def test_outside_the_margin_both_are_certified(alpha, margin):
     exact = math.asin(0.4 * math.sin(alpha))
@@ -155,6 +156,7 @@ def bounds_at(given, motion):
     return tubes, neglected(work.system, given.layout, tubes, u, counted, none)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(2))
 def test_joints_move_no_further_than_bounded(seed):
     """Exact positions within the limits: joints, tilts and the rest of the closure stay inside the bounds."""
@@ -196,6 +198,7 @@ def test_a_link_without_any_limit_leaves_a_jam_unproved():
     assert steep.verdict is FREE  # the limits are wide, the tilts that are needed are not
 
 
+@pytest.mark.long
 def test_guides_and_more_loops_are_decided_too():
     graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     joints = [Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (3.0, 0.0)), Prismatic(0, 3, (0.0, 0.2))]
@@ -345,6 +348,7 @@ def test_a_box_without_a_single_assembly_is_not_sound():
     assert bounds_at(tight, motion)[1].r.max() > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("lengths", "u"), [((2, 1, 1.6, 1.5), 2.5), ((2, 1, 2.5, 2.5), 1.0), ((2, 1, 1.2, 1.0), 1.0)])
 def test_movements_that_lead_out_of_the_box_are_not_sound(monkeypatch, lengths, u):
     """The box is twice what is expected to first order: bounds of more say nothing, the equations may be regular."""

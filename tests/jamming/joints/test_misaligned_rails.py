@@ -49,6 +49,7 @@ def apart(name, seed, alpha):
     return exact(mechanism, motion, limits, tilts) / value - 1.0 if value < 20.0 else 0.0, rail
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["slider_crank", "slotted", pytest.param("swinging_block", marks=LONG),
                                   pytest.param("two_loops", marks=LONG)])  # fmt: skip
 def test_small_tilts_are_the_first_order_of_the_exact_closure(name):
@@ -109,6 +110,7 @@ def test_the_lift_of_a_slider_tilts_the_coupler(angle):
     assert other.factor == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["slider_crank", "slotted", pytest.param("swinging_block", marks=LONG),
                                   pytest.param("two_loops", marks=LONG)])  # fmt: skip
 def test_bounds_meet_at_a_pose_and_hold_over_boxes(name):

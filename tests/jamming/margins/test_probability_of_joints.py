@@ -119,6 +119,7 @@ def test_allocation_takes_the_margin_of_all_joints() -> None:
     assert bought.cheapest
 
 
+@pytest.mark.long
 def test_what_has_no_answer_is_refused() -> None:
     motion = FOUR.simulate("30..120 deg")
     with pytest.raises(GeometryError, match="nothing can bind"):
@@ -135,6 +136,7 @@ def test_what_has_no_answer_is_refused() -> None:
         probability(joints_margin(motion, PLAIN, ALPHA), {"nonsense": Distribution.uniform("[0, 1]")})
 
 
+@pytest.mark.long
 def test_limits_that_are_zero_by_name_count_with_their_range() -> None:
     """Free or not depends on what a limit may be; without any the question is refused."""
     motion = FOUR.simulate("60..120 deg")

@@ -89,6 +89,7 @@ def test_pieces_meet_where_one_ends_and_the_next_begins_and_members_are_common()
     assert faces(low[:1], high[:1], p_low[:1], p_high[:1])[0].size == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("part", [0.0, 0.002])
 def test_one_motion_leads_through_a_part_of_a_rotation(part):
     motion, tilt = simulate(four_bar(), [0.4, 0.9]), Misalignment(0, 1, 0.011)

@@ -71,6 +71,7 @@ def test_an_axis_that_may_lean_adds_its_angle_to_the_tilt_of_one_bearing(axis, l
         assert certify_in_space(motion, given, (motor, turned)).verdict is FREE
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("factor", "verdict"), [(1.01, FREE), pytest.param(0.99, SOME, marks=SLOW)])
 def test_a_motor_axis_that_may_lean_is_as_bad_as_its_worst_direction(factor, verdict):
     """Parallelism: within a cylinder; the worst direction is across the crank, which stands at 1.2 rad."""
@@ -148,6 +149,7 @@ def test_loops_and_bodies_close_alike_with_leaning_axes():
         assert slope == pytest.approx((ends[0] - ends[1]) / 2e-5, abs=1e-8)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("alpha", "verdict"), [(0.0105, FREE), pytest.param(0.0137, JAMMED, marks=SLOW)])
 def test_random_members_are_as_the_box_is(alpha, verdict):
     parts, tilt = [AxisAngle(2, 3, 5e-4), AxisAngle(0, 3, 5e-4)], Misalignment(0, 1, alpha)

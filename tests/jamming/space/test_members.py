@@ -102,6 +102,7 @@ def test_over_boxes_the_loops_hold_all_members(disturbed):
         assert (np.abs(slope.mid - J.mid) <= J.rad + slope.rad).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("factor", "part", "verdict"),
                          [(0.95, 0.01, FREE), (0.995, 1e-3, FREE), (0.9999, 1e-6, FREE), (1.003, 0.01, SOME),
                           (1.045, 0.01, JAMMED)])  # fmt: skip

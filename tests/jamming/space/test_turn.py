@@ -19,6 +19,7 @@ def one_bearing(limit):
     return {(0, 1): RIGID, (1, 2): SPHERICAL, (2, 3): limit, (0, 3): RIGID}
 
 
+@pytest.mark.long
 def test_between_small_and_exact_tilts_the_exact_ones_decide():
     """(1, 3, 2, 3.5): small tilts need 1.5 alpha = 0.12, exact ones asin(1.5 sin alpha) = 0.12016, which is more."""
     alpha, motion = 0.08, simulate(four_bar(1, 3, 2, 3.5), [1.57, 1.571])
