@@ -29,9 +29,10 @@ LISTED = [(module, signature) for module, signatures in read_modules().items() f
 
 
 def case(module: str, signature: Signature) -> Any:
-    """One kernel as a case; those with the workspace of enumeration, twenty megabytes, are for the long run."""
-    long = any(part in signature.kernel for part in (".synthesis.", "canon_packed", *PAGE))
-    marks = [pytest.mark.long] if long else []
+    """One kernel as a case: the workspace of enumeration is large, native kernels of the page are compiled."""
+    long = ".synthesis." in signature.kernel or "canon_packed" in signature.kernel
+    slow = any(part in signature.kernel for part in PAGE)
+    marks = [pytest.mark.slow] if slow else [pytest.mark.long] if long else []
     return pytest.param(module, signature, id=signature.kernel.removeprefix("graphsynth."), marks=marks)
 
 

@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from queue import Queue
+from queue import Empty, Queue
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -64,8 +64,11 @@ class Remote:
 
             def do_POST(self) -> None:
                 body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
-                if self.path == "/next":
-                    self._answer(remote._chunks.get())
+                if self.path == "/next":  # answered in time: who asks gives up after some minutes
+                    try:
+                        self._answer(remote._chunks.get(timeout=60.0))
+                    except Empty:
+                        self._answer(_packed({"wait": True}, []))
                     return
                 remote._found.put(body.decode() if self.path == "/failed" else body)
                 self._answer(b"")

@@ -108,6 +108,7 @@ async function serve(Kernels, address) {
     const size = new DataView(all).getUint32(0, true);
     const head = JSON.parse(new TextDecoder().decode(new Uint8Array(all, 8, size)));
     if (head.end) return;
+    if (head.wait) continue;
     let found;
     try {
       if (!(head.module in modules)) {
@@ -117,7 +118,7 @@ async function serve(Kernels, address) {
       found = run(modules, head, all.slice(8 * Math.ceil((8 + size) / 8)));
     } catch (error) {
       await fetch(`${address}/failed`, { method: "POST", body: String(error.stack || error) });
-      return;
+      continue;
     }
     await fetch(`${address}/result`, { method: "POST", body: found });
   }
