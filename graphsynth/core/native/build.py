@@ -18,6 +18,7 @@ from tempfile import TemporaryDirectory
 from graphsynth.core.native.library import FOLDER, LEVELS, target
 from graphsynth.core.native.lowering import ENVIRONMENT, Lowered, lower, optimise
 from graphsynth.core.native.signatures import read_list
+from graphsynth.core.wholefiles import replacing
 
 _RUNTIME = (
     "NRT_Allocate NRT_Free NRT_MemInfo_alloc_aligned NRT_MemInfo_alloc_safe_aligned NRT_MemInfo_call_dtor numba_frexp "
@@ -109,9 +110,8 @@ def build(wanted: str, path: Path) -> None:
         for source in ("runtime.c", "support.h"):
             (folder / source).write_bytes((FOLDER / source).read_bytes())
         subprocess.run([sys.executable, "-m", "ziglang", *options.split()], cwd=folder, check=True)
-        part = path.with_suffix(".part")
-        part.write_bytes((folder / "out.so").read_bytes())
-        part.replace(path)  # a process that has the old one loaded keeps it
+        with replacing(path) as fresh:  # a process that has the old one loaded keeps it
+            fresh.write_bytes((folder / "out.so").read_bytes())
 
 
 def main() -> None:

@@ -64,7 +64,7 @@ def broken_bounds(task: DesignTask, motion: Motion, places: Array, plan: Plan) -
     if task.plates:
         broken["a given plate is not used"] = not _has_plates(task, mechanism)
     if task.crank is not None or task.crank_start is not None:
-        broken |= _crank_bounds(task, motion)
+        broken |= _crank_bounds(task, motion.mechanism, places)
     if task.symmetric:
         broken["its curve is not symmetric"] = not _symmetric(motion, task.symmetric_point)
     if task.linear and task.stroke is not None:
@@ -91,12 +91,12 @@ def _has_plates(task: DesignTask, mechanism: Mechanism) -> bool:
     return True
 
 
-def _crank_bounds(task: DesignTask, motion: Motion) -> dict[str, bool]:
-    """Tell whether the driven link has not its length or begins elsewhere; of the motion as it is."""
-    mechanism, driven = motion.mechanism, motion.mechanism.drivers[0].link
+def _crank_bounds(task: DesignTask, mechanism: Mechanism, places: Array) -> dict[str, bool]:
+    """Tell whether the driven link has not its length or begins elsewhere."""
+    driven = mechanism.drivers[0].link
     own = [k for k, joint in enumerate(mechanism.joints) if driven in joint.pair and joint.kind == "R"]
     fixed = [k for k, joint in enumerate(mechanism.joints) if mechanism.frame in joint.pair]
-    at = places_of(motion)[0] @ [1.0, 1.0j]
+    at = places[0] @ [1.0, 1.0j]
     pivot = next((k for k in own if k in fixed), -1)
     ways = [at[k] - at[pivot] for k in own if k != pivot] if pivot >= 0 else []
     broken: dict[str, bool] = {}

@@ -345,10 +345,14 @@ class _Run:
                 if near and own.error < 1.0:  # then the largest error may be small enough, too
                     self._level(own)
 
+    def _last(self, candidate: Candidate) -> TaskProblem:
+        """Return the problem of the last stage."""
+        return TaskProblem(_modelled(self.task, self.seed, candidate.origin)[0], 0, self.turned)
+
     def _settled(self, candidate: Candidate) -> Candidate:
         """Return a candidate at its least sum of squares, its motion and bounds taken exactly."""
         with suppress(GraphsynthError):
-            problem = TaskProblem(_modelled(self.task, self.seed, candidate.origin)[0], 0, self.turned)
+            problem = self._last(candidate)
             x, error = settled(problem, candidate.x)
             error += float(problem.model.untransmitted(x[None])[0])
             if error < candidate.error:
@@ -362,7 +366,7 @@ class _Run:
         if answer.accepted:
             return
         with suppress(GraphsynthError):
-            problem = TaskProblem(_modelled(self.task, self.seed, candidate.origin)[0], 0, self.turned)
+            problem = self._last(candidate)
             x, error = levelled(problem, candidate.x)
             if not error < math.inf:
                 return

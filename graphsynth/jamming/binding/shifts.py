@@ -185,8 +185,7 @@ class _Followed:
         self.assembled[i] = True
         self.poses[i] = self.plane.pose(found.z)
         self.velocities[i] = self.plane.pose((tight if free else found).rate)
-        for k, spring in self.plane.springs.items():
-            way = float(np.sqrt((found.rows[spring] ** 2).sum()))
+        for k, way in self._ways(found):
             self.out.shift[i, k] = way if way > _NOTHING * self.plane.Lc else 0.0
         if not free:
             self._write(i, found)
@@ -197,10 +196,11 @@ class _Followed:
 
     def _open(self, rest: Rest) -> bool:
         """Whether no contact is pressed."""
-        return all(
-            float(np.sqrt((rest.rows[rows] ** 2).sum())) <= self.contacts.clearance[k] + _NOTHING * self.plane.Lc
-            for k, rows in self.plane.springs.items()
-        )
+        return all(way <= self.contacts.clearance[k] + _NOTHING * self.plane.Lc for k, way in self._ways(rest))
+
+    def _ways(self, rest: Rest) -> list[tuple[int, float]]:
+        """Return joints that may shift, and by how much they do."""
+        return [(k, float(np.sqrt((rest.rows[rows] ** 2).sum()))) for k, rows in self.plane.springs.items()]
 
     def _write(self, i: int, found: Rest) -> None:
         """Write forces of a loaded sample, newtons; the effort of the driver is the derivative of the energy."""

@@ -142,10 +142,12 @@ def _report(
     rubbing, rate = parts.rubbing, driven_rate(motion, size)[keep]
     sliding = _sliding(given, rubbing, *joint_rates(motion.mechanism, poses, rates), size)
     loaded = loaded.pressed(given, plane, keep)
-    rubs = loaded.contact(given, rubbing) * sliding
+    ends, push = loaded.ends(given, rubbing), np.sqrt((loaded.push**2).sum(-1))
+    # at the worse end of a bearing, at both and its face
+    worse, contact = ends.max(axis=0, initial=0.0), ends.sum(axis=0) + np.abs(loaded.force)
     coefficient = np.array([0.0 if own is None else own.coefficient for own in _of(given, rubbing)])
     known = np.where(moving & (rate != 0.0), rate, math.nan)
-    elastic, losses = loaded.slope / known + plane.torque[keep], rubs @ coefficient / np.abs(known)
+    elastic, losses = loaded.slope / known + plane.torque[keep], (contact * sliding) @ coefficient / np.abs(known)
     elastic[loaded.least.stiff] = math.inf
     # the columns of the report, NaN where the mechanism is not assembled
     columns = {
@@ -156,7 +158,7 @@ def _report(
         "force": np.abs(loaded.force),
         "tilt": loaded.tilt,
         "error": loaded.least.error,
-        "push": np.sqrt((loaded.push**2).sum(-1)),
+        "push": push,
         "shift": plane.shift[keep][:, list(given.layout.joints)],
     }
     whole = {name: _spread(values, keep, len(motion.inputs)) for name, values in columns.items()}
@@ -168,7 +170,7 @@ def _report(
         blocked=plane.blocked | np.isin(np.arange(len(motion.inputs)), keep[loaded.least.stiff]),
         names=given.names,
         joints=given.pairs,
-        wear=_wear(given, rubbing, motion.inputs[keep], loaded, sliding),
+        wear=_wear(given, rubbing, motion.inputs[keep], loaded, (push, worse, contact, sliding)),
         motor_torque=limit,
         unit=size,
         problem=given,
@@ -220,10 +222,6 @@ class _Loaded(NamedTuple):
         half, q = 0.5 * self.push, (self.couple @ np.array([[0.0, -1.0], [1.0, 0.0]])) / lengths[:, None]
         rest = (self.guided + self.turning) / lengths
         return np.stack([np.sqrt(((half + sign * q) ** 2).sum(-1)) + rest for sign in (1.0, -1.0)])
-
-    def contact(self, given: JointProblem, rubbing: Sequence[ContactFriction | None]) -> Array:
-        """Sum of all contact forces of every joint, N: both ends of the bearing and its face; (N, joints)."""
-        return np.asarray(self.ends(given, rubbing).sum(axis=0) + np.abs(self.force))
 
 
 def _of(given: JointProblem, parts: Sequence[Any]) -> list[Any]:
@@ -285,11 +283,13 @@ def _spread(values: Array, keep: NDArray[np.intp], count: int) -> Array:
 
 
 def _wear(
-    given: JointProblem, rubbing: Sequence[ContactFriction | None], u: Array, loaded: _Loaded, sliding: Array
+    given: JointProblem, rubbing: Sequence[ContactFriction | None], u: Array, loaded: _Loaded, rubs: Sequence[Array]
 ) -> tuple[JointWear, ...]:
-    """Rows of all joints, those that wear most first; sizes that are not known leave NaN."""
-    contact, ends = loaded.contact(given, rubbing), loaded.ends(given, rubbing).max(axis=0, initial=0.0)
-    push = np.sqrt((loaded.push**2).sum(-1))
+    """Rows of all joints, those that wear most first; sizes that are not known leave NaN.
+
+    ``rubs``: force in the plane, at the worse end of the bearing, of all contacts; how it slides; all (N, joints).
+    """
+    push, ends, contact, sliding = rubs
     found = []
     for place, (pair, own) in enumerate(zip(given.pairs, _of(given, rubbing))):
         moment, force, pressed = (

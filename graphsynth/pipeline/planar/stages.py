@@ -182,9 +182,9 @@ def move(context: Context, built: Built) -> Moved:
 
     table: PlanarTable = context.scene.mechanism
     motion = simulate(built.mechanism, np.linspace(0.0, table.motion.span, table.motion.positions + 1))
-    angle = smallest_transmission(motion)
+    angle = smallest_transmission(motion) if motion.completed else 0.0
     if not motion.completed:
-        motion, angle = _completed(context, motion), 0.0
+        motion = _completed(context, motion)
     if angle < table.motion.min_transmission:
         degrees, least = math.degrees(angle), math.degrees(table.motion.min_transmission)
         raise Rejected("the transmission angle is too small", f"{degrees:.2f}°, at least {least:.10g}° is asked")

@@ -90,11 +90,7 @@ const Curves = (() => {
 
   /* A mechanism with these places; the last is the tracing point. */
   function drawn({ family: [links, joints, driven], link }, places) {
-    return {
-      format: "graphsynth mechanism", version: 1, graph: Turning.graphText(links, 0, joints), pose: Array.from({ length: links }, () => [0, 0, 0]),
-      joints: joints.map(([a, b], k) => ({ kind: "R", a, b, at_a: places[k], at_b: places[k] })),
-      drivers: [{ base: 0, link: driven, law: { kind: "linear", rate: 1, offset: 0 } }], points: { P: { link, at: places[joints.length] } },
-    };
+    return Turning.file(links, 0, joints, places, [[0, driven]], { P: { link, at: places[joints.length] } });
   }
 
   /* The curve that it draws in a turn; null if it does not turn, or does not close. */

@@ -3,8 +3,8 @@
 
 (function () {
   const { make, svg } = Bench, DEGREE = Math.PI / 180;
-  /** Pixels of the handle for one radian of tilt. */
-  const HANDLE = 900;
+  /** Pixels of the handle for one radian of tilt; the largest tilt. */
+  const HANDLE = 900, MOST = (30 * Math.PI) / 180;
 
   /** The joints that can be asked about: [number, words]. */
   function joints(app, data) {
@@ -22,6 +22,11 @@
     }
 
     get motion() { return this.app.motion; }
+    /** The link on which the axis leans: the frame, or the joint's first one. */
+    get base() {
+      const { a, b } = this.data.joints[this.joint];
+      return b === Bench.linkNumber(this.app.sheet, Bench.GROUND) ? b : a;
+    }
     /** The seats of the drawing as it is now, for the kernels. */
     open() {
       const { app } = this;
@@ -36,9 +41,7 @@
       }
       const limits = this.data.joints.map(({ kind }) => ({ R: { tilt: this.tilt, end: this.end } })[kind] ||
         (kind === "P" || kind === "pin-slot" ? { roll: this.tilt, pitch: this.tilt, end: this.end } : null));
-      const { a, b } = this.data.joints[this.joint], frame = Bench.linkNumber(app.sheet, Bench.GROUND);
-      const base = b === frame ? b : a;
-      this.seats = Binding.open(this.module, this.data, limits, { joint: this.joint, alpha: this.alpha, direction: this.direction, base });
+      this.seats = Binding.open(this.module, this.data, limits, { joint: this.joint, alpha: this.alpha, direction: this.direction, base: this.base });
       return this.seats;
     }
     close() {
@@ -79,25 +82,18 @@
       const parts = [Bench.check("jam.on", this.on, on => this.turn(on))];
       if (this.on) {
         this.open();
-        const angle = (text, least) => {
-          const value = Number(text.replace(",", ".").replace(/[°\s]/g, ""));
-          if (!(value >= least && value <= 30) || !text.trim()) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });
-          return value * DEGREE;
+        const within = (read, most) => (text, unit) => {
+          const value = read(text, unit);
+          if (!(value >= 0 && value <= most)) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });
+          return value;
         };
+        const angle = within(Bench.typedAngle, MOST), length = within(Bench.typedLength, Infinity);
         const shown = value => String(Number((value / DEGREE).toPrecision(6)));
         parts.push(Bench.choice("jam.axis", String(this.joint), joints(app, this.data).map(([k, text]) => [String(k), text]), own => this.set({ joint: Number(own) })),
-          Bench.field(app, "jam.alpha", shown(this.alpha), text => this.set({ alpha: angle(text, 0) }), { unit: "°" }),
-          Bench.field(app, "jam.direction", shown(this.direction), text => {
-            const value = Number(text.replace(",", ".").replace("−", "-").replace(/[°\s]/g, ""));
-            if (!Number.isFinite(value)) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });
-            this.set({ direction: value * DEGREE });
-          }, { unit: "°" }),
-          Bench.field(app, "jam.limit", shown(this.tilt), text => this.set({ tilt: angle(text, 0) }), { unit: "°" }),
-          Bench.field(app, "jam.end", String(this.end), text => {
-            const value = Bench.parseLength(text, app.sheet.unit);
-            if (!(value >= 0)) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });
-            this.set({ end: value });
-          }, { unit: app.sheet.unit }),
+          Bench.field(app, "jam.alpha", shown(this.alpha), text => this.set({ alpha: angle(text) }), { unit: "°" }),
+          Bench.field(app, "jam.direction", shown(this.direction), text => this.set({ direction: Bench.typedAngle(text) }), { unit: "°" }),
+          Bench.field(app, "jam.limit", shown(this.tilt), text => this.set({ tilt: angle(text) }), { unit: "°" }),
+          Bench.field(app, "jam.end", String(this.end), text => this.set({ end: length(text, app.sheet.unit) }), { unit: app.sheet.unit }),
           this.answer = make("div", { id: "jammed", "aria-live": "polite" }), this.summary(),
           make("div", { class: "acts" }, Bench.button("jam.prove", () => this.prove(), { "data-prove": true })));
       }
@@ -137,7 +133,7 @@
 
     /** The axis that leans, seen from above: dragged, it leans more, or elsewhere. */
     handle([x, y]) {
-      const { a, b } = this.data.joints[this.joint], frame = Bench.linkNumber(this.app.sheet, Bench.GROUND), turn = this.motion.row(b === frame ? b : a)[2];
+      const turn = this.motion.row(this.base)[2];
       const long = this.alpha * HANDLE + 18, to = this.direction + turn, tip = [x + long * Math.cos(to), y - long * Math.sin(to)];
       const grip = svg("circle", { class: "lean", cx: tip[0], cy: tip[1], r: 9 }, svg("title", {}, Bench.word("jam.lean")));
       grip.addEventListener("pointerdown", event => {
@@ -146,7 +142,7 @@
         const root = this.app.view.root, box = root.getBoundingClientRect();
         const move = own => {
           const dx = own.clientX - box.left - x, dy = y - (own.clientY - box.top);
-          Object.assign(this, { alpha: Math.min(30 * DEGREE, Math.max(0, (Math.hypot(dx, dy) - 18) / HANDLE)), direction: Math.atan2(dy, dx) - turn });
+          Object.assign(this, { alpha: Math.min(MOST, Math.max(0, (Math.hypot(dx, dy) - 18) / HANDLE)), direction: Math.atan2(dy, dx) - turn });
           this.close();
           this.show();
         };

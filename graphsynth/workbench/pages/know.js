@@ -27,16 +27,15 @@
   }
 
   /** The chain: its key in the atlas and in the library, and its name if it has one. */
-  function chain(app) {
-    if (!app.chains) return [];
-    const key = Bench.chainKey(app.chains, Bench.written(app.sheet)), named = `chain.${key}`, name = Bench.word(named);
+  function chain(key) {
+    if (!key) return [];
+    const named = `chain.${key}`, name = Bench.word(named);
     return [[Bench.word("know.chain"), name === named ? key : `${name} (${key})`]];
   }
   /** Chains one dyad away, and the page of the chain in the atlas. */
-  function kin(app) {
-    const data = Bench.written(app.sheet), chain = Bench.chainOf(data);
-    if (!app.chains || !chain) return null;
-    const key = Bench.chainKey(app.chains, data);
+  function kin(app, data, key) {
+    const chain = key && Bench.chainOf(data);
+    if (!chain) return null;
     return make("div", { class: "acts" }, make("button", { type: "button", "data-kin": key, on: { click: () => Bench.showRelatives(app, chain) } }, Bench.word("know.kin")),
       Bench.atlas ? make("a", { href: `${Bench.atlas}#/${key}`, target: "_top" }, Bench.word("know.atlas")) : null);
   }
@@ -86,9 +85,10 @@
     const { motion } = app, engine = motion && motion.current();
     app.faulty = [];
     place.closest("section").hidden = !app.chains && !motion;
-    if (!motion && Object.keys(app.sheet.links).length > 1) { place.replaceChildren(Bench.rows(chain(app))); return; }
+    const data = Bench.written(app.sheet), keyed = () => (app.chains ? Bench.chainKey(app.chains, data) : null);
+    if (!motion && Object.keys(app.sheet.links).length > 1) { place.replaceChildren(Bench.rows(chain(keyed()))); return; }
     if (!engine) { place.replaceChildren(make("p", { class: "soft" }, Bench.word("know.nothing"))); return; }
-    const rows = [[Bench.word("know.mobility"), String(engine.mobility)], ...chain(app)], parts = [];
+    const key = keyed(), rows = [[Bench.word("know.mobility"), String(engine.mobility)], ...chain(key)], parts = [];
     if (engine.fault) {
       app.faulty = idsOf(app, engine.fault.tooMany || []);
       parts.push(make("p", { class: "warn" }, fault(app, engine.fault)));
@@ -99,7 +99,7 @@
         parts.push(make("h3", {}, Bench.word("know.modes")), buttons(engine.groups.map((group, k) => [name(group), () => motion.assemble(k), { "data-group": k }])));
       }
     }
-    place.replaceChildren(...[Bench.rows(rows), kin(app), ...parts, ...(motion.driven ? rotation(app, motion) : []),
+    place.replaceChildren(...[Bench.rows(rows), kin(app, data, key), ...parts, ...(motion.driven ? rotation(app, motion) : []),
       ...(engine.mobility > 0 ? drivers(app, motion) : []), ...frames(app)].filter(Boolean));
   };
 

@@ -4,16 +4,17 @@
 (function () {
   const { make, field, check, choice, button } = Bench;
 
-  function number(text, unit) {
+  /** A length and an angle as they are typed; what is none is refused. */
+  const number = Bench.typedLength = (text, unit) => {
     const value = Bench.parseLength(text, unit);
     if (!Number.isFinite(value)) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });
     return value;
-  }
-  function angle(text) {
+  };
+  const angle = Bench.typedAngle = text => {
     const value = Number(text.replace(",", ".").replace("−", "-").replace(/[°\s]/g, ""));
     if (!Number.isFinite(value) || !text.trim()) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });
     return (value * Math.PI) / 180;
-  }
+  };
   const degrees = value => String(Number(((value * 180) / Math.PI).toPrecision(10)));
   const tidy = value => String(Number(value.toPrecision(12)));
   const take = (app, change) => app.attempt(sheet => ({ sheet: change(sheet) }));

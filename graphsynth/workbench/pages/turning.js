@@ -24,6 +24,15 @@ const Turning = (() => {
     return `${String.fromCharCode(...[links, ...chunks].map(value => value + 63))} f${frame}`;
   }
 
+  /* Revolute joints at these places in the form of files, the links not moved yet. */
+  function file(links, frame, joints, at, drivers, points) {
+    return {
+      format: "graphsynth mechanism", version: 1, graph: graphText(links, frame, joints), pose: Array.from({ length: links }, () => [0, 0, 0]),
+      joints: joints.map(([a, b], k) => ({ kind: "R", a, b, at_a: at[k], at_b: at[k] })),
+      drivers: drivers.map(([base, link]) => ({ base, link, law: { kind: "linear", rate: 1, offset: 0 } })), points,
+    };
+  }
+
   /* A mechanism of the joints at these places; links that are driven are drawn smaller about their pivots. */
   function drawn(links, joints, places, frame, driven, shrink) {
     const at = places.map(place => [...place]), drivers = driven.map(k => (joints[k][1] === frame ? [...joints[k]].reverse() : joints[k]));
@@ -32,11 +41,7 @@ const Turning = (() => {
       if (base !== frame) continue;
       joints.forEach((pair, k) => { if (pair.includes(link) && !pair.includes(frame)) at[k] = [x + shrink * (places[k][0] - x), y + shrink * (places[k][1] - y)]; });
     }
-    return {
-      format: "graphsynth mechanism", version: 1, graph: graphText(links, frame, joints), pose: Array.from({ length: links }, () => [0, 0, 0]),
-      joints: joints.map(([a, b], k) => ({ kind: "R", a, b, at_a: at[k], at_b: at[k] })),
-      drivers: drivers.map(([base, link]) => ({ base, link, law: { kind: "linear", rate: 1, offset: 0 } })), points: traced(links, joints, at, frame),
-    };
+    return file(links, frame, joints, at, drivers, traced(links, joints, at, frame));
   }
 
   /* A point in the middle of up to two links that have no joint on the frame. */
@@ -93,7 +98,7 @@ const Turning = (() => {
     return best || (choices.length ? drawn(links, joints, scaled[0], ...choices[0], 1) : null);
   }
 
-  return { found, graphText };
+  return { found, graphText, file };
 })();
 
 if (typeof module !== "undefined") module.exports = Turning;
