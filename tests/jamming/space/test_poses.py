@@ -22,6 +22,13 @@ from graphsynth.jamming.space.pose import prove_pose
 from graphsynth.jamming.space.proof import _positive, shift
 
 
+@pytest.fixture(autouse=True)
+def digits():
+    """Fifty digits for every test, whichever runs before it."""
+    with mpmath.workdps(50):
+        yield
+
+
 def posed(limits, tilt, u=0.7, lengths=(2.0, 1.0, 2.5, 2.5)):
     """A four-bar in space and its plane coordinates at one input."""
     mechanism = four_bar(*lengths)
@@ -76,7 +83,6 @@ def test_the_plane_mechanism_closes_and_a_chart_is_a_rotation():
     model, q = posed(JointLimits(0.1, 0.05), Misalignment(0, 1, 0.0))
     closure = Closure(model, False)
     assert np.abs(closure.values(closure.loops(q[None]))).max() < 1e-14
-    mpmath.mp.dps = 50
     rng = np.random.default_rng(2)
     model, q = general(rng)
     misfit = placed(model, [mpmath.mpf(v) for v in q])
@@ -233,7 +239,6 @@ def test_all_rigid_jams_and_no_misalignment_is_free():
 def test_a_limit_that_touches_is_never_wrong():
     """Limits a few units in the last place beside the closed form; the box of a jam must hold the spherical tilt."""
     u = math.pi / 2
-    mpmath.mp.dps = 40
     edge = mpmath.asin(mpmath.mpf(2) / 5 * mpmath.sin(mpmath.mpf(0.1)) * mpmath.sin(mpmath.mpf(u)))
     limit = float(edge)
     for _ in range(2):
