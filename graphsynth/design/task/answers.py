@@ -31,7 +31,7 @@ from graphsynth.design.task.targets import (
 from graphsynth.design.task.task import DesignTask
 from graphsynth.jamming.questions import largest_scale
 from graphsynth.kinematics.dimensional.design import World
-from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, matched
+from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, in_order, matched
 from graphsynth.kinematics.dimensional.problem import carried, lying
 from graphsynth.kinematics.dimensional.verify import (
     SAMPLES,
@@ -301,7 +301,7 @@ def _seen(task: DesignTask, motion: Motion, link: int, name: str = "") -> Moving
 
 
 def _point_error(task: DesignTask, target: PathTarget | PosesTarget, motion: Motion, link: int, start: float) -> float:
-    """Largest distance over the size; of poses also the largest angle, from the line that suits best."""
+    """Largest distance over the size, or their mean; of poses also the largest angle, from the line that suits best."""
     own = _seen(task, motion, link, target.point)
     turn = target.turn if isinstance(target, PosesTarget) else None
     if isinstance(target, PathTarget) and target.outline:  # passed by, and the curve is nowhere else
@@ -310,9 +310,12 @@ def _point_error(task: DesignTask, target: PathTarget | PosesTarget, motion: Mot
     if target.inputs is not None:
         times = np.array(target.inputs)[None] + start
     else:
-        times = matched(own, Wanted(target.goal, turn, target.size, False, free=False))
+        wanted = Wanted(target.goal, turn, target.size, False, free=False)
+        times = in_order(own, wanted) if turn is None else matched(own, wanted)
     at = at_times(own, times)[0][0]
-    far = float(np.abs(at[:, 0] + 1j * at[:, 1] - target.goal).max()) / target.size
+    away = np.abs(at[:, 0] + 1j * at[:, 1] - target.goal) / target.size
+    mean = isinstance(target, PathTarget) and target.mean
+    far = float(np.sqrt((away**2).mean()) if mean else away.max())
     if turn is None:
         return far
     rest = (at[:, 2] + 1j * at[:, 3]) * np.exp(-1j * turn)

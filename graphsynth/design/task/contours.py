@@ -31,16 +31,21 @@ _NONE = 1e-9
 
 
 class Polygon(NamedTuple):
-    """Closed polygons (sets, n): corners, directions of the sides that begin there."""
+    """Polygons (sets, n): corners, and the directions of the sides before and after them."""
 
     z: Complex
-    way: Complex
+    before: Complex
+    after: Complex
 
     @classmethod
-    def of(cls, z: Complex) -> Polygon:
-        """From corners."""
+    def of(cls, z: Complex, closed: bool = True) -> Polygon:
+        """From corners; at an end of what is not closed both directions are those of its side."""
         side = np.roll(z, -1, axis=-1) - z
-        return cls(z, side / np.maximum(np.abs(side), 1e-300))
+        after = side / np.maximum(np.abs(side), 1e-300)
+        before = np.roll(after, 1, axis=-1)
+        if not closed:
+            before[..., 0], after[..., -1] = after[..., 0], before[..., -1]
+        return cls(z, before, after)
 
     def foot(self, of: Complex, near: Whole) -> Complex:
         """Points nearest to others (sets, m) on the two sides at the corners ``near`` of one polygon."""
@@ -67,7 +72,8 @@ class ContourAim(PointAim):
         parts = np.ceil(_ALONG * np.abs(side) / np.abs(side).sum()).astype(np.intp).clip(1)
         k = np.repeat(np.arange(len(side)), parts)
         part = (np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[k]
-        self.outline, self.given = Polygon.of((target.goal[k] + part * side[k])[None]), Polygon.of(target.goal[None])
+        self.outline = Polygon.of((target.goal[k] + part * side[k])[None])
+        self.given = Polygon.of(target.goal[None], target.closed)
         self.band = bands(target.goal)[k]
         self.closed, n = target.closed, len(target.goal)
         self.count = _EQUAL + len(model.inputs) - 1 if self.closed else 0
@@ -93,7 +99,7 @@ class ContourAim(PointAim):
         z, v = own[..., 0] + 1j * own[..., 1] + arm, speed[..., 0] + 1j * speed[..., 1] + 1j * speed[..., 2] * arm
         curve = _Cubics(z[:, :-1], z[:, 1:], v[:, :-1] * h, v[:, 1:] * h, self.closed)
         at = curve.spread()
-        polygon = Polygon.of(curve.at(at)[0])
+        polygon = Polygon.of(curve.at(at)[0], self.closed)
         there, back = _nearest(polygon, self.outline, self.given, self.turned)
         places = curve.nearest(at[np.arange(sets)[:, None], back], self.given.z)
         e = self.heavy * (curve.at(places)[0] - self.given.z) / self.size
@@ -178,6 +184,6 @@ def _parts(z: Complex) -> Array:
 
 def _four(own: Polygon, turned: float) -> NDArray[np.float32]:
     """Places and, as far as they count, directions."""
-    way = own.way + np.roll(own.way, 1, axis=1)
+    way = own.before + own.after
     way = turned * way / np.maximum(np.abs(way), 1e-300)
     return np.stack([own.z.real, own.z.imag, way.real, way.imag], axis=2).astype(np.float32)

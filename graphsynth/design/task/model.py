@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 #: Samples of the range, and the gap after a turn that counts as closed.
 _SAMPLES, _CLOSED = 60, 1e-6
+#: More samples at the ends of a range that is no turn, over the step: dead centres are near, where motions are fast.
+_ENDS = np.array([0.02, 0.1, 0.4])
 #: Frames of links at rest, and rates that do no harm, for sets without a motion.
 _REST, _SLOW = np.array([0.0, 0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.1])
 
@@ -164,7 +166,8 @@ class Model:
         self.size = self.stroke_at + task.linear
         shared = [u for target in task.targets for u in target.shared_inputs]
         shared = np.mod(shared, task.span).tolist() if task.drive == "rotation" else shared
-        order = np.sort(np.concatenate([np.linspace(0.0, task.span, _SAMPLES + 1), shared]))
+        ends = np.zeros(0) if task.drive == "rotation" else _ENDS * task.span / _SAMPLES
+        order = np.sort(np.concatenate([np.linspace(0.0, task.span, _SAMPLES + 1), ends, task.span - ends, shared]))
         self.inputs = order[np.concatenate([[True], np.diff(order) > 1e-9])]
 
     # --- the vector

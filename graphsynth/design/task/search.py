@@ -238,6 +238,7 @@ class _Run:
         self.turned = _TURNED[1] if self.outlines else 0.0  # in the last stage; open paths there at exact points
         self.near, self.even = (_OUTLINED, _OUTLINED) if self.outlines else (_NEAR, _EVEN)
         self.grows = any(isinstance(target, PathTarget) for target in task.targets)
+        self.levels = any(not (isinstance(target, PathTarget) and target.mean) for target in task.targets)
         self.before, self.idle = 0, 0  # accepted before the last wave, waves without another one
 
     def search(self, executor: Executor | None, progress: Callable[[Progress], None] | None) -> None:
@@ -363,7 +364,7 @@ class _Run:
     def _level(self, candidate: Candidate) -> None:
         """Make the largest error of a candidate small that was judged and missed a target; keep what is better."""
         _, answer = self.judged[id(candidate)]
-        if answer.accepted:
+        if answer.accepted or not self.levels:
             return
         with suppress(GraphsynthError):
             problem = self._last(candidate)

@@ -28,6 +28,7 @@ from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted
 from graphsynth.kinematics.engine.batch import simulate_batch
 from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.model import Mechanism
+from graphsynth.structure.assur import decompose
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -39,6 +40,8 @@ _HELD, _TRIED, _TOGETHER = 30.0, 2, 128
 _STRETCHED, _FAR = 3, 30.0
 #: Matches of an index for every one that is wanted within a range; by how much the range may be too short; samples.
 _RANGES, _SLACK, _STEPS = 6, 0.03, 60
+#: Fewest points with even times over a turn that tell a curve of an index.
+_EVENLY = 8
 
 
 class Starts(Protocol):
@@ -50,7 +53,9 @@ class Starts(Protocol):
 
 
 def index_starts(index: CurveIndex, count: int = 32) -> Starts:
-    """Begin a search with the mechanisms of an index whose curves are nearest to the first path without times.
+    """Begin a search with the mechanisms of an index whose curves are nearest to a path.
+
+    It is the first one without times, or with even times over a turn.
 
     Parameters
     ----------
@@ -71,19 +76,22 @@ def index_starts(index: CurveIndex, count: int = 32) -> Starts:
     """
 
     def starts(task: DesignTask) -> list[Mechanism]:
-        path = next((t for t in task.targets if isinstance(t, PathTarget) and t.inputs is None), None)
+        path = next((t for t in task.targets if isinstance(t, PathTarget) and (t.inputs is None or _round(t))), None)
         if path is None:
             return []
 
         def fits(design: Design) -> bool:
             turns, sliders = design.kinds[design.driver_joints[0]] == "R", design.kinds.count("P")
             few = sliders <= task.sliders + (not turns) and design.graph.links in task.links
-            return few and turns == (task.drive in ("rotation", "rocking"))
+            good = few and turns == (task.drive in ("rotation", "rocking"))
+            return good and not (task.dyads_only and not decompose(design.graph, design.drivers).dyadic)
 
         rocking = task.drive == "rocking"
         most = (1.0 + _SLACK) * task.span if rocking else math.inf
         wanted = _RANGES * count if rocking else count
-        every = index.find(_pairs(path.goal), wanted, closed=path.closed, only=fits, within=most)
+        timed = path.inputs is not None
+        closed = timed or path.closed or (not rocking and path.points[0] == path.points[-1])
+        every = index.find(_pairs(path.goal), wanted, closed=closed, timed=timed, only=fits, within=most)
         begun = (within(match, task.span) if rocking else match.mechanism for match in every)
         return [
             Mechanism(m.graph, m.joints, m.drivers, {path.point: m.points["P"]}, m.pose)
@@ -91,6 +99,12 @@ def index_starts(index: CurveIndex, count: int = 32) -> Starts:
         ]
 
     return starts
+
+
+def _round(path: PathTarget) -> bool:
+    """Whether the times of a path are even, over a turn."""
+    steps = np.diff(path.inputs or (0.0,))
+    return len(steps) + 1 >= _EVENLY and bool(np.abs(steps - math.tau / (len(steps) + 1)).max() < 1e-9)
 
 
 def within(match: CurveMatch, span: float) -> Mechanism | None:

@@ -129,6 +129,9 @@ class PathTarget(TimedTarget):
         where the polygon turns by more than 69 degrees it has a corner.
     point : str
         Name of the point.
+    mean : bool
+        The tolerance is that of the root mean square of the distances from the points, as much of the literature has
+        it, not of the largest one; not of a closed path without inputs.
 
     Examples
     --------
@@ -141,9 +144,12 @@ class PathTarget(TimedTarget):
     closed: bool = False
     point: str = "P"
     tolerance: Tolerance = Kept(_part, 0.01)
+    mean: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.mean and self.outline:
+            raise GeometryError("mean = True is for points, a closed path is a whole curve; leave one of both out")
         places = tuple(point(f"points[{k}]", p) for k, p in enumerate(self.points))
         if not 2 <= len(places) <= MOST or len(set(places)) < 2:
             raise GeometryError(f"a path needs 2 to {MOST} points that do not all coincide; it has {len(places)}")

@@ -151,6 +151,31 @@ def matched(own: MovingLink, wanted: Wanted) -> Array:
     return followed(own, times.reshape(sets, count, -1)[np.arange(sets), best], wanted, _ROUNDS)
 
 
+def in_order(own: MovingLink, wanted: Wanted) -> Array:
+    """Find times (1, N) at which one link, as it lies, passes the points of an open path in order.
+
+    Dynamic programming over all samples gives the least sum of squared distances without going back, from where times
+    slide; where `matched`, which begins with few guesses, comes nearer, its times are taken.
+    """
+    u, z = own.u, own.frames[0, :, 0] + 1j * own.frames[0, :, 1]
+    if own.period:
+        u, z = np.concatenate([u, u[1:] + own.period]), np.concatenate([z, z[1:]])
+    square = np.abs(z - wanted.points[:, None]) ** 2
+    best, before = square[0], np.zeros(square.shape, dtype=np.intp)
+    for k in range(1, len(square)):
+        least = np.minimum.accumulate(best)
+        fresh = np.concatenate([[True], best[1:] < least[:-1]])
+        before[k] = np.maximum.accumulate(np.where(fresh, np.arange(len(u)), 0))
+        best = least + square[k]
+    at = [int(best.argmin())]
+    for row in before[:0:-1]:
+        at.append(int(row[at[-1]]))
+    times = u[at[::-1]][None]
+    times = np.minimum(times, times[:, :1] + own.period) if own.period else times  # no more than a turn
+    every = times, followed(own, times, wanted, _ROUNDS), matched(own, wanted)
+    return min(every, key=lambda found: float(np.abs(_placed(at_times(own, found)[0], wanted)[1]).max()))
+
+
 def followed(own: MovingLink, times: Array, wanted: Wanted, rounds: int = 4) -> Array:
     """Slide times (sets, N) that are nearly right to where they belong."""
     for _ in range(rounds):

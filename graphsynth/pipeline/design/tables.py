@@ -37,6 +37,7 @@ class PathTable:
     """A named point passes points, or draws a line from corner to corner, a segment, an arc, an SVG path.
 
     ``inputs``: of the drive at the points, or at the two ends of what is drawn: degrees, or parts 0 to 1 of a stroke.
+    ``mean``: the tolerance is that of the root mean square of the distances, not of the largest.
     """
 
     points: tuple[Point, ...] = ()
@@ -48,6 +49,7 @@ class PathTable:
     inputs: tuple[float, ...] = ()
     own_start: bool = False
     closed: bool | None = None
+    mean: bool = False
     point: str = "P"
     tolerance: Annotated[float, In(above=0)] = 0.01
     weight: Annotated[float, In(above=0)] = 1.0
@@ -62,7 +64,7 @@ class PathTable:
         from graphsynth.design.task.targets import PathTarget
 
         more: dict[str, Any] = {"inputs": [turn * u for u in self.inputs] or None, "own_start": self.own_start}
-        more |= {"point": self.point, "tolerance": self.tolerance, "weight": self.weight}
+        more |= {"point": self.point, "tolerance": self.tolerance, "weight": self.weight, "mean": self.mean}
         if self.closed is not None:
             more["closed"] = self.closed
         if self.points:

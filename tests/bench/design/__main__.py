@@ -36,7 +36,8 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=10.0, help="of the processor, for each task and competitor")
     parser.add_argument("--only", nargs="*", default=[trial.name for trial in EVERY], help="names of tasks")
     parser.add_argument("--by", nargs="*", default=list(table.NAMES), choices=list(table.NAMES))
-    parser.add_argument("--curves", type=int, default=100_000, help="curves of the index with which letters begin")
+    parser.add_argument("--curves", type=int, default=1_000_000, help="curves of the index with which paths begin")
+    parser.add_argument("--index", type=Path, help="folder of an index that is there, instead of building one")
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
     results, drawn = given.out / "results.csv", given.out / "curves"
@@ -46,8 +47,8 @@ def main() -> None:
         for by in given.by:
             if trial.name not in given.only or (trial.name, by) in done:
                 continue
-            if trial.kind == "curve" and by in ("ours", "dyads") and index is None:
-                index = CurveIndex.build(given.out / "index", given.curves, links=[4, 6, 8], sliders=0)
+            if trial.kind in ("curve", "path", "timed") and by in ("ours", "dyads") and index is None:
+                index = opened(given.index, given.out / "index", given.curves)
             found = compete(trial, by, given.seconds, index)
             if found is None:
                 continue
@@ -56,6 +57,15 @@ def main() -> None:
             if found.curve is not None:
                 np.save(drawn / f"{trial.name} {by}.npy", found.curve)
     write(given.out)
+
+
+def opened(there: Path | None, place: Path, curves: int) -> CurveIndex:
+    """Open an index that is there, or build one; look for a curve once, which is not part of a search."""
+    index = CurveIndex.build(place, curves, links=[4, 6, 8], sliders=0) if there is None else CurveIndex(there)
+    circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 33))
+    for closed, timed in ((True, False), (False, False), (True, True)):
+        index.find(np.stack([circle.real, circle.imag**3], axis=1), 1, closed=closed, timed=timed)
+    return index
 
 
 def write(folder: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from time import process_time
 from typing import Any
 
@@ -16,10 +15,10 @@ from graphsynth.design import (
     DesignedMechanism,
     Designs,
     DesignTask,
-    PathTarget,
     design,
     dyads,
     four_bars_for_poses,
+    index_starts,
 )
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.assur import decompose
@@ -30,8 +29,8 @@ from tests.bench.design.tasks import Trial
 #: Answers of one search, of four-bars and of longer chains, of which there are many; by how much the tolerance falls
 #: from one search to the next; samples of a turn that is proved.
 _COUNT, _TIGHTER, _PROVED = (1, 3), 0.5, 181
-#: Curves of an index to begin with, for a second of the processor.
-_STARTS = 12
+#: Curves of an index to begin with, for a second of the processor, and in how many searches.
+_STARTS, _AGAIN = 12, 3
 _FOREVER = 1e6
 
 
@@ -54,40 +53,21 @@ def dyadic(graph: Any, drivers: Any) -> bool:
     return decompose(graph, drivers).dyadic
 
 
-def nearest(index: CurveIndex | None, count: int = 24) -> Callable[[DesignTask], list[Mechanism]]:
-    """Begin with the nearest curves of an index, of dyadic mechanisms alone if the task asks for them."""
-
-    def starts(task: DesignTask) -> list[Mechanism]:
-        path = task.targets[0]
-        if index is None or not isinstance(path, PathTarget) or not path.closed:
-            return []
-
-        def fits(own: Any) -> bool:
-            return (
-                own.graph.links in task.links
-                and set(own.kinds) == {"R"}
-                and (not task.dyads_only or dyadic(own.graph, own.drivers))
-            )
-
-        found = [match.mechanism for match in index.find(path.points, count, closed=True, only=fits)]
-        return [Mechanism(m.graph, m.joints, m.drivers, {path.point: m.points["P"]}, m.pose) for m in found]
-
-    return starts
-
-
 def ours(trial: Trial, seconds: float, *, only_dyads: bool = False, index: CurveIndex | None = None) -> Result:
     """Search until the processor time is spent, ever tighter: each search begins with the best of the last one."""
     if trial.kind == "poses":
         return algebra(trial)
     begin, tolerance, seed = process_time(), trial.tolerance, 0
     best: tuple[float, DesignedMechanism | None] = (float("inf"), None)
+    near: list[Mechanism] = []
     while (left := seconds - (process_time() - begin)) > 0.0 and best[0] > 1e-12:
-        given = [] if best[1] is None else [best[1].mechanism]
-        more = nearest(index, int(min(_STARTS * seconds, 400))) if seed == 0 else None
         task = dataclasses.replace(trial.task(tolerance), dyads_only=only_dyads)
+        if seed == 0 and index is not None:
+            near = [*index_starts(index, int(min(_STARTS * seconds, 400)))(task)]
+        given = ([] if best[1] is None else [best[1].mechanism]) + (near if seed < _AGAIN else [])
 
-        def starts(task: DesignTask, given: Any = given, more: Any = more) -> list[Mechanism]:
-            return [*given, *(more(task) if more is not None else ())]
+        def starts(_: DesignTask, given: list[Mechanism] = given) -> list[Mechanism]:
+            return given
 
         count = _COUNT[max(task.links) > 4]
         try:

@@ -77,7 +77,7 @@ def _path(name: str, title: str, source: str, points: Any, inputs_deg: Any = Non
 
     def task(tolerance: float) -> DesignTask:
         timing = {} if inputs is None else {"inputs": inputs.tolist()}
-        target = PathTarget(points=[tuple(p) for p in points], tolerance=tolerance, **timing)
+        target = PathTarget(points=[tuple(p) for p in points], tolerance=tolerance, mean=True, **timing)
         return DesignTask(targets=[target], links=[4], lengths=lengths, **_FREE, **more)
 
     kind = "path" if inputs is None else "timed"

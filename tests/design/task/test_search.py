@@ -192,6 +192,24 @@ def test_a_curve_that_also_goes_elsewhere_does_not_draw_a_closed_path() -> None:
     assert errors[1] > 0.5 * (far - 0.2 * abs(half[-1] - half[0])) / size > 0.05
 
 
+def test_errors_of_points_are_their_largest_or_their_mean() -> None:
+    """Points beside those that the hidden curve passes at given inputs, each by a distance of its own."""
+    motion = hidden()
+    z = motion.point("P").position @ [1.0, 1.0j]
+    at = np.arange(0, 300, 30)
+    away = 0.01 * (1.0 + np.arange(10)) * np.exp(1j * np.arange(10))
+    goal = z[at] + away
+    size = float(np.abs(goal - goal.mean()).max())
+    points = [(p.real, p.imag) for p in goal]
+    errors = []
+    for mean in (False, True):
+        path = PathTarget(points=points, inputs=motion.inputs[at].tolist(), mean=mean)
+        task = DesignTask(targets=[path], links=[4], transmission="5 deg")
+        plan = next(iter(plans(task, 4)))
+        errors.append(judged(task, Candidate(0.0, Origin(plan, 0, None), z.real, motion.mechanism, ())).errors[0])
+    assert np.allclose(errors, [0.1 / size, math.sqrt(3.85e-3) / size], rtol=1e-4)
+
+
 def test_errors_of_angles_are_those_of_a_fine_motion() -> None:
     """Stroke, time ratio, dwell and function of the hidden rocker, each against its angle at 36 000 inputs."""
     motion = hidden()

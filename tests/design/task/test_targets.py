@@ -82,6 +82,7 @@ def test_a_tolerance_is_an_angle_with_its_unit_or_a_part_of_the_size() -> None:
         (lambda: PathTarget(points=[(0, 0)]), "2 to 400 points"),
         (lambda: PathTarget(points=[(0, 0), (0, 0)]), "do not all coincide"),
         (lambda: PathTarget(points=[(0, 0), (1, 0)], inputs=[1, 0]), "must increase"),
+        (lambda: PathTarget(points=[(0, 0), (1, 0)], closed=True, mean=True), "a closed path is a whole curve"),
         (lambda: PathTarget(points=[(0, 0), (1, 0)], inputs=[0]), "2 values but 1 inputs"),
         (lambda: PathTarget(points=[(0, 0), (1, 0)], inputs=[0, 7]), "at most one turn"),
         (lambda: PathTarget(points=[(0, 0), (1, 0)], tolerance=0), "tolerance"),
