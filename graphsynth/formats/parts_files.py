@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import csv
 import io
 import math
@@ -18,6 +19,7 @@ from graphsynth.core.extras import need
 from graphsynth.core.wholefiles import replacing
 from graphsynth.design.parts.outline import Rounded, arc_of
 from graphsynth.design.parts.result import Parts, turned
+from graphsynth.design.parts.wheels import Cut
 
 #: Free sheet between two parts, in thicknesses.
 _BETWEEN = 2.0
@@ -106,7 +108,7 @@ def laid_out(parts: Parts) -> tuple[list[tuple[complex, complex]], complex]:
     boxes = []
     for link, outline in enumerate(parts.plan.outlines):
         turn = turned(parts, link)
-        boxes.append((turn, _moved(outline, turn, 0j).box))
+        boxes.append((turn, outline.moved(turn, 0j).box))
     wide = max([_WIDTH, *((high - low).real + 2.0 * between for _, (low, high) in boxes)])
     places: dict[int, tuple[complex, complex]] = {}
     x = y = between
@@ -122,14 +124,10 @@ def laid_out(parts: Parts) -> tuple[list[tuple[complex, complex]], complex]:
     return [places[link] for link in range(len(boxes))], complex(right, y + row + between)
 
 
-def _moved(shape: Rounded, turn: complex, shift: complex) -> Rounded:
-    return Rounded(tuple(z * turn + shift for z in shape.hull), shape.radius)
-
-
 def _sheet(parts: Parts) -> list[tuple[int, Rounded, list[Rounded]]]:
     """Link, outline and holes of every part on the sheet."""
     return [
-        (link, _moved(outline, *at), [_moved(hole, *at) for hole in holes])
+        (link, outline.moved(*at), [hole.moved(*at) for hole in holes])
         for link, (outline, holes, at) in enumerate(zip(parts.plan.outlines, parts.plan.holes, laid_out(parts)[0]))
     ]
 
@@ -153,10 +151,17 @@ def cut_svg(parts: Parts, *, line: float = 0.1) -> str:
     lines = []
     for link, outline, holes in _sheet(parts):
         path = " ".join(_path(shape, corner.imag) for shape in (outline, *holes))
-        at = _label_place(outline, holes)
+        at, middle = _label_place(outline, holes), outline.hull[0]
+        pitch = outline.pitch if isinstance(outline, Cut) else 0.0
+        engraved = (
+            f'<circle cx="{middle.real:.3f}" cy="{corner.imag - middle.imag:.3f}" r="{pitch:.3f}" fill="none" '
+            f'stroke="#0000ff" stroke-width="{line:g}"/>'
+            if pitch
+            else ""
+        )
         lines.append(
             f'<g id="link-{parts.plan.label(link)}">'
-            f'<path d="{path}" fill="none" stroke="#ff0000" stroke-width="{line:g}"/>'
+            f'<path d="{path}" fill="none" stroke="#ff0000" stroke-width="{line:g}"/>{engraved}'
             f'<text x="{at.real:.3f}" y="{corner.imag - at.imag + _HALF * size:.3f}" '
             f'font-size="{size:.3g}" text-anchor="middle" fill="#0000ff">{parts.plan.label(link)}</text></g>'
         )
@@ -172,6 +177,9 @@ def _label_place(outline: Rounded, holes: Sequence[Rounded]) -> complex:
     hull = outline.hull
     middle = sum(hull) / len(hull)
     tries = [middle] + [p + (q - p) * t for p, q in zip(hull, hull[1:] + hull[:1]) for t in (0.5, 0.3, 0.2, 0.7)]
+    if isinstance(outline, Cut):  # between hub and rim
+        reach = 0.5 * min(abs(corner.at - middle) for corner in outline.corners)
+        tries += [middle + reach * cmath.exp(0.25j * math.pi * k) for k in range(8)]
     return max(
         tries, key=lambda z: min((min(abs(z - c) for c in hole.hull) - hole.radius for hole in holes), default=0.0)
     )
@@ -202,11 +210,13 @@ def cut_dxf(parts: Parts) -> Any:
     for link, outline, holes in _sheet(parts):
         for shape, layer in ((outline, "OUTLINE"), *((hole, "HOLES") for hole in holes)):
             look = {"layer": layer}
-            if len(shape.hull) == 1:
+            if len(shape.corners) == 2 and len(shape.hull) == 1:
                 space.add_circle((shape.hull[0].real, shape.hull[0].imag), shape.radius, dxfattribs=look)
             else:
                 points = [(at.real, at.imag, bulge) for at, bulge in shape.corners]
                 space.add_lwpolyline(points, format="xyb", close=True, dxfattribs=look)
+        if pitch := outline.pitch if isinstance(outline, Cut) else 0.0:
+            space.add_circle((outline.hull[0].real, outline.hull[0].imag), pitch, dxfattribs={"layer": "NUMBERS"})
         at = _label_place(outline, holes)
         height = max(2.0, 0.6 * parts.sizes.pin)
         text = space.add_text(parts.plan.label(link), height=height, dxfattribs={"layer": "NUMBERS"})

@@ -15,6 +15,7 @@ from graphsynth.design.parts.layers import least_layers
 from graphsynth.design.parts.outline import Rounded
 from graphsynth.design.parts.plan import PartSizes, PartsPlan, Travel, divided, plan
 from graphsynth.design.parts.result import Parts
+from graphsynth.design.parts.wheels import check
 from graphsynth.kinematics.certify.poses import Enclosures, enclosures
 from graphsynth.kinematics.engine.result import Motion
 from graphsynth.kinematics.simulation import simulate
@@ -40,8 +41,8 @@ def parts(
     Parameters
     ----------
     motion : Motion
-        Of a planar mechanism with revolute and prismatic joints and pins in slots; its links are sheets, the frame is
-        the board below all others.
+        Of a planar mechanism; its links are sheets, the frame is the board below all others.  External gears become
+        wheels with involute teeth, cams disks, each in the layer of what it touches.
     unit : float
         Millimetres of one unit of length of the mechanism.
     sizes : PartSizes, optional
@@ -60,8 +61,8 @@ def parts(
     Raises
     ------
     GeometryError
-        A gear or a cam, a motion that is nowhere assembled, holes that overlap; or no layering without a collision:
-        the message names the parts and the inputs at which they meet.
+        Gears that cannot mesh, a motion that is nowhere assembled, holes that overlap; or no layering without a
+        collision: the message names the parts and the inputs at which they meet.
 
     Examples
     --------
@@ -79,8 +80,9 @@ def parts(
     tube, reason = _tube(motion, unit, max_boxes, seconds) if prove else (None, "no proof was asked for")
     given = PartSizes() if sizes is None else sizes
     mechanism = motion.mechanism
+    check(motion)
     travel = _travel(motion, unit, reached if tube is None else np.concatenate([reached, tube.poses()]))
-    own = plan(mechanism, given, unit, travel)
+    own = plan(mechanism, given, unit, travel, reached[0])
     if tube is not None and (short := _short_slot(motion, own, unit, travel, tube)):
         tube, reason = None, short
     at = motion.inputs[motion.assembled]

@@ -41,7 +41,7 @@ class Hazards:
         self.plan, self.frame, self.sheets = plan, frame, len(plan.outlines)
         self.bodies = [Solid(link, outline) for link, outline in zip(plan.links, plan.outlines)]
         self.bodies += [Solid(pin.link, Rounded((pin.at,), plan.sizes.spacer)) for pin in plan.pins]
-        self.jointed = {pair for pin in plan.pins for pair in combinations(pin.sheets, 2)}
+        self.jointed = {pair for pin in plan.pins for pair in combinations(sorted(pin.sheets), 2)}
         self.known: dict[Pair, Found] = {}
         for one, other in self._pairs():
             found = gaps(self.bodies[one], self.bodies[other], poses)
@@ -52,7 +52,7 @@ class Hazards:
     def _pairs(self) -> Iterator[Pair]:
         """Pairs that may meet in a layer: links, links and pins, pins."""
         moving = [link for link in range(self.sheets) if link != self.frame]
-        yield from (pair for pair in combinations(moving, 2) if pair not in self.jointed)
+        yield from (pair for pair in combinations(moving, 2) if pair not in self.jointed | {*self.plan.touching})
         pins = list(enumerate(self.plan.pins, self.sheets))
         yield from ((link, p) for link in moving for p, pin in pins if link not in (*pin.sheets, *pin.passes))
         yield from ((p, q) for (p, _), (q, _) in combinations(pins, 2))
@@ -72,6 +72,7 @@ class Hazards:
             sorted(self.jointed) + [(a, b) for a, b in apart if b < n],
             [(p - n, c) for c, p in apart if c < n <= p],
             [(p - n, q - n) for p, q in apart if p >= n],
+            self.plan.touching,
         )
 
     def length(self, layers: Sequence[int]) -> int:

@@ -1,9 +1,9 @@
 """Layers of links: the least number in which nothing meets, by integer programming (HiGHS).
 
-``x[a, k]`` is 1 where link a lies in layer k.  Links that would meet have different layers; a link that would hit a pin
-does not lie between two links of that pin; pins that would hit each other do not pass through the same layer, except
-where their links lie (theory/parts 3).  The frame is layer 0.  Of all layerings with the least number, one with the
-shortest pins is taken.
+``x[a, k]`` is 1 where link a lies in layer k.  Links that would meet have different layers, wheels that mesh the same
+one; a link that would hit a pin does not lie between two links of that pin; pins that would hit each other do not pass
+through the same layer, except where their links lie (theory/parts 3).  The frame is layer 0.  Of all layerings with
+the least number, one with the shortest pins is taken.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Stacking:
 
     ``links``: number of links, of which ``frame`` is layer 0; ``pins``: links on each pin; ``same``: pairs of links
     that must not share a layer, ``through``: (pin, link) where the link must not lie between links of the pin,
-    ``crossing``: pairs of pins that must not pass through one layer.
+    ``crossing``: pairs of pins that must not pass through one layer, ``together``: pairs that must share a layer.
     """
 
     links: int
@@ -34,12 +34,14 @@ class Stacking:
     same: Collection[tuple[int, int]]
     through: Collection[tuple[int, int]]
     crossing: Collection[tuple[int, int]] = ()
+    together: Collection[tuple[int, int]] = ()
 
     def violated(self, layers: Sequence[int]) -> bool:
         """Whether a layering breaks any of it: the definition, for checks."""
         span = [(min(own), max(own)) for own in ([layers[link] for link in pin] for pin in self.pins)]
         return (
             any(layers[a] == layers[b] for a, b in self.same)
+            or any(layers[a] != layers[b] for a, b in self.together)
             or any(span[p][0] < layers[c] < span[p][1] for p, c in self.through)
             or any(max(span[p][0], span[q][0]) + 1 < min(span[p][1], span[q][1]) for p, q in self.crossing)
         )
@@ -105,6 +107,8 @@ def _rows(stacking: Stacking, count: int) -> Iterator[Row]:
 
     for a, b in stacking.same:
         yield from (({a * wide + k: 1.0, b * wide + k: 1.0}, 1.0) for k in range(1, wide))
+    for pair in stacking.together:
+        yield from (({a * wide + k: 1.0, b * wide + k: -1.0}, 0.0) for k in range(wide) for a, b in permutations(pair))
     for p, c in stacking.through:
         for a, b in permutations(stacking.pins[p], 2):
             yield from ((below(a, k) | {c * wide + k: 1.0} | above(b, k), 2.0) for k in range(1, count))

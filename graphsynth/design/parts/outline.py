@@ -126,6 +126,10 @@ class Rounded:
                 found += [centre + (start - centre) * cmath.exp(1j * angle * k / count) for k in range(1, count)]
         return found
 
+    def moved(self, turn: complex, shift: complex) -> Rounded:
+        """Return it turned about the origin by a unit vector, then shifted."""
+        return Rounded(tuple(z * turn + shift for z in self.hull), self.radius)
+
     @property
     def box(self) -> tuple[complex, complex]:
         """Opposite corners of the box around it."""

@@ -1,8 +1,8 @@
 """Links as rounded sheets: outlines, holes, slots, and the pins through them.
 
 A revolute joint is a pin through all links that meet there.  A prismatic joint is a slot in the link that carries the
-line, and two pins of the other link in it; a pin in a slot is one.  Everything here is in millimetres, in the frame of
-the link.
+line, and two pins of the other link in it; a pin in a slot is one.  Gears and cams are sheets of their own (`wheels`).
+Everything here is in millimetres, in the frame of the link.
 """
 
 from __future__ import annotations
@@ -14,10 +14,14 @@ from dataclasses import dataclass, fields
 from itertools import combinations
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from graphsynth.core.checks import positive
 from graphsynth.core.errors import GeometryError
 from graphsynth.design.parts.outline import Rounded
-from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
+from graphsynth.design.parts.wheels import Wheel, pair
+from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
 
 #: Points of a link nearer than this times its size are one point.
@@ -109,7 +113,7 @@ class Pin(NamedTuple):
     places: tuple[complex, ...]
     link: int
     at: complex
-    kind: str  #: "pin", "shaft" of a motor, or "guide" in a slot
+    kind: str  #: "pin", "shaft" of a motor, "guide" in a slot, or "dowel" that fastens a wheel
     name: str
     passes: tuple[int, ...] = ()  #: sheets in whose slot it moves, without a spacer
 
@@ -130,19 +134,34 @@ class PartsPlan(NamedTuple):
     holes: tuple[tuple[Rounded, ...], ...]
     pins: tuple[Pin, ...]
     sizes: Sizes
+    wheels: tuple[str, ...] = ()  #: what the sheets are that come after all links and touch others: wheels, cams
+    touching: tuple[tuple[int, int], ...] = ()  #: pairs of these
 
     def label(self, sheet: int) -> str:
-        """Return the number of its link, with "b" for a second sheet."""
+        """Return the number of its link, with "b" for a second sheet, "w" (w2, w3) for its wheels."""
         link = self.links[sheet]
-        return str(link) if sheet == link else f"{link}b"
+        if not self.wheel(sheet):
+            return str(link) if sheet == link else f"{link}b"
+        before = self.links[self._first : sheet].count(link)
+        return f"{link}w{before + 1 if before else ''}"
+
+    def wheel(self, sheet: int) -> str:
+        """Say what a wheel, a cam or a roller is; empty for all other sheets."""
+        at = sheet - self._first
+        return self.wheels[at] if 0 <= at < len(self.wheels) else ""
+
+    @property
+    def _first(self) -> int:
+        """First sheet that is no link."""
+        return max(self.links) + 1
 
 
 #: Where ``at_b`` travels along the line of a joint, by its pair, millimetres.
 Travel = Mapping[tuple[int, int], tuple[float, float]]
 
 
-def plan(mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel) -> PartsPlan:
-    """Return outlines, holes and pins of a mechanism with revolute and prismatic joints and pins in slots.
+def plan(mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel, pose: NDArray[np.float64]) -> PartsPlan:
+    """Return outlines, holes and pins of a mechanism; wheels mesh at a pose (links, 3) in millimetres.
 
     If the pin is not given, it is made smaller where holes would be too near to each other.  If that does not help,
     guides of a cylinder are moved along its axis.
@@ -150,7 +169,7 @@ def plan(mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel) ->
     told = ""
     for free in (False, True):
         for smaller in _SMALLER if given.pin is None else _SMALLER[:1]:
-            found, near = _planned(mechanism, given, unit, travel, (smaller, free))
+            found, near = _planned(mechanism, given, unit, travel, pose, (smaller, free))
             if not near:
                 return found
             told = told or near
@@ -158,16 +177,15 @@ def plan(mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel) ->
 
 
 def _planned(
-    mechanism: Mechanism, given: PartSizes, unit: float, travel: Travel, tried: tuple[float, bool]
+    mechanism: Mechanism,
+    given: PartSizes,
+    unit: float,
+    travel: Travel,
+    pose: NDArray[np.float64],
+    tried: tuple[float, bool],
 ) -> tuple[PartsPlan, str]:
     """Return the plan and which holes are too near; tried: the pin so much smaller, guides of cylinders moved."""
     smaller, free = tried
-    for joint in mechanism.joints:
-        if not isinstance(joint, Revolute | Prismatic | PinSlot):
-            raise GeometryError(
-                f"joint {joint.a}-{joint.b} is a {joint.kind}; parts are made for revolute and prismatic "
-                "joints and pins in slots"
-            )
     meeting = _meeting(mechanism, unit)
     traced = [(link, complex(*at) * unit) for link, at in mechanism.points.values() if link != mechanism.frame]
     largest, shortest = _ways(mechanism, meeting, traced, unit)
@@ -217,14 +235,70 @@ def _planned(
         places[joint.a] += ends
         places[joint.b] += guides
         holes[joint.a].append((Rounded.around(ends, sizes.hole / 2.0), name))
+    wheels = [w for j in mechanism.joints if isinstance(j, Gear | Cam) for w in pair(j, unit, pose, sizes.boss)]
+    own_holes = [_fastened(w, len(links) + k, sizes, places, holes, pins) for k, w in enumerate(wheels)]
     for link, at in traced:
         if all(abs(at - own) > _SAME * abs(at) for own in places[link]):
             places[link].append(at)
             holes[link].append((Rounded((at,), sizes.pin / 2.0), "point"))
     radius = [sizes.boss * (_BOARD if link == mechanism.frame else 1.0) for link in links]
-    outlines = tuple(Rounded.around(own, r) for own, r in zip(places, radius))
-    shapes = tuple(tuple(hole for hole, _ in own) for own in holes)
-    return PartsPlan(tuple(links), outlines, shapes, tuple(pins), sizes), _near_holes(holes, sizes)
+    outlines = tuple(Rounded.around(own, r) for own, r in zip(places, radius)) + tuple(w.outline for w in wheels)
+    shapes = tuple(tuple(hole for hole, _ in own) for own in (*holes, *own_holes))
+    sheets, touching = (*links, *(w.link for w in wheels)), [(n, n + 1) for n in range(len(links), len(outlines), 2)]
+    told = tuple(w.told for w in wheels)
+    near = _near_holes(holes, sizes) or _small_wheel(wheels, sizes)
+    return PartsPlan(sheets, outlines, shapes, tuple(pins), sizes, told, tuple(touching)), near
+
+
+def _fastened(
+    own: Wheel,
+    sheet: int,
+    sizes: Sizes,
+    places: Sequence[list[complex]],
+    holes: Sequence[list[tuple[Rounded, str]]],
+    pins: list[Pin],
+) -> list[tuple[Rounded, str]]:
+    """Put a wheel on the pin in its centre, a roller on one of its own, and dowels through it; return its holes."""
+    link, at, found = own.link, own.centre, []
+    name = f"{own.told.partition(',')[0]} {sheet} of link {link}"
+    for k, pin in enumerate(pins):
+        if pin.kind != "guide" and link in pin.sheets and _near(pin.places[pin.sheets.index(link)], at):
+            pins[k] = pin._replace(sheets=(*pin.sheets, sheet), places=(*pin.places, at))
+            tight = pin.link == link and not own.rolls
+            found = [(Rounded((at,), (sizes.pin if tight else sizes.hole) / 2.0), pin.name)]
+            break
+    if own.rolls and not found:
+        pins.append(Pin((link, sheet), (at, at), link, at, "pin", name))
+        places[link].append(at)
+        holes[link].append((Rounded((at,), sizes.pin / 2.0), name))
+        found = [(Rounded((at,), sizes.hole / 2.0), name)]
+    if own.rolls:
+        return found
+    far = max((p - at for p in places[link]), key=abs, default=1.0 + 0j)
+    along = far / abs(far) if abs(far) > _SAME * abs(at) else 1.0 + 0j
+    for side in (1.0, -1.0):
+        there = at + side * _dowels(sizes) * along
+        other = "" if side > 0.0 else ", second"
+        pins.append(Pin((link, sheet), (there, there), link, there, "dowel", name + other))
+        places[link].append(there)
+        holes[link].append((Rounded((there,), sizes.pin / 2.0), name))
+        found.append((Rounded((there,), sizes.pin / 2.0), name))
+    return found
+
+
+def _dowels(sizes: Sizes) -> float:
+    """Distance of dowels from the centre of a wheel."""
+    return 2.1 * sizes.spacer
+
+
+def _small_wheel(wheels: Sequence[Wheel], sizes: Sizes) -> str:
+    """Name a wheel that has no room for its dowels."""
+    need = _dowels(sizes) + sizes.boss
+    for own in wheels:
+        if not own.rolls and own.free < need:
+            what = own.told.partition(",")[0]
+            return f"the {what} of link {own.link} is solid to {own.free:.3g} mm, and needs {need:.3g}"
+    return ""
 
 
 def _guides_at(
@@ -268,11 +342,11 @@ def divided(whole: PartsPlan, frame: int) -> Iterator[PartsPlan]:
 
     Such a link has three pins or more: one joins the sheets, the others are on one sheet each.
     """
-    for link in range(len(whole.outlines)):
+    for link in range(max(whole.links) + 1):
         own = [k for k, pin in enumerate(whole.pins) if link in pin.sheets]
         if link == frame or any(len(hole.hull) > 1 for hole in whole.holes[link]):
             continue
-        if any(whole.pins[k].kind == "guide" for k in own):
+        if any(whole.pins[k].kind in ("guide", "dowel") for k in own):
             continue
         for joining in own:
             _, *others = (k for k in own if k != joining)
@@ -300,7 +374,9 @@ def _divided(whole: PartsPlan, link: int, joining: int, moved: Sequence[int]) ->
     outlines = list(whole.outlines)
     outlines[link] = Rounded.around([hole.hull[0] for hole in holes[link]], sizes.boss)
     outlines.append(Rounded.around([hole.hull[0] for hole in holes[second]], sizes.boss))
-    return PartsPlan((*whole.links, link), tuple(outlines), tuple(map(tuple, holes)), tuple(pins), sizes)
+    return whole._replace(
+        links=(*whole.links, link), outlines=tuple(outlines), holes=tuple(map(tuple, holes)), pins=tuple(pins)
+    )
 
 
 def _meeting(mechanism: Mechanism, unit: float) -> list[tuple[dict[int, complex], str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -66,6 +66,7 @@ class Parts(Shown):
     gap : float
         A lower bound of the least gap between parts of one layer (certified), or the least one at the samples;
         infinite if no two parts share a layer.
+        Wheels that mesh, and a cam and its roller, touch by design and are left out of it.
     collisions : tuple of Collision
         Pairs that are in different layers because they would meet; `Collision.status` is "undecided" where that is
         only not excluded.
@@ -169,7 +170,7 @@ class Parts(Shown):
             length, width = sides(self, link)
             area = self.moments(link).area
             name = "frame" if link == self.motion.mechanism.frame else "link"
-            name += f" {self.plan.label(link)}"
+            name = f"{self.plan.wheel(link).partition(',')[0] or name} {self.plan.label(link)}"
             t = self.sizes.thickness
             rows.append(
                 BillRow(
@@ -221,6 +222,8 @@ class Parts(Shown):
             if np.isinf(self.gap)
             else f"at least {self.gap:.3g} mm between parts of a layer"
         )
+        touching = [" and ".join(map(self.plan.label, pair)) for pair in self.plan.touching]
+        gap += "".join(f"; {pair} touch by design, which is not part of it" for pair in touching)
         if self.certified:
             return f"certified: nothing collides over the whole motion, {gap}"
         return f"estimated at {int(self.motion.assembled.sum())} samples: nothing collides, {gap}; {self.reason}"
@@ -246,6 +249,9 @@ class Parts(Shown):
             ("mass", f"{sum(row.number * row.mass for row in self.bill):.3g} g of plywood and beech"),
         ]
         for sheet in range(self.motion.mechanism.graph.links, len(self.layers)):
+            if told := self.plan.wheel(sheet):
+                rows.insert(1, (self.plan.label(sheet), told))
+                continue
             joined = ", ".join(pin.name for pin in self.plan.pins if {sheet, self.plan.links[sheet]} <= set(pin.sheets))
             rows.insert(1, ("two sheets", f"link {self.plan.links[sheet]}, joined by the pin of joint {joined}"))
         if undecided:
@@ -256,7 +262,7 @@ class Parts(Shown):
         return self.draw().svg
 
 
-_PINS = ("pin", "shaft", "guide")
+_PINS = ("pin", "shaft", "guide", "dowel")
 
 
 def turned(parts: Parts, link: int) -> complex:
@@ -270,7 +276,7 @@ def turned(parts: Parts, link: int) -> complex:
 def sides(parts: Parts, link: int) -> tuple[float, float]:
     """Length and width of a link along its longest side and across."""
     outline, turn = parts.plan.outlines[link], turned(parts, link)
-    low, high = replace(outline, hull=tuple(z * turn for z in outline.hull)).box
+    low, high = outline.moved(turn, 0j).box
     return (high - low).real, (high - low).imag
 
 

@@ -17,6 +17,8 @@ def allowed(stacking, layers):
     """Return what the words say, layer by layer: who is in it, which pins pass through it."""
     if any(layers[a] == layers[b] for a, b in stacking.same):
         return False
+    if any(layers[a] != layers[b] for a, b in stacking.together):
+        return False
     for k in range(max(layers) + 1):
         passing = {
             p
@@ -60,7 +62,9 @@ def stackings(draw):
     same = some(list(combinations(moving, 2))) + pins
     through = some([(p, c) for p, pin in enumerate(pins) for c in moving if c not in pin])
     crossing = some(list(combinations(range(len(pins)), 2)))
-    return Stacking(graph.links, graph.frame, pins, sorted(set(same)), through, crossing)
+    free = [pair for pair in combinations(moving, 2) if pair not in same]
+    together = draw(st.sampled_from([[], *([pair] for pair in free)]))
+    return Stacking(graph.links, graph.frame, pins, sorted(set(same)), through, crossing, together)
 
 
 def agrees(stacking):

@@ -1,0 +1,165 @@
+"""Gear wheels and disk cams as sheets beside their links, in the layer of what they touch (theory/parts 4).
+
+A wheel has involute teeth of 20 degrees, addendum one module and dedendum 1.25; a cam the curve within its pitch curve
+by the radius of its roller.  Two dowels fasten each to its link; a roller turns on a pin of its own.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.errors import GeometryError
+from graphsynth.design.parts.outline import Corner, Rounded
+from graphsynth.kinematics.engine.result import Motion
+from graphsynth.mechanism.joints import Cam, Gear
+
+Complex = NDArray[np.complex128]
+#: Pressure angle; addendum and dedendum, and what both wheels' teeth together are thinner by, in modules.
+_PRESSURE, _ADDENDUM, _DEDENDUM, _BACKLASH = math.radians(20.0), 1.0, 1.25, 0.04
+#: Fewest teeth, below which a rack would undercut them; largest whole numbers of a ratio; points of a flank.
+_FEWEST, _RATIO, _FLANK = 17, 200, 8
+#: Points of a cam, more where it has many harmonics; directions in which it is touched by what holds it.
+_POINTS, _WAVES, _TOUCHED = 360, 24, 24
+#: Distances of centres that differ by less, of their size, are what they should be.
+_SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Cut(Rounded):
+    """A sheet with a polygon of its own; as a rounded hull it is what holds it, which is what must not collide.
+
+    >>> square = Cut((0j,), 2.0, (1 + 1j, -1 + 1j, -1 - 1j, 1 - 1j))
+    >>> square.moments.area, square.box
+    (4.0, ((-2-2j), (2+2j)))
+    """
+
+    edge: tuple[complex, ...] = ()
+    pitch: float = 0.0  #: radius of a circle to engrave
+
+    def moved(self, turn: complex, shift: complex) -> Cut:
+        """Return it turned about the origin by a unit vector, then shifted."""
+        held = super().moved(turn, shift)
+        return Cut(held.hull, held.radius, tuple(z * turn + shift for z in self.edge), self.pitch)
+
+    @cached_property
+    def corners(self) -> tuple[Corner, ...]:
+        """The polygon, counter-clockwise."""
+        return tuple(Corner(z, 0.0) for z in self.edge)
+
+
+class Wheel(NamedTuple):
+    """A sheet of a link that touches another one: its link, centre, outline, the radius free for dowels, what it is.
+
+    ``rolls``: it turns on a pin and needs no dowels.
+    """
+
+    link: int
+    centre: complex
+    outline: Rounded
+    free: float
+    told: str
+    rolls: bool = False
+
+
+def check(motion: Motion) -> None:
+    """Refuse what has no teeth: rings, ratios without whole numbers, centres elsewhere than both radii apart."""
+    poses = motion.poses[motion.assembled]
+    for joint in motion.mechanism.joints:
+        if not isinstance(joint, Gear):
+            continue
+        name = f"gear {joint.a}-{joint.b}"
+        if joint.internal:
+            raise GeometryError(f"{name} is internal; parts are made for external wheels, a ring has no outline yet")
+        teeth(joint)
+        ends = ((joint.a, joint.at_a), (joint.b, joint.at_b))
+        a, b = (poses[:, k, :2] @ [1, 1j] + np.exp(1j * poses[:, k, 2]) * complex(*at) for k, at in ends)
+        far, need = np.abs(b - a), joint.radius_a + joint.radius_b
+        if np.abs(far - need).max() > _SAME * need:
+            raise GeometryError(
+                f"the centres of {name} are {far.min():.6g} to {far.max():.6g} apart, its pitch radii together "
+                f"{need:.6g}; make them equal, so that teeth meet"
+            )
+
+
+def teeth(joint: Gear) -> tuple[int, int]:
+    """Return the least numbers of teeth of a pair, none below 17.
+
+    >>> teeth(Gear(0, 1, radius_a=1.0, radius_b=1.5))
+    (18, 27)
+    """
+    ratio = joint.radius_a / joint.radius_b
+    whole = Fraction(ratio).limit_denominator(_RATIO)
+    if whole <= 0 or abs(whole - ratio) > 1e-9 * ratio or whole.numerator > _RATIO:
+        raise GeometryError(
+            f"the radii of gear {joint.a}-{joint.b}, {joint.radius_a:g} and {joint.radius_b:g}, have no ratio of whole "
+            f"numbers up to {_RATIO}; give such radii, for teeth are counted"
+        )
+    times = -(-_FEWEST // min(whole.numerator, whole.denominator))
+    return whole.numerator * times, whole.denominator * times
+
+
+def wheel(count: int, pitch: float, centre: complex, first: float) -> Cut:
+    """Return a wheel with so many teeth on a pitch radius, the middle of one of them in a direction."""
+    module = 2.0 * pitch / count
+    base, tip, root = pitch * math.cos(_PRESSURE), pitch + _ADDENDUM * module, pitch - _DEDENDUM * module
+    radii: NDArray[np.float64] = np.linspace(max(base, root), tip, _FLANK)
+    angle = np.arccos(base / radii)
+    whole = math.pi / (2 * count) - 0.25 * _BACKLASH * module / pitch + math.tan(_PRESSURE) - _PRESSURE
+    half = np.asarray(whole - (np.tan(angle) - angle))  # of a tooth, at these radii
+    if root < base:
+        radii, half = np.append(root, radii), np.append(half[0], half)
+    flank = radii * np.exp(-1j * half)
+    tooth = np.concatenate([flank, np.conj(flank[::-1])])
+    turns = np.exp(1j * (first + math.tau * np.arange(count) / count))
+    return Cut((centre,), tip, tuple((centre + (turns[:, None] * tooth).ravel()).tolist()), pitch)
+
+
+def cam(joint: Cam, unit: float, roller: float) -> Cut:
+    """Return the disk that a roller touches, in millimetres."""
+    psi = np.linspace(0.0, math.tau, max(_POINTS, _WAVES * len(joint.harmonics)), endpoint=False)
+    rho, first, second = unit * np.array([joint.pitch_radius(float(u)) for u in psi]).T
+    bend = (rho**2 + 2.0 * first**2 - rho * second) / (rho**2 + first**2) ** 1.5
+    if bend.max() * roller >= 1.0:
+        raise GeometryError(
+            f"the pitch curve of cam {joint.a}-{joint.b} has a radius of curvature of {1.0 / bend.max():.3g} mm, "
+            f"and its roller one of {roller:.3g}, which would undercut it; make the pin smaller, or the unit larger"
+        )
+    turn = np.exp(1j * (psi + joint.angle_a))
+    way = (first + 1j * rho) * turn
+    edge = rho * turn + 1j * roller * way / np.abs(way) + complex(*joint.at_a) * unit
+    ends = np.exp(1j * math.tau * np.arange(_TOUCHED) / _TOUCHED)
+    far = (np.conj(ends)[:, None] * edge).real.max(axis=1)  # lines that touch it: their corners hold it
+    step = math.tau / _TOUCHED
+    held = ends * (far + 1j * (np.roll(far, -1) - far * math.cos(step)) / math.sin(step))
+    around = Rounded.around(held.tolist(), 0.0)
+    return Cut(around.hull, around.radius, tuple(edge.tolist()))
+
+
+def pair(joint: Gear | Cam, unit: float, pose: NDArray[np.float64], roller: float) -> tuple[Wheel, Wheel]:
+    """Return both sheets of a joint, with teeth that mesh at a pose (links, 3) in millimetres."""
+    A, B = complex(*joint.at_a) * unit, complex(*joint.at_b) * unit
+    if isinstance(joint, Cam):
+        disk = cam(joint, unit, roller)
+        return (
+            Wheel(joint.a, A, disk, min(abs(z - A) for z in disk.edge), "cam"),
+            Wheel(joint.b, B, Rounded((B,), roller), roller, "roller", True),
+        )
+    a, b = (complex(*pose[k, :2]) + cmath.exp(1j * pose[k, 2]) * at for k, at in ((joint.a, A), (joint.b, B)))
+    towards, found = cmath.phase(b - a), []
+    for count, link, at, radius, first in zip(
+        teeth(joint), (joint.a, joint.b), (A, B), (joint.radius_a, joint.radius_b), (towards, towards + math.pi)
+    ):
+        pitch, gap = radius * unit, math.pi / count if link == joint.b else 0.0  # a tooth of a in a gap of b
+        module = 2.0 * pitch / count
+        outline = wheel(count, pitch, at, first + gap - float(pose[link, 2]))
+        told = f"wheel, {count} teeth, module {module:.4g} mm"
+        found.append(Wheel(link, at, outline, pitch - _DEDENDUM * module, told))
+    return found[0], found[1]

@@ -1,0 +1,125 @@
+"""Wheels and cams: teeth mesh without cutting each other, rollers touch, layers are shared, and what cannot mesh."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from matplotlib.path import Path
+
+import graphsynth as gs
+from graphsynth import Driver, Mechanism, MechanismGraph
+from graphsynth.core.errors import GeometryError
+from graphsynth.mechanism.joints import Cam, Gear, Revolute
+
+from .moving import carried
+from .test_outline import polygon_moments
+
+GRAPH = MechanismGraph(3, [(0, 1), (0, 2), (1, 2, 2)], frame=0)
+#: A carrier that turns a planet about a wheel on the frame.
+PLANET = MechanismGraph(3, [(0, 1), (1, 2), (0, 2, 2)], frame=0)
+
+
+def geared(**more):
+    """Two wheels on the frame, 1 : 2, their centres not on the x axis."""
+    given = {"radius_a": math.hypot(3.0, 0.4) / 3.0, "radius_b": 2.0 * math.hypot(3.0, 0.4) / 3.0} | more
+    joints = (Revolute(0, 1), Revolute(0, 2, (3.0, 0.4)), Gear(1, 2, **given))
+    return Mechanism(GRAPH, joints, (Driver(0, 1),))
+
+
+def cammed():
+    """A cam on the driver, a rocker with a roller."""
+    cam = Cam(1, 2, at_b=(2.6, 0.0), radius=1.2, harmonics=((0.25, 0.1), (0.05, 0.0)))
+    pose = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (3.0, 0.0, 2.6))
+    return Mechanism(GRAPH, (Revolute(0, 1), Revolute(0, 2, (3.0, 0.0)), cam), (Driver(0, 1),), pose=pose)
+
+
+def planetary():
+    joints = (Revolute(0, 1), Revolute(1, 2, (3.0, 0.0)), Gear(0, 2, radius_a=1.8, radius_b=1.2))
+    return Mechanism(PLANET, joints, (Driver(0, 1),))
+
+
+def distances(P, Q):
+    """Distances of points (n,) from the sides of a closed polygon (m,)."""
+    side = np.roll(Q, -1) - Q
+    part = np.clip((np.conj(side) * (P[:, None] - Q)).real / np.abs(side) ** 2, 0.0, 1.0)
+    return np.abs(P[:, None] - Q - part * side).min(axis=1)
+
+
+def edges(made, poses):
+    """Boundaries of both sheets that touch, at poses."""
+    ((one, other),) = made.plan.touching
+    return [
+        carried(np.array(made.plan.outlines[k].flat(1e-3)), poses, made.plan.links[k], made.unit) for k in (one, other)
+    ]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("mechanism", [geared(), planetary()], ids=["pair", "planet"])
+def test_teeth_mesh_and_nowhere_cut_each_other(mechanism):
+    made = gs.parts(gs.simulate(mechanism, np.linspace(0.0, 2.0 * math.pi, 73)), unit=60.0)
+    assert made.certified and "touch by design" in made.statement
+    ((one, other),) = made.plan.touching
+    assert made.layers[one] == made.layers[other] > 0
+    module = float(made.plan.wheel(one).split()[-2])
+    inputs = np.linspace(0.0, 1.0, 41)  # more than a pitch, between the samples
+    for P, Q in zip(*edges(made, gs.simulate(mechanism, inputs).poses)):
+        for A, B in ((P, Q), (Q, P)):
+            shape = Path(np.column_stack([B.real, B.imag]))
+            assert not shape.contains_points(np.column_stack([A.real, A.imag])).any()
+        near = min(distances(P, Q).min(), distances(Q, P).min())
+        assert near < 0.04 * module  # the play of a pitch, of which a flank has half at most
+
+
+def test_a_wheel_has_its_teeth_and_its_mass():
+    made = gs.parts(gs.simulate(geared(), np.linspace(0.0, 6.0, 40)), unit=60.0, prove=False)
+    ((one, other),) = made.plan.touching
+    for sheet, count in ((one, 17), (other, 34)):
+        outline, holes = made.plan.outlines[sheet], made.plan.holes[sheet]
+        z = np.array(outline.flat(1e-3)) - outline.hull[0]
+        crossings = np.diff(np.abs(np.append(z, z[0])) > outline.pitch)
+        assert crossings.sum() == 2 * count and f"{count} teeth" in made.plan.wheel(sheet)
+        assert math.isclose(outline.pitch, count * float(made.plan.wheel(sheet).split()[-2]) / 2.0, rel_tol=1e-3)
+        area = polygon_moments(np.array(outline.flat(1e-3)))[0] - sum(math.pi * h.radius**2 for h in holes)
+        assert math.isclose(made.moments(sheet).area, area, rel_tol=1e-9)
+        assert len(holes) == 3  # the pivot and two dowels
+    text = str(made)
+    assert "1w" in text and {"wheel 1w", "wheel 2w"} <= {row.part for row in made.bill}
+
+
+def test_a_roller_touches_its_cam_all_around():
+    motion = gs.simulate(cammed(), np.linspace(0.0, 2.0 * math.pi, 73))
+    made = gs.parts(motion, unit=60.0)
+    assert not made.certified and "cam" in made.reason
+    ((cam, roller),) = made.plan.touching
+    assert made.layers[cam] == made.layers[roller] and made.plan.wheel(roller) == "roller"
+    poses = gs.simulate(cammed(), np.linspace(0.1, 6.2, 101)).poses
+    centre, radius = made.plan.outlines[roller].hull[0], made.plan.outlines[roller].radius
+    disk = carried(np.array(made.plan.outlines[cam].flat(1e-3)), poses, 1, 60.0)
+    far = [distances(at, edge)[0] for at, edge in zip(carried(np.array([centre]), poses, 2, 60.0), disk)]
+    assert np.abs(np.array(far) - radius).max() < 0.01  # mm: the cam is a polygon of 360 corners
+
+
+@pytest.mark.long
+def test_files_hold_the_teeth(tmp_path):
+    ezdxf = pytest.importorskip("ezdxf")
+    made = gs.parts(gs.simulate(geared(), np.linspace(0.0, 6.0, 40)), unit=60.0, prove=False)
+    made.write(tmp_path, forms=("dxf", "svg"))
+    drawing = ezdxf.readfile(tmp_path / "cut.dxf")
+    lines = [len(line) for line in drawing.modelspace().query("LWPOLYLINE[layer=='OUTLINE']")]
+    assert sorted(lines)[-2:] == [17 * 18, 34 * 18]  # both reach below their base circles
+    assert (tmp_path / "cut.svg").read_text("utf-8").count("<circle") == 2  # pitch circles
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "words"),
+    [
+        (geared(radius_a=math.pi / 3.0, radius_b=math.hypot(3.0, 0.4) - math.pi / 3.0), "whole numbers"),
+        (geared(radius_a=1.0, radius_b=3.0), "centres of gear 1-2 are 3.02655"),
+        (geared(radius_a=1.0, radius_b=4.0, internal=True), "internal"),
+    ],
+)
+def test_what_cannot_mesh_is_refused(mechanism, words):
+    with pytest.raises(GeometryError, match=words):
+        gs.parts(gs.simulate(mechanism, np.linspace(0.0, 1.0, 9)), unit=60.0)
