@@ -1,6 +1,7 @@
 """The guard, and that compiled code does exactly what is written: no contraction, no reassociation."""
 
 import json
+import os
 import platform
 import subprocess
 import sys
@@ -15,8 +16,9 @@ ON_GLIBC = platform.libc_ver()[0] == "glibc" and platform.machine() == "x86_64"
 needs_control_word = pytest.mark.skipif(not ON_GLIBC, reason="sets the control word of x86-64 through glibc")
 
 
-def run(code):
-    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=120)
+def run(code, timeout=120, **environment):
+    command, environment = [sys.executable, "-c", textwrap.dedent(code)], os.environ | environment
+    done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, env=environment)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -200,3 +202,26 @@ def test_compiled_code_equals_the_uncompiled_source_to_the_bit():
     compiled = json.loads(run(textwrap.dedent(CASES).format(folder=folder, patch="")))
     assert len(compiled) > 2500
     assert interpreted == compiled
+
+
+@pytest.mark.slow  # every kernel is compiled twice
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names a processor of x86-64")
+def test_processors_without_fused_operations_give_the_same_bits(tmp_path):
+    """Without FMA the compiler calls the C library's; what it makes of every kernel is the same to the bit."""
+    from pathlib import Path
+
+    code = textwrap.dedent(CASES).format(folder=str(Path(__file__).parent), patch="") + textwrap.dedent("""
+    print(json.dumps(sum("vfmadd" in asm or "vfnmadd" in asm or "vfmsub" in asm
+                         for asm in arithmetic.multiply.dispatcher.inspect_asm().values())))
+    """)
+    here, plain = (
+        run(code, timeout=1200, GRAPHSYNTH_NATIVE="0", NUMBA_CACHE_DIR=str(tmp_path / name), **environment)
+        for name, environment in (
+            ("here", {"NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": "+fma,+avx2"}),
+            ("plain", {"NUMBA_CPU_NAME": "x86-64-v2", "NUMBA_CPU_FEATURES": "-fma,-avx,-avx2"}),
+        )
+    )
+    (here, fused), (plain, none) = ([json.loads(line) for line in text.splitlines()] for text in (here, plain))
+    assert fused and not none
+    assert len(here) > 2500
+    assert here == plain

@@ -8,6 +8,7 @@ assembly of that mode, exactly one, and no system has to be solved.  See theory/
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import chain, zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -50,7 +51,7 @@ class Near(NamedTuple):
     known: Interval
     steps: Interval | None = None
 
-    def narrowed(self, value: Any, dyad: int, place: int) -> Any:
+    def narrowed(self, dyad: int, value: Any, place: int) -> Any:
         """Narrow one number of a dyad, by the mean value theorem if it is a dual."""
         known = self.known[:, dyad, place]
         if not isinstance(value, Dual):
@@ -102,20 +103,96 @@ def find_dyads(mechanism: Mechanism, placed: set[int]) -> list[Dyad]:
 
 
 def place_dyad(
-    plane: Plane, ends: tuple[Pair, Pair], arms: tuple[Pair, Pair], side: float, near: Callable[[Any, int], Any]
-) -> list[Any]:
-    """Return the room, the way between the outer joints (x, y), and cos and sin of both links' angles.
+    plane: Plane,
+    ends: tuple[Pair, Pair],
+    arms: tuple[Pair, Pair],
+    side: float,
+    near: Callable[[Any, int], Any] | None,
+    wide: bool = True,
+) -> tuple[list[Any], list[Any]]:
+    """Return the room, the way between the outer joints (x, y), cos and sin of both links' angles; and those angles.
 
     ``arms`` lead from the outer joint of each link to the inner one, in its frame; ``near`` narrows each of the seven.
+    For a ``wide`` box directions are narrowed by all that is known of them, which pays there alone.
     """
     d = ends[1] - ends[0]
-    d = Pair(near(d.x, 1), near(d.y, 2))
-    a, b = (arm.x.sqr() + arm.y.sqr() for arm in arms)
+    d = d if near is None else Pair(near(d.x, 1), near(d.y, 2))
+    squares = [arm.x.sqr() + arm.y.sqr() for arm in arms]
     size = d.x.sqr() + d.y.sqr()
-    share = (a - b) / size * 0.5 + 0.5
-    found = [near(a / size - share.sqr(), 0), d.x, d.y]
-    way = d * share + plane.left(d) * (found[0].sqrt() * side)
-    for arm, reached, square in zip(arms, (way, way - d), (a, b)):
-        found.append(near(plane.dot(arm, reached) / square, len(found)))
-        found.append(near(plane.cross(arm, reached) / square, len(found)))
-    return found
+    share = (squares[0] - squares[1]) / size * 0.5 + 0.5
+    room = squares[0] / size - share.sqr()
+    room = room if near is None else near(room, 0)
+    beside, along = _value(room).sqrt() * side, _values(d)
+    way = along * _value(share) + plane.left(along) * beside
+    inner, own = [way, way - along], [_values(arm) for arm in arms]
+    turns = [
+        _turn(plane.dot(arm, to) / _value(square), plane.cross(arm, to) / _value(square), wide)
+        for arm, to, square in zip(own, inner, squares)
+    ]
+    rates: list[Any] = []
+    moves = any(isinstance(part, Dual) for pair in (d, *arms) for part in (pair.x, pair.y))
+    for _ in range(2 if wide and near is not None else 1):
+        if moves:
+            if wide:
+                inner = [_both(to, plane.turned(arm, turn)) for to, arm, turn in zip(inner, own, turns)]
+            rates = _turning(plane, (_rates(d), _rates(arms[0]), _rates(arms[1])), turns, inner, beside * _value(size))
+        if near is not None:
+            c, s = zip(*(_directed(turn, rate) for turn, rate in zip_longest(turns, rates)))
+            turns = [_turn(_value(near(c[k], 3 + 2 * k)), _value(near(s[k], 4 + 2 * k)), wide) for k in (0, 1)]
+    both = list(zip_longest(turns, rates))
+    angles = [_dual(plane.argument(turn), rate) for turn, rate in both]
+    return [room, d.x, d.y, *chain.from_iterable(_directed(*own) for own in both)], angles
+
+
+def _turning(
+    plane: Plane, moved: tuple[Pair, Pair, Pair], turns: list[Pair], inner: list[Pair], area: Interval
+) -> list[Interval]:
+    """Return how fast both links turn, from the rates of d and of the arms; ``inner``: the arms as they are turned.
+
+    The inner joint is ``A + R_a arm_a = B + R_b arm_b``, and ``R' = angle' J R``, so
+    ``d' - R_a arm_a' + R_b arm_b' = angle_a' J r_a - angle_b' J r_b``.  ``area`` is ``r_a x r_b``.
+    """
+    d, arm_a, arm_b = moved
+    gap = d - plane.turned(arm_a, turns[0]) + plane.turned(arm_b, turns[1])
+    return [plane.dot(gap, inner[1]) / area, plane.dot(gap, inner[0]) / area]
+
+
+def _dual(value: Interval, rate: Interval | None) -> Any:
+    return value if rate is None else Dual(value, rate)
+
+
+def _directed(turn: Pair, rate: Interval | None) -> tuple[Any, Any]:
+    """Cosine and sine of an angle that turns at a rate."""
+    return (turn.x, turn.y) if rate is None else (Dual(turn.x, -turn.y * rate), Dual(turn.y, turn.x * rate))
+
+
+def _value(number: Any) -> Any:
+    return number.value if isinstance(number, Dual) else number
+
+
+def _values(pair: Pair) -> Pair:
+    return Pair(_value(pair.x), _value(pair.y))
+
+
+def _rates(pair: Pair) -> Pair:
+    return Pair(*(part.grad if isinstance(part, Dual) else Interval(0) for part in (pair.x, pair.y)))
+
+
+def _both(one: Pair, other: Pair) -> Pair:
+    return Pair(_within(one.x, other.x), _within(one.y, other.y))
+
+
+def _turn(c: Interval, s: Interval, wide: bool) -> Pair:
+    """Direction of an angle; of a wide one cosine and sine narrow each other."""
+    if not wide:
+        return Pair(c, s)
+    c = _across(c, s)
+    s = _across(s, c)
+    return Pair(_across(c, s), s)
+
+
+def _across(c: Interval, s: Interval) -> Interval:
+    """Narrow a cosine by the sine: it is ``+-sqrt(1 - s^2)``."""
+    way, above = (1.0 - s.sqr()).sqrt(), c.lo > 0.0
+    low, high = np.where(above, way.lo, -way.hi), np.where(~above & (c.hi < 0.0), -way.lo, way.hi)
+    return _within(c, Interval.from_bounds(low, high))

@@ -15,6 +15,7 @@ import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -247,16 +248,13 @@ class Positions:
             ends = [ends[0] + first, ends[1] + second + inner]
         outer = [local(k, link) for k, link in zip(dyad.joints, dyad.links)]
         arms = local(dyad.joints[2], a) - outer[0], local(dyad.joints[2], b) - outer[1]
-        near = self.near
-
-        def narrowed(value: Any, place: int) -> Any:
-            return value if near is None else near.narrowed(value, number, place)
-
-        found = place_dyad(PLANE, (ends[0], ends[1]), arms, dyad.side, narrowed)
+        near = None if self.near is None else partial(self.near.narrowed, number)
+        wide = self.box.size > 0
+        found, angles = place_dyad(PLANE, (ends[0], ends[1]), arms, dyad.side, near, wide)
         at.dyads.append(found)
         turns = Pair(*found[3:5]), Pair(*found[5:])
-        for link, turn, end, own in zip((a, b), turns, ends, outer):
-            at.turn[link], at.angle[link] = turn, PLANE.argument(turn)
+        for link, turn, angle, end, own in zip((a, b), turns, angles, ends, outer):
+            at.turn[link], at.angle[link] = turn, angle
             at.origin[link] = end - PLANE.turned(own, turn)
 
     def seen(self, k: int, at: Placement) -> Seen:

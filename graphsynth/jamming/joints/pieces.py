@@ -337,13 +337,18 @@ class Work:
             layout, at, found = below[0], _take(below[1], rows), _take(below[2], rows)
             exact = rest(layout, rows, np.full((rows.size, len(layout.limit)), np.inf))
             sure[rows[lower_bounds(layout, at, found, exact) > 1.0]] = -1
-        rows = np.flatnonzero(upper < 1.0)
-        if rows.size:
+        for wide in (False, True):
+            rows = np.flatnonzero((upper < 1.0) & (sure == 0))
+            if rows.size == 0:
+                break
             free = np.ones(rows.size, dtype=bool)
             for layout, whole, found, rule in above:
                 at, found, rule = _take(whole, rows), _take(found, rows), rule.take(rows)
                 tilts = np.abs(rule.tau).sum(axis=-1)
                 tilts = _ROOM * tilts + _SHARE * tilts.max(axis=1, keepdims=True, initial=0.0) + _LEAST
+                if wide:  # over a wide piece a tilt may come nearer to its limit than in the middle
+                    near = layout.limit_range[0] * (_ROOM * upper[rows, None])
+                    tilts = np.maximum(tilts, np.where(np.isfinite(near), near, 0.0))
                 free &= upper_bounds(layout, at, found, rest(layout, rows, tilts), rule) < 1.0
             sure[rows[free]] = 1
         return sure
