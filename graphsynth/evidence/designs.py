@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from statistics import median
+from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
@@ -12,6 +13,9 @@ import numpy as np
 from graphsynth.evidence.embodiment import median_row
 from graphsynth.evidence.rows import Effort, Problem, Row
 from graphsynth.mechanism.four_bar import TiltedFourBar
+
+#: Frame, crank, coupler and follower of wanted curves, at least; by how much they are longer at most: all turn fully.
+_MIDDLE, _WIDE = np.array([2.2, 1.0, 2.4, 2.3]), np.array([0.2, 0.05, 0.2, 0.3])
 
 
 def hidden_task(context: Any, effort: Effort) -> Problem:
@@ -63,3 +67,35 @@ def nine_points(context: Any, effort: Effort) -> Problem:
     )
     question = "Every four-bar whose coupler passes given points"
     return Problem("nine-points", question, "relative", tuple(rows), "homotopy", note)
+
+
+def nearest_curves(context: Any, effort: Effort) -> Problem:
+    """Look for coupler curves of four-bars in indexes of more and more curves, and among more and more candidates."""
+    from graphsynth.design import CurveIndex
+    from graphsynth.design.curves.index import CANDIDATES
+
+    turn, random = np.linspace(0.0, math.tau, 129), np.random.default_rng(3)
+    wanted, rows = [], []
+    for _ in range(9):
+        frame, crank, coupler, follower = (_MIDDLE + _WIDE * random.random(4)).tolist()
+        bar = TiltedFourBar(frame, crank, coupler, follower, k=random.uniform(-1.0, 1.0))
+        wanted.append(bar.positions(turn).M[:, :2])
+    sizes = (1000, 2000) if effort.quick else (1000, 4000, 16_000)
+    with TemporaryDirectory() as folder:
+        for curves in sizes:
+            index = CurveIndex.build(f"{folder}/{curves}", curves, links=[4, 6], sliders=0)
+            index.find(wanted[0], 1, closed=True)  # loaded
+            for candidates in (CANDIDATES,) if curves != sizes[-1] else (10, CANDIDATES, curves):
+                begin = perf_counter()
+                found = [index.find(curve, 1, closed=True, candidates=candidates)[0].error for curve in wanted]
+                timed = (perf_counter() - begin) / len(wanted), 1
+                setting, usual = f"{curves} curves, {candidates} candidates", candidates == CANDIDATES
+                more = {"kind": "distance of curves, median of 9", "reference": "closed form of the wanted curve"}
+                rows.append(
+                    Row.of("index", setting, median(found), timed, default=usual and curves == sizes[-1], **more)
+                )
+    note = (
+        "Wanted are curves of four-bars that no index holds; what is found is refined by a search, which comes nearer."
+    )
+    question = "Curves of an index that are nearest to a coupler curve"
+    return Problem("nearest-curves", question, "relative", tuple(rows), "index", note)

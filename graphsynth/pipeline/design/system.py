@@ -20,7 +20,7 @@ SYSTEM = System(
         Stage("mechanisms", f"{_HERE}:mechanisms", ("designs",), ("mechanisms",)),
     ),
     evidence=(
-        *plans("graphsynth.evidence.designs", "hidden-task", "nine-points"),
+        *plans("graphsynth.evidence.designs", "hidden-task", "nine-points", "nearest-curves"),
         *plans("graphsynth.evidence.poses", "five-poses", "function-positions", "cognates"),
     ),
 )
