@@ -63,6 +63,10 @@ class Curve:
         self.tangent = np.linalg.svd(self.matrix())[2][:, -1]
         self.step(np.zeros(len(poses)))
 
+    def keep(self, which: np.ndarray) -> None:
+        """Go on with these sets only."""
+        self.poses, self.tangent = self.poses[which], self.tangent[which]
+
     def matrix(self) -> np.ndarray:
         return jacobian(self.mechanism.joints, self.poses)[:, :, self.moving] * self.unit
 
@@ -73,8 +77,10 @@ class Curve:
     def step(self, h: np.ndarray) -> None:
         """Step along the tangents by lengths (sets,), and back to the joints at right angles to them."""
         self.moved(h[:, None] * self.tangent)
-        for _ in range(3):
+        for _ in range(6):
             f = residual(self.mechanism.joints, self.poses) / self.size
+            if np.abs(f).max() < 1e-13 * self.Lc:
+                break
             held = np.concatenate([self.matrix(), self.tangent[:, None, :]], axis=1)
             self.moved(np.linalg.solve(held, np.concatenate([-f, np.zeros((len(f), 1))], axis=1)[..., None])[..., 0])
         held = np.concatenate([self.matrix(), self.tangent[:, None, :]], axis=1)
@@ -116,17 +122,23 @@ def agree(mechanism: Mechanism, pulls: int, sets: int, random: np.random.Generat
         results = [pulled(mechanism, poses[k], link, at, targets[k], ways[k]) for k in range(sets)]
         ends = np.array([pose for pose, _ in results])
         # tiny steps down the slope, until it changes its sign; then a while on, to look for ends that lie farther
-        sense = np.sign(curve.slope(link, at, targets))
-        close = distance(curve.poses, ends, Lc)
-        first, over = np.full(sets, math.inf), np.zeros(sets, dtype=bool)
+        slope, close = curve.slope(link, at, targets), distance(curve.poses, ends, Lc)
+        sense = np.sign(slope)
+        # a link that the motion leaves where it is cannot be pulled: the end is the beginning
+        over = np.abs(slope) <= 1e-11 * np.hypot(*(targets - points_of(poses, link, at)).T)
+        first = np.where(over, close, math.inf)
+        live = np.arange(sets)
         for _ in range(round(6.0 / h)):
-            passed = ~over & (sense * curve.slope(link, at, targets) < 0.0)
-            first[passed] = distance(curve.poses, ends, Lc)[passed]
-            over |= passed
-            if (over & (close < 2.0 * h)).all():
+            here = distance(curve.poses, ends[live], Lc)
+            passed = ~over[live] & (sense[live] * curve.slope(link, at, targets[live]) < 0.0)
+            close[live], first[live[passed]] = np.minimum(close[live], here), here[passed]
+            over[live] |= passed
+            left = ~over[live] | (close[live] >= 2.0 * h)
+            live = live[left]
+            if not len(live):
                 break
-            curve.step(sense * h * Lc)
-            close = np.minimum(close, distance(curve.poses, ends, Lc))
+            curve.keep(left)
+            curve.step(sense[live] * h * Lc)
         assert (close < 4.0 * h).all(), (np.flatnonzero(close >= 4.0 * h), close.max(), mechanism)
         near = first < 4.0 * h
         same, on = same + int(near.sum()), on + int((~near).sum())
@@ -189,6 +201,20 @@ def test_several_freedoms_reach_what_they_can() -> None:
     assert abs(left - math.hypot(0.3, 4.0 - math.sqrt(3.75))) < 1e-6  # both legs are stretched
     _, (_, code, _) = pulled(FIVE_BAR, far, 2, (1.0, 0.0), tip - [0.1, 0.4], way)
     assert code == outlines.REACHED
+
+
+def test_a_link_that_stands_still_moves_nothing() -> None:
+    """A crank-rocker with links 4 and 5 as a triangle on its frame, which no motion moves: pulls leave the crank alone."""
+    crank, random = Mechanism.four_bar(2.0, 1.0, 2.5, 2.5), np.random.default_rng(5)
+    graph = MechanismGraph(6, [*((j.a, j.b) for j in crank.graph.joints), (0, 4), (4, 5), (0, 5)], frame=0)
+    for _ in range(20):
+        corners = [tuple(corner) for corner in random.normal(size=(3, 2)).tolist()]
+        fixed = [Revolute(*pair, at, at) for pair, at in zip(((0, 4), (4, 5), (0, 5)), corners, strict=True)]
+        whole = Mechanism(graph, [*crank.joints, *fixed], [])
+        base = np.vstack([simulate(crank, [random.uniform(0.0, math.tau)]).poses[0], np.zeros((2, 3))])
+        tip, target = random.normal(size=(2, 2))
+        pose, (_, code, _) = pulled(whole, base, 4, tip, target, np.zeros(15))
+        assert code == outlines.NEAREST and np.abs(pose - base).max() < 1e-9
 
 
 def test_poses_that_do_not_close_are_told() -> None:

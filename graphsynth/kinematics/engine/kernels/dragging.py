@@ -27,6 +27,8 @@ TRIALS = 300
 REACHED, GAIN = 1e-10, 1e-12
 #: Step of a probe where the point cannot get nearer to first order.
 PROBE = 2e-3
+#: Movement of a point for a unit step below which it stands still: rounding of the tangent space, not a way to go.
+STILL = 1e-10
 #: Damping of the shorter axis of a point's velocities, over the square of the longer one.
 LEAST = 1e-9
 #: Least part of the determinant of the tangent spaces before and after a step.
@@ -263,8 +265,8 @@ def nearing(D, rx, ry, damping, a):
     radius = math.sqrt(half * half + xy * xy)
     big = middle + radius
     a[:] = 0.0
-    if big <= 0.0:
-        return big
+    if big <= STILL * STILL:
+        return 0.0
     ex, ey = (half + radius, xy) if half >= 0.0 else (xy, radius - half)
     size = math.sqrt(ex * ex + ey * ey)
     ex, ey = (ex / size, ey / size) if size > 0.0 else (1.0, 0.0)
