@@ -86,7 +86,8 @@ def computations(*, many: bool) -> Recorded:
 
 
 #: Kernels of the page's engine alone; natively they are compiled when a test asks for them.
-PAGE = ("engine.kernels.planning.", "engine.kernels.advancing.", "engine.kernels.dragging.", "jamming.joints.kernels.")
+PAGE = ("engine.kernels.planning.", "engine.kernels.advancing.", "engine.kernels.dragging.", "jamming.joints.kernels.",
+        "design.poses.kernels.")  # fmt: skip
 
 
 def page_computations() -> Recorded:
@@ -122,7 +123,19 @@ def page_computations() -> Recorded:
                 at = np.array([0.3, 0.2])
                 dragging.drag(rows, table[0], 0, near, 2, at, np.array(target), way, length[0], found[:3].copy())
         _tilted(mechanism, np.ascontiguousarray(pose[None]), kept)
+    _through_poses(kept)
     return kept
+
+
+def _through_poses(kept: Recorded) -> None:
+    """Record the calls with which the page finds dyads of two to five poses."""
+    from graphsynth.design.poses.kernels import candidates
+
+    random = np.random.default_rng(3)
+    with recording(kept, all_calls=True):
+        for count in (2, 3, 4, 5):
+            poses = np.column_stack([random.normal(size=(count, 2)), random.uniform(-3.0, 3.0, count)])
+            candidates(poses, 60, np.zeros((400, 4)))
 
 
 def _tilted(mechanism: Any, poses: np.ndarray, kept: Recorded) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from graphsynth.kinematics.engine import outlines
-from graphsynth.kinematics.engine.kernels.dragging import drag
+from graphsynth.kinematics.engine.kernels.dragging import LONGEST, TRIALS, drag
 from graphsynth.kinematics.engine.program import compile_program, equations
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.constraints import characteristic_length, jacobian, residual
@@ -121,14 +121,14 @@ def agree(mechanism: Mechanism, pulls: int, sets: int, random: np.random.Generat
         curve = Curve(mechanism, poses)
         results = [pulled(mechanism, poses[k], link, at, targets[k], ways[k]) for k in range(sets)]
         ends = np.array([pose for pose, _ in results])
-        # tiny steps down the slope, until it changes its sign; then a while on, to look for ends that lie farther
+        # tiny steps down the slope, until it changes its sign; then on to ends that lie farther, as far as pulls go
         slope, close = curve.slope(link, at, targets), distance(curve.poses, ends, Lc)
         sense = np.sign(slope)
         # a link that the motion leaves where it is cannot be pulled: the end is the beginning
         over = np.abs(slope) <= 1e-11 * np.hypot(*(targets - points_of(poses, link, at)).T)
         first = np.where(over, close, math.inf)
         live = np.arange(sets)
-        for _ in range(round(6.0 / h)):
+        for _ in range(round(TRIALS * LONGEST / h)):
             here = distance(curve.poses, ends[live], Lc)
             passed = ~over[live] & (sense[live] * curve.slope(link, at, targets[live]) < 0.0)
             close[live], first[live[passed]] = np.minimum(close[live], here), here[passed]
@@ -204,7 +204,7 @@ def test_several_freedoms_reach_what_they_can() -> None:
 
 
 def test_a_link_that_stands_still_moves_nothing() -> None:
-    """A crank-rocker with links 4 and 5 as a triangle on its frame, which no motion moves: pulls leave the crank alone."""
+    """A crank-rocker with links 4 and 5 as a triangle on its frame: pulls of those leave the crank alone."""
     crank, random = Mechanism.four_bar(2.0, 1.0, 2.5, 2.5), np.random.default_rng(5)
     graph = MechanismGraph(6, [*((j.a, j.b) for j in crank.graph.joints), (0, 4), (4, 5), (0, 5)], frame=0)
     for _ in range(20):

@@ -252,6 +252,20 @@ def measure_a_distance(person, downloads):
     assert person.said().startswith("80 mm")
 
 
+def ask_for_a_body_in_three_poses(person, downloads):
+    person.press("[data-do=fresh]")
+    person.look_at(40, 0, 1.6 if person.mobile else 3)
+    person.tool("poses")
+    for x, y, turn in ((0, 0, 0.0), (40, 20, 0.5), (70, 10, 1.2)):
+        person.drag((x, y), (x + 20 * math.cos(turn), y + 20 * math.sin(turn)))
+    assert person.script("return Bench.app.poses.length") == 3
+    fill(person, "chosen", "panel.angle", "0")
+    person.press("[data-passing]")
+    person.until("return document.getElementById('candidates').open", seconds=240)
+    assert person.script("return Bench.app.candidates[0].quality") > 0.3
+    assert mechanism(person).graph.without_frame().key == KEY
+
+
 def undo_all_and_do_it_again(person, downloads):
     data, steps = person.drawn(), person.script("return Bench.app.history.at")
     for _ in range(steps):
@@ -278,7 +292,8 @@ TASKS = [
     drag_the_coupler, assemble_it_otherwise, tilt_the_axis_until_it_binds, prove_that_it_binds,
     find_its_chain_and_relatives, change_the_frame, change_the_driver, share_it_and_open_the_link,
     save_it_for_the_library, export_a_drawing_for_cad, take_the_python_for_it, take_a_chain_from_the_list,
-    count_the_chains_of_sixteen_links, draw_a_wanted_curve, measure_a_distance, undo_all_and_do_it_again,
+    count_the_chains_of_sixteen_links, draw_a_wanted_curve, ask_for_a_body_in_three_poses,
+    measure_a_distance, undo_all_and_do_it_again,
     see_velocities_of_a_template_in_russian_and_dark,
 ]  # fmt: skip
 

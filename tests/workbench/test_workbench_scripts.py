@@ -234,7 +234,7 @@ def test_every_word_is_asked_for_and_every_word_asked_for_is_there():
     names = page_file("order.txt").split()
     text = page_file("index.html") + "".join(page_file(f"{name}.js") for name in names)
     known = languages()["en"]
-    groups = "tool hint template name pair mode do language said fault.file event know chain chains jam target"
+    groups = "tool hint template name pair mode do language said fault.file event know chain chains jam target passing"
     built = [f"{group}." for group in groups.split()]
     for key in known:
         assert f'"{key}"' in text or f"'{key}'" in text or any(key.startswith(start) for start in built), key

@@ -1,8 +1,9 @@
-"""Mechanisms for a drawn curve: the page's index and search, beside the library."""
+"""Mechanisms for a drawn curve and for poses: the page's index and searches, beside the library."""
 
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ return args[0].map(k => {
   const own = Curves.row(held, k);
   return { own, curve: Curves.curve(motion, own, [...own.places, own.point]) };
 });"""
-FOUND = """const found = await Curves.found(await Kernels.load("motion"), args[0]);
+FOUND = """const found = await Curves.found(await Kernels.load("motion"), args[0], () => true, args[1] ?? true);
 return found.map(({ data, error }) => [JSON.stringify(data), error]);"""
 
 
@@ -87,6 +88,61 @@ def test_a_hidden_curve_is_drawn_again(with_curves):
         curve = traced(Mechanism.from_json(text))
         assert abs(curve[0] - curve[-1]) < 1e-7
         assert apart(curve, wanted) == pytest.approx(error, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_open_curves_are_drawn(with_curves):
+    """A straight line, an arc and a wave: the library's curve of what is found passes near all points."""
+    t = np.linspace(0.0, 1.0, 25)
+    for wanted, most in ((100 * t, 2e-3), (50 * np.exp(2.4j * t), 2e-3), (90 * t + 20j * np.sin(6 * t), 1e-2)):
+        found = with_curves(FOUND, np.column_stack([wanted.real, wanted.imag]).tolist(), False)
+        text, error = found[0]
+        assert error < most and len(found) > 3
+        curve = traced(Mechanism.from_json(text), 1441)
+        assert abs(curve[0] - curve[-1]) < 1e-7
+        size = np.hypot(np.ptp(wanted.real), np.ptp(wanted.imag))
+        assert np.abs(wanted[:, None] - curve).min(axis=1).max() < (3 * most + 5e-3) * size
+
+
+PASSING = """const found = await Passing.found(await Kernels.load("design"), await Kernels.load("motion"), args[0]);
+return found.map(({ data, quality }) => [JSON.stringify(data), quality]);"""
+
+
+def misses(mechanism, poses, sense):
+    """How far the coupler is from the poses when the crank turns in one sense; None if it does not get there."""
+    poses = np.array(poses)
+    places, turns = poses[:, 0] + 1j * poses[:, 1], np.exp(1j * (poses[:, 2] - poses[0, 2]))
+    at = {joint.pair: complex(*joint.at_a) for joint in mechanism.joints}
+    pivot, tip = at[0, 1], at[1, 2]
+    tips = places + turns * (tip - places[0])
+    steps = np.mod(sense * np.diff(np.angle((tips - pivot) / (tip - pivot))), 2 * np.pi)
+    goals = sense * np.concatenate([[0.0], np.cumsum(steps)])
+    if steps.sum() >= 2 * np.pi:
+        return None
+    motion = mechanism.simulate(np.concatenate([[0.0], *(np.linspace(a, b, 61)[1:] for a, b in pairwise(goals))]))
+    if not motion.assembled.all():
+        return None
+    at = motion.poses[60 * np.arange(len(goals)), 2]
+    here = at[:, 0] + 1j * at[:, 1] + np.exp(1j * at[:, 2]) * places[0]
+    return max(np.abs(here - places).max(), np.abs(np.exp(1j * at[:, 2]) - turns).max())
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("count", [2, 3, 4, 5])
+def test_four_bars_pass_through_the_poses_in_the_library(scripts, count):
+    poses = [[0, 0, 0], [40, 20, 0.5], [70, 10, 1.2], [80, -10, 1.7], [60, 18, 0.8]]
+    poses = poses[:count] if count < 5 else [poses[k] for k in (0, 1, 4, 2, 3)]
+    found = scripts(PASSING, poses, modules=("design", "motion"))
+    assert len(found) >= (1 if count == 5 else 5)
+    assert [quality for _, quality in found] == sorted((quality for _, quality in found), reverse=True)
+    for text, quality in found:
+        own = [misses(Mechanism.from_json(text), poses, sense) for sense in (1, -1)]
+        assert 0 < quality <= 1 and min(far for far in own if far is not None) < 1e-5
+
+
+def test_poses_at_one_place_have_no_four_bars(scripts):
+    for poses in ([[1, 2, 0], [1, 2, 0]], [[0, 0, 0], [1, 0, 0], [2, 1, 0], [3, 0, 0]]):
+        assert scripts(PASSING, poses, modules=("design", "motion")) == []
 
 
 @pytest.mark.slow

@@ -1,14 +1,19 @@
 "use strict";
-/* Mechanisms for a drawn curve, from the small index of the library's curves: the rows whose sizes of Fourier coefficients
+/* Mechanisms for a drawn curve, closed or open, from the small index of the library's curves: the rows whose sizes of Fourier coefficients
    are nearest (docs/theory/curve-index.md) are moved by the engine, laid on the target, and the best are refined: damped
    Gauss-Newton steps on the distances from the target to the curve, with differences of the engine's sweeps.
 
-     Curves.found(motion, target, tell)    -> [{data, error, key}], the best first
-         target: [[x, y], ...], closed; data: in the form of files; error: root mean square distance over its size */
+   An open one is laid on parts of every third curve of the index, for a part has no sizes of coefficients.
+
+     Curves.found(motion, target, tell, closed = true)    -> [{data, error}], the best first
+         target: [[x, y], ...]; data: in the form of files; error: root mean square distance over its size, of an open
+         target that of its points from the curve, which goes on beyond it */
 
 const Curves = (() => {
   const HARMONICS = 8, JOINTS = 7, ROW = 2 + 4 * (JOINTS + 1) + 2 * HARMONICS, GRID = 32767;
   const LOOKED = 120, LAID = 8, KEPT = 6, SAMPLES = 73, POINTS = 48, STEPS = 10, ENOUGH = 1e-3, DIFFERENCE = 1e-5;
+  /* Open targets: points along them and along a whole curve, lengths of parts in such points, and where they begin. */
+  const FEW = 16, ROUND = 96, PARTS = [12, 16, 24, 32, 48, 64, 80], BEGINS = 2, ROWS = 3, TOLD = 37;
   let text = "", index = null;
 
   const register = packed => { text = packed; };
@@ -50,14 +55,14 @@ const Curves = (() => {
     return [...all.slice(HARMONICS).map(own => own[0]), ...all.slice(0, HARMONICS).map(own => own[1])].map(own => own / norm);
   }
 
-  /* So many points at equal steps of the length of a closed polygon. */
-  function even(points, count) {
-    const sides = points.map((p, k) => { const q = points[(k + 1) % points.length]; return Math.hypot(q[0] - p[0], q[1] - p[1]); });
+  /* So many points at equal steps of the length of a polygon. */
+  function even(points, count, closed = true) {
+    const sides = points.slice(0, closed ? points.length : -1).map((p, k) => { const q = points[(k + 1) % points.length]; return Math.hypot(q[0] - p[0], q[1] - p[1]); });
     const total = sides.reduce((sum, own) => sum + own, 0), found = [];
     for (let k = 0, j = 0, gone = 0; k < count; k++) {
-      const wanted = (k * total) / count;
-      while (j < points.length - 1 && gone + sides[j] < wanted) gone += sides[j++];
-      const share = sides[j] ? (wanted - gone) / sides[j] : 0, p = points[j], q = points[(j + 1) % points.length];
+      const wanted = (k * total) / (closed ? count : count - 1);
+      while (j < sides.length - 1 && gone + sides[j] < wanted) gone += sides[j++];
+      const share = sides[j] ? Math.min(1, (wanted - gone) / sides[j]) : 0, p = points[j], q = points[(j + 1) % points.length];
       found.push([p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1])]);
     }
     return found;
@@ -85,6 +90,32 @@ const Curves = (() => {
       }
     }
     const { a, b, mirror } = best;
+    return { error: best.error, map: ([x, y]) => { const u = x - from[0], v = mirror * (y - from[1]); return [to[0] + a * u - b * v, to[1] + b * u + a * v]; } };
+  }
+
+  /* The part of a curve that is most like an open target, and the similar motion that takes it there. */
+  function part(target, curve) {
+    const own = even(curve, ROUND), mean = points => [0, 1].map(c => points.reduce((sum, p) => sum + p[c], 0) / points.length);
+    const to = mean(target), w = target.map(p => [p[0] - to[0], p[1] - to[1]]), size = w.reduce((sum, p) => sum + p[0] ** 2 + p[1] ** 2, 0);
+    let best = { error: Infinity };
+    for (const length of PARTS) {
+      for (let begin = 0; begin < ROUND; begin += BEGINS) {
+        const z = w.map((_, k) => own[(begin + Math.round((k * length) / (FEW - 1))) % ROUND]), from = mean(z);
+        const sums = [0, 0, 0, 0, 0, 0, 0, 0];
+        let square = 0;
+        for (let k = 0; k < FEW; k++) {
+          const x = z[k][0] - from[0], y = z[k][1] - from[1], [u, v] = w[k], [r, t] = w[FEW - 1 - k];
+          square += x * x + y * y;
+          sums[0] += u * x + v * y; sums[1] += v * x - u * y; sums[2] += u * x - v * y; sums[3] += v * x + u * y;
+          sums[4] += r * x + t * y; sums[5] += t * x - r * y; sums[6] += r * x - t * y; sums[7] += t * x + r * y;
+        }
+        for (let way = 0; way < 8; way += 2) {
+          const [re, im] = [sums[way], sums[way + 1]], error = Math.sqrt(Math.max(0, 1 - (re * re + im * im) / (square * size || 1)));
+          if (error < best.error) best = { error, a: re / square, b: im / square, mirror: way % 4 ? -1 : 1, from };
+        }
+      }
+    }
+    const { a, b, mirror, from } = best;
     return { error: best.error, map: ([x, y]) => { const u = x - from[0], v = mirror * (y - from[1]); return [to[0] + a * u - b * v, to[1] + b * u + a * v]; } };
   }
 
@@ -122,10 +153,10 @@ const Curves = (() => {
   }
   const between = (points, [k, share]) => { const p = points[k], q = points[(k + 1) % points.length]; return [p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1])]; };
 
-  /* Root mean square distance, target to curve and curve to target. */
-  function error(target, points) {
+  /* Root mean square distance, target to curve and, of a closed target, curve to target. */
+  function error(target, points, closed) {
     const square = (from, to) => feet(from, to).reduce((sum, own) => sum + own[2] ** 2, 0) / from.length;
-    return Math.sqrt(0.5 * (square(target, points) + square(even(points, POINTS), target)));
+    return closed === false ? Math.sqrt(square(target, points)) : Math.sqrt(0.5 * (square(target, points) + square(even(points, POINTS), target)));
   }
 
   /* The solution of A x = b by elimination with pivots. */
@@ -144,10 +175,10 @@ const Curves = (() => {
   }
 
   /* Damped Gauss-Newton steps over all places: residuals are the gaps from target points to their feet, and back. */
-  function refined(motion, target, own, places, size) {
-    let points = curve(motion, own, places), best = error(target, points), damping = 1e-2;
+  function refined(motion, target, own, places, size, closed) {
+    let points = curve(motion, own, places), best = error(target, points, closed), damping = 1e-2;
     for (let step = 0; step < STEPS && best > ENOUGH * size; step++) {
-      const back = even(points, POINTS), there = feet(target, points), here = feet(back, target).map(foot => between(target, foot)), on = feet(back, points);
+      const back = closed ? even(points, POINTS) : [], there = feet(target, points), here = feet(back, target).map(foot => between(target, foot)), on = feet(back, points);
       const gaps = now => [...there.map((foot, k) => { const [x, y] = between(now, foot); return [target[k][0] - x, target[k][1] - y]; }),
         ...on.map((foot, k) => { const [x, y] = between(now, foot); return [here[k][0] - x, here[k][1] - y]; })].flat();
       const r = gaps(points), columns = [];
@@ -163,7 +194,7 @@ const Curves = (() => {
       for (let trial = 0; trial < 5 && !better; trial++, damping *= 4) {
         const by = solve(normal.map((line, k) => line.map((value, j) => value + (k === j ? damping * trace : 0))), slope);
         if (!by || !by.every(Number.isFinite)) break;
-        const moved = places.map(([x, y], k) => [x + by[2 * k], y + by[2 * k + 1]]), next = curve(motion, own, moved), far = next ? error(target, next) : Infinity;
+        const moved = places.map(([x, y], k) => [x + by[2 * k], y + by[2 * k + 1]]), next = curve(motion, own, moved), far = next ? error(target, next, closed) : Infinity;
         if (far < best) { better = true; places = moved; points = next; damping = Math.max(1e-9, damping / 40); if (far > 0.995 * best) step = STEPS; best = far; }
       }
       if (!better) break;
@@ -171,24 +202,29 @@ const Curves = (() => {
     return { places, error: best };
   }
 
-  async function found(motion, drawnTarget, tell = () => true) {
-    const held = await open(), target = even(drawnTarget, POINTS), wanted = sizes(target), turned = [...wanted].reverse(), count = held.rows.length / ROW, far = [];
-    const apart = (a, b) => a.reduce((sum, own, k) => sum + (own - b[k]) ** 2, 0);
-    for (let k = 0; k < count; k++) { const own = sizesAt(held.rows, k); far.push([Math.min(apart(wanted, own), apart(turned, own)), k]); }
-    far.sort((p, q) => p[0] - q[0]);
-    const near = [];
-    for (const [, k] of far.slice(0, LOOKED)) {
+  /* The rows that are worth looking at: a closed curve is asked by its sizes. */
+  function likely(held, target) {
+    const wanted = sizes(target), reversed = [...wanted].reverse(), far = [], apart = (a, b) => a.reduce((sum, own, k) => sum + (own - b[k]) ** 2, 0);
+    for (let k = 0; k < held.rows.length / ROW; k++) { const own = sizesAt(held.rows, k); far.push([Math.min(apart(wanted, own), apart(reversed, own)), k]); }
+    return far.sort((p, q) => p[0] - q[0]).slice(0, LOOKED).map(own => own[1]);
+  }
+
+  async function found(motion, drawnTarget, tell = () => true, closed = true) {
+    const held = await open(), target = even(drawnTarget, POINTS, closed), few = closed ? null : even(drawnTarget, FEW, false), near = [];
+    const looked = closed ? likely(held, target) : Array.from({ length: Math.floor(held.rows.length / ROW / ROWS) }, (_, k) => k * ROWS);
+    for (const [n, k] of looked.entries()) {
       const own = row(held, k), places = [...own.places, own.point], points = curve(motion, own, places);
-      if (points) { const { error: apartBy, map } = laid(target, points); near.push({ own, places: places.map(map), error: apartBy }); }
+      if (points) { const { error: apart, map } = closed ? laid(target, points) : part(few, points); near.push({ own, places: places.map(map), error: apart }); }
+      if (!closed && n % TOLD === 0 && (await tell((0.5 * n) / looked.length)) === false) break;
     }
     near.sort((p, q) => p.error - q.error);
     const box = [0, 1].map(c => Math.max(...target.map(p => p[c])) - Math.min(...target.map(p => p[c]))), size = Math.hypot(...box), all = [];
     for (const [k, { own, places }] of near.slice(0, LAID).entries()) {
       if (curve(motion, own, places)) {
-        const done = refined(motion, target, own, places, size);
+        const done = refined(motion, target, own, places, size, closed);
         all.push({ data: drawn(own, done.places), error: done.error / size });
       }
-      if ((await tell((k + 1) / LAID)) === false) break;
+      if ((await tell(closed ? (k + 1) / LAID : 0.5 + (0.5 * (k + 1)) / LAID)) === false) break;
     }
     return all.sort((p, q) => p.error - q.error).slice(0, KEPT);
   }

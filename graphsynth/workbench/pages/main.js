@@ -18,6 +18,7 @@
     trace: "M3 17C7 3 12 3 13 10C14 18 19 18 21 9M13 10m-2 0a2 2 0 1 0 4 0a2 2 0 1 0 -4 0",
     picture: "M3 5H21V19H3ZM3 16L8 11L12 15L15 12L21 17M15.5 8.5m-1.5 0a1.5 1.5 0 1 0 3 0a1.5 1.5 0 1 0 -3 0",
     target: "M4 14C4 6 10 3 15 5C21 8 20 18 14 19C8 20 4 19 4 14M12 12h.1M12 12m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0",
+    poses: "M3 20L11 16M3 20L5 12M3 20m-1.5 0a1.5 1.5 0 1 0 3 0a1.5 1.5 0 1 0 -3 0M12 10L20 12M12 10L14 3M12 10m-1.5 0a1.5 1.5 0 1 0 3 0a1.5 1.5 0 1 0 -3 0",
     measure: "M3 15L15 3L21 9L9 21ZM7 11L9 13M10 8L13 11M13 5L15 7",
   };
   const icon = name => Bench.svg("svg", { viewBox: "0 0 24 24", width: 22, height: 22, "aria-hidden": "true" }, Bench.svg("path", { d: ICONS[name] }));

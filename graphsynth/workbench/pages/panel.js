@@ -146,12 +146,13 @@
     const focused = place.contains(document.activeElement) ? [...place.querySelectorAll("input,select,button")].indexOf(document.activeElement) : -1;
     const { sheet, selection } = app, [id] = selection;
     let parts;
-    if (selection.length === 0) parts = [make("p", { class: "soft" }, Bench.word("panel.none"))];
+    if (app.tool === "poses") parts = Bench.posePanel(app);
+    else if (selection.length === 0) parts = [make("p", { class: "soft" }, Bench.word("panel.none"))];
     else if (selection.length > 1) parts = [make("h3", {}, Bench.word("panel.many", { n: selection.length }))];
     else if (sheet.points[id]) parts = pointPanel(app, id);
     else if (sheet.links[id]) parts = linkPanel(app, id);
     else parts = pairPanel(app, id);
-    if (selection.length) {
+    if (selection.length && app.tool !== "poses") {
       parts.push(make("div", { class: "acts" }, button("do.duplicate", () => Bench.do.duplicate(app)),
         button("do.mirror", () => Bench.do.mirror(app)), button("do.delete", () => Bench.do.delete(app))));
     }

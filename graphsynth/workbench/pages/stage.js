@@ -56,6 +56,7 @@
       const { app } = this, tool = Bench.TOOLS[app.tool];
       if (app.mode === "run") this.action = this.drag(place, event);
       else if (app.tool === "target") this.action = this.trail(place);
+      else if (app.tool === "poses") this.action = this.stand(place, event);
       else if (tool.picks === 0) this.action = this.choose(place, event);
       else this.action = this.press(place, event);
       event.preventDefault();
@@ -104,6 +105,17 @@
           shown();
         },
         up: () => { this.over(); Bench.answerTarget(app, way.map(place => { const { x, y } = view.place(place); return [x, y]; })); },
+        cancel: () => this.over(),
+      };
+    }
+
+    /** A pose that is wanted: pressed at its place, released in its direction. */
+    stand(start, event) {
+      const { app, view } = this, from = this.pickAt(start, event);
+      let to = from;
+      return {
+        move: (place, more) => { to = Bench.snapped(view.place(place), { from, straight: more.shiftKey, off: !more.shiftKey }); this.over(Bench.svg("path", { class: "ghost", d: Bench.pathOf([from, to].map(own => view.px([own.x, own.y]))) })); },
+        up: () => { this.over(); Bench.addPose(app, from, to); },
         cancel: () => this.over(),
       };
     }

@@ -90,6 +90,7 @@
     measure: { key: "m", picks: 2 },
     picture: { key: "i", picks: 2 },
     target: { key: "w", picks: 0 },
+    poses: { key: "q", picks: 0 },
   };
 
   /** Where a place snaps to: {x, y, kind}.  Points first, then the angle from where a line begins, then the grid. */

@@ -14,6 +14,7 @@
         root.append(this.layers[name] = svg("g", { "data-layer": name }));
       }
       this.pose = null;
+      this.shown = new WeakMap();
     }
 
     resize() {
@@ -102,20 +103,18 @@
       this.show(sheet);
     }
 
-    /** Show the pose: groups are shifted and turned as a whole. */
+    /** Show the pose: groups are shifted and turned as a whole, those that moved. */
     show(sheet) {
       const [ox, oy] = this.px([0, 0]), { scale } = this.camera;
+      const put = (group, to) => { if (this.shown.get(group) !== to) { this.shown.set(group, to); group.setAttribute("transform", to); } };
       for (const [id, group] of this.groups) {
         const [x, y, turn] = this.row(sheet, id);
-        if (!x && !y && !turn) group.removeAttribute("transform");
-        else {
-          const to = `translate(${(ox + x * scale).toFixed(2)} ${(oy - y * scale).toFixed(2)})`;
-          group.setAttribute("transform", `${to} rotate(${((-turn * 180) / Math.PI).toFixed(4)}) translate(${-ox} ${-oy})`);
-        }
+        const to = `translate(${(ox + x * scale).toFixed(2)} ${(oy - y * scale).toFixed(2)})`;
+        put(group, !x && !y && !turn ? "" : `${to} rotate(${((-turn * 180) / Math.PI).toFixed(4)}) translate(${-ox} ${-oy})`);
       }
       for (const [id, group] of [...this.spots, ...this.drives]) {
         const [x, y] = this.where(sheet, id);
-        group.setAttribute("transform", `translate(${x.toFixed(2)} ${y.toFixed(2)})`);
+        put(group, `translate(${x.toFixed(2)} ${y.toFixed(2)})`);
       }
     }
 

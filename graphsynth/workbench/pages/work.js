@@ -35,9 +35,13 @@ const Work = (() => {
       const motion = await Kernels.load("motion"), sketch = await Kernels.load("sketch");
       return Turning.found(motion, links, joints, more.places || Layout.places(sketch, links, joints).places, more);
     },
-    /* Mechanisms for a closed curve. */
-    async target([curve], tell) {
-      return Curves.found(await Kernels.load("motion"), curve, tell);
+    /* Mechanisms for a curve. */
+    async target([curve, closed], tell) {
+      return Curves.found(await Kernels.load("motion"), curve, tell, closed);
+    },
+    /* Four-bars through poses. */
+    async passing([poses], tell) {
+      return Passing.found(await Kernels.load("design"), await Kernels.load("motion"), poses, tell);
     },
   };
 
