@@ -258,7 +258,9 @@ def ask_for_a_body_in_three_poses(person, downloads):
     person.tool("poses")
     for x, y, turn in ((0, 0, 0.0), (40, 20, 0.5), (70, 10, 1.2)):
         person.drag((x, y), (x + 20 * math.cos(turn), y + 20 * math.sin(turn)))
-    assert person.script("return Bench.app.poses.length") == 3
+        # the panel grows with the poses, and on a phone the drawing makes room
+        person.until("return Bench.app.view.height === document.getElementById('sheet').getBoundingClientRect().height")
+    person.until("return Bench.app.poses.length === 3")
     fill(person, "chosen", "panel.angle", "0")
     person.press("[data-passing]")
     person.until("return document.getElementById('candidates').open", seconds=240)

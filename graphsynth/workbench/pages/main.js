@@ -153,7 +153,7 @@
       $("undo").disabled = !app.history.canUndo;
       $("redo").disabled = !app.history.canRedo;
       $("unit").value = app.sheet.unit;
-      $("empty").hidden = Object.keys(app.sheet.points).length > 0;
+      $("empty").hidden = Object.keys(app.sheet.points).length > 0 || app.tool === "target" || app.tool === "poses";
       if (kind === "tool") toolbar(app);
       if (kind !== "view") describe(app);
       document.body.dataset.mode = app.mode;
