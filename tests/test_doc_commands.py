@@ -40,7 +40,7 @@ CHECKED = {
 #: Commands that no test of this file runs, and why.
 NOT_RUN = {
     r"run |accuracy |stress": "the scenes, methods and cases have tests of their own: tests/pipeline, accuracy, stress",
-    r"(enumerate|build) --links 16|--links 18": "much disk or many hours; fewer links in tests/synthesis, atlas",
+    r"(enumerate|build) --links 16|--links (18|20)": "much disk or many hours; fewer in tests/synthesis, atlas",
     r"\$|part-": "jobs of a batch system; shards in tests/synthesis, atlas",
     r"--scheduler|sixteen": "needs a cluster; tests/atlas starts one",
     r"--mobility 2\.\.4|verify chains.sqlite$": "minutes; tests/atlas verify every chain of the shipped catalogue",

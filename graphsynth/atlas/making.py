@@ -94,9 +94,9 @@ def _family(
 
 def expected_of(problem: EnumerationProblem, executor: Executor | None) -> int:
     """Count the chains of a family without listing them."""
-    from graphsynth.synthesis.problem import counts
+    from graphsynth.synthesis.problem import counted
 
-    return sum(counts(problem.work_items(listing=False), executor))
+    return counted(problem, executor)
 
 
 def processes(workers: int) -> AbstractContextManager[Executor | None]:

@@ -14,10 +14,10 @@ from graphsynth.synthesis.writing import count_with_checkpoint
 def run(options: argparse.Namespace) -> int:
     """Print the count; the number stands alone on the last line."""
     begin = time.perf_counter()
-    problem = problem_of(options)
+    problem = problem_of(options, counted=options.shard is None)
     if problem.reason:
         console.note(f"nothing to count: {problem.reason}")
-    size = sum(len(family.graphs) for family in problem.families)
+    size = sum(part.weight for part in problem.parts())
     try:
         with (
             processes(console.workers_for(options.workers, size > 100_000)) as executor,

@@ -61,7 +61,7 @@ def spec_of(options: argparse.Namespace) -> StructuralSpec:
     return StructuralSpec(**question)
 
 
-def problem_of(options: argparse.Namespace) -> EnumerationProblem:
+def problem_of(options: argparse.Namespace, *, counted: bool = False) -> EnumerationProblem:
     """Return what ``count`` and ``enumerate`` are asked to do."""
     from graphsynth.synthesis.problem import EnumerationProblem
 
@@ -94,7 +94,8 @@ def problem_of(options: argparse.Namespace) -> EnumerationProblem:
     asked = {symbol: int(text) for symbol, text in given.items()}
     joints = {int(symbol[1:]): count for symbol, count in asked.items() if symbol[0] == "p"}
     plane, mobility = asked.get("Pi", 3), asked.get("W", 1)
-    return EnumerationProblem.chains(asked["N"], mobility, plane, joints, options.fractionated, options.symmetry)
+    numbers = asked["N"], mobility, plane, joints, options.fractionated, options.symmetry
+    return EnumerationProblem.chains(*numbers, counted=counted)
 
 
 def shard(text: str) -> tuple[int, int]:

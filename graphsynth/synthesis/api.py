@@ -9,7 +9,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, overload
 
 from graphsynth.core.errors import GraphError
-from graphsynth.synthesis.problem import EnumerationProblem, counts, graphs
+from graphsynth.synthesis.problem import EnumerationProblem, counted, graphs
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
@@ -69,10 +69,6 @@ class Graphs(Iterator["MechanismGraph"]):
 
 def _list(what: str, problem: EnumerationProblem, executor: Executor | None) -> Graphs:
     return Graphs(what, lambda: graphs(problem.work_items(listing=True), executor))
-
-
-def _count(problem: EnumerationProblem, executor: Executor | None) -> int:
-    return sum(counts(problem.work_items(listing=False), executor))
 
 
 def enumerate_chains(
@@ -160,8 +156,8 @@ def count_chains(
     >>> [count_chains(n) for n in (4, 6, 8, 10, 12, 14)]
     [1, 2, 16, 230, 6856, 318162]
     """
-    problem = EnumerationProblem.chains(links, mobility, space, joints_by_mobility, fractionated, symmetry)
-    return _count(problem, executor)
+    asked = links, mobility, space, joints_by_mobility, fractionated, symmetry
+    return counted(EnumerationProblem.chains(*asked, counted=True), executor)
 
 
 def enumerate_mechanisms(
@@ -219,7 +215,7 @@ def count_mechanisms(
     >>> count_mechanisms(StructuralSpec(W=1, Pi=3, v_ct=6, p=22, p2=3, n=14, t0=7, n4=4))
     9663907
     """
-    return _count(EnumerationProblem.mechanisms(spec, symmetry), executor)
+    return counted(EnumerationProblem.mechanisms(spec, symmetry), executor)
 
 
 def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) -> list[MechanismGraph]:
@@ -296,7 +292,7 @@ def count_assur_groups(links: int, *, space: int = 3, executor: Executor | None 
     >>> [count_assur_groups(n) for n in (2, 4, 6, 8, 10)]
     [1, 2, 10, 173, 5438]
     """
-    return _count(EnumerationProblem.groups(links, space), executor)
+    return counted(EnumerationProblem.groups(links, space), executor)
 
 
 def enumerate_baranov_trusses(links: int, *, space: int = 3, executor: Executor | None = None) -> Graphs:
@@ -338,4 +334,4 @@ def count_baranov_trusses(links: int, *, space: int = 3, executor: Executor | No
     >>> [count_baranov_trusses(n) for n in (3, 5, 7, 9, 11)]
     [1, 1, 3, 28, 562]
     """
-    return _count(EnumerationProblem.trusses(links, space, False), executor)
+    return counted(EnumerationProblem.trusses(links, space, False), executor)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from itertools import chain
 from operator import methodcaller
 from typing import TYPE_CHECKING
 
-from graphsynth.core.errors import InfeasibleSpecError, SpecError, TooLargeError
+from graphsynth.core.errors import GraphsynthError, InfeasibleSpecError, SpecError, TooLargeError
 from graphsynth.core.ordered import in_order, processes as processes_of
 from graphsynth.core.wording import shown, whole
 from graphsynth.synthesis.chunks import Chunk, cut
@@ -28,6 +28,7 @@ from graphsynth.synthesis.families import (
     mechanism_families,
 )
 from graphsynth.synthesis.fractionated import OneByOne
+from graphsynth.synthesis.totals import Total, is_counted_together, totals_of
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
@@ -66,6 +67,11 @@ class EnumerationProblem:
         listing = listing or bool(self.symmetry) or any(family.levels for family in self.families)
         return list(_work_items(self, listing))
 
+    def parts(self) -> Sequence[WorkItem | Total]:
+        """Cut the problem to count it as a whole; where chains are many, the counts of the parts are fractions."""
+        totals = None if self.symmetry else totals_of(self.families)
+        return self.work_items(listing=False) if totals is None else [*self.one_by_one, *totals]
+
     @classmethod
     def chains(
         cls,
@@ -77,8 +83,9 @@ class EnumerationProblem:
         symmetry: int | None,
         *,
         framed: bool = False,
+        counted: bool = False,
     ) -> EnumerationProblem:
-        """State the enumeration of chains (of mechanisms with every frame, if ``framed``).
+        """State the enumeration of chains (of mechanisms with every frame, if ``framed``; to count them, ``counted``).
 
         Raises `SpecError` for a value out of its bounds, `TooLargeError` for more loops than there are contracted
         graphs.
@@ -92,7 +99,9 @@ class EnumerationProblem:
         loops = -1 if joints is None else joints + sum(count for _, count in placed) - links + 1
         if loops < (links > 2):
             return cls(title, (), reason=_reason(links, mobility, space, higher))
-        check_loops(loops, links, mobility, space, higher, framed=framed)
+        together = counted and not framed and not order
+        if not (together and is_counted_together(mobility, loops, placed)):
+            check_loops(loops, links, mobility, space, higher, framed=framed)
         common = (links, mobility, space, placed, framed)
         one_by_one = [OneByOne("rings", *common, symmetry=order)]
         if fractionated and mobility > 1:
@@ -285,9 +294,27 @@ def _graphs(item: WorkItem) -> list[MechanismGraph]:
     return list(item.graphs())
 
 
-def counts(items: Iterable[WorkItem], executor: Executor | None) -> Iterator[int]:
-    """Yield the number of graphs of each work item."""
+def counts(items: Iterable[WorkItem | Total], executor: Executor | None) -> Iterator[int | Fraction]:
+    """Yield the number of graphs of each work item, or the share of each part."""
     return in_order(executor, methodcaller("count"), items)
+
+
+def counted(problem: EnumerationProblem, executor: Executor | None) -> int:
+    """Count what a problem enumerates (exact)."""
+    total = Fraction(0)
+    for share in counts(problem.parts(), executor):
+        total += share
+    return whole_sum(total)
+
+
+def whole_sum(total: Fraction) -> int:
+    """Return the sum of all parts, which is a whole number.
+
+    Raises `GraphsynthError` if it is none: then parts are missing.
+    """
+    if total.denominator != 1:
+        raise GraphsynthError(f"the parts of a count add up to {total}, no whole number: count anew")
+    return int(total)
 
 
 def texts(items: Iterable[WorkItem], executor: Executor | None) -> Iterator[tuple[bytes, int]]:

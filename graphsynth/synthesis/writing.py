@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -21,8 +22,9 @@ from graphsynth.core.journal import Journal, Work, digest_of
 from graphsynth.core.ordered import in_order
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis.chunks import Chunk
-from graphsynth.synthesis.problem import EnumerationProblem, WorkItem, counts, graphs, texts
+from graphsynth.synthesis.problem import EnumerationProblem, WorkItem, counts, graphs, texts, whole_sum
 from graphsynth.synthesis.shards import shard_of
+from graphsynth.synthesis.totals import Total
 
 _SAMPLED = 16  # items made to estimate the size of a listing
 
@@ -36,7 +38,11 @@ class Step:
 
 
 def _work(
-    problem: EnumerationProblem, items: Sequence[WorkItem], form: str, remedy: str, again: str = "the same command"
+    problem: EnumerationProblem,
+    items: Sequence[WorkItem | Total],
+    form: str,
+    remedy: str,
+    again: str = "the same command",
 ) -> Work:
     """State what a journal is of: the question and its cut."""
     cut = [(repr(item.weight), *(getattr(item, name, 0) for name in ("start", "stop", "part"))) for item in items]
@@ -189,11 +195,11 @@ def count_with_checkpoint(
     Raises `GraphsynthError` if the checkpoint belongs to another problem, or another process writes it. Raises
     `FormatError` if it is no checkpoint, or somebody changed it.
     """
-    items = shard_of(problem.work_items(listing=False), shard, listing=False)
+    items = shard_of(problem.work_items(listing=False), shard, listing=False) if shard else problem.parts()
     total = sum(item.weight for item in items) or 1.0
     with Journal(checkpoint, _work(problem, items, "count", "name another file")) as journal:
-        known = [int(entry) for entry in journal.entries]
-        count = sum(known)
+        known = [Fraction(entry) for entry in journal.entries]
+        count = sum(known, Fraction(0))
         done = sum(item.weight for item in items[: len(known)])
         rest = items[len(known) :]
         for item, found in zip(rest, counts(rest, executor)):
@@ -201,5 +207,5 @@ def count_with_checkpoint(
             done += item.weight
             journal.append(str(found))
             if watch:
-                watch(Step(count, done / total))
-    return count
+                watch(Step(int(count), done / total))
+    return whole_sum(count)

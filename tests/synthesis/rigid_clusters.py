@@ -1,0 +1,159 @@
+"""Chains counted without contracted graphs, labels or critical sets: permutations of links, and rigid clusters.
+
+A second way to count, from the definition: DOF(S) = Pi (|S| - 1) - (Pi - 1) (joints inside S) >= 1 for every set S of
+two or more links.  Any graph falls apart in one way only into its largest rigid clusters and, each cluster drawn
+together to one vertex, a graph without rigid sets.  So graphs without rigid sets are all graphs less those that have
+clusters.  The lemma of Burnside is used on the permutations of the links: one that keeps a graph permutes its clusters.
+
+An *orbit* (c, cycles) stands for c clusters that a permutation p takes one to the next, p ** c permuting the links of
+each by cycles of these lengths; a *state* is a sorted tuple of orbits.  Polynomials are in the number of joints.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from fractions import Fraction
+from itertools import combinations, product
+from math import comb, factorial, gcd, lcm, prod
+
+Cycles = tuple[int, ...]
+Orbit = tuple[int, Cycles]
+State = tuple[Orbit, ...]
+
+
+class Clusters:
+    """All counts for graphs with so many links and at most so many joints in a space of mobility Pi.
+
+    A polynomial is one integer, its value at 2 ** digits: no coefficient counts more graphs than there are.
+    """
+
+    def __init__(self, links: int, most: int, space: int = 3) -> None:
+        self.most, self.space = most, space
+        self.digits = comb(comb(links, 2), min(most, comb(links, 2) // 2)).bit_length() + 1
+        self.mask = (1 << self.digits * (most + 1)) - 1
+        self.known: dict[State, tuple[int, int]] = {}
+        self.known_drawn: dict[State, dict[State, int]] = {}
+
+    def coefficient(self, polynomial: int, joints: int) -> int:
+        return polynomial >> self.digits * joints & ((1 << self.digits) - 1)
+
+    def spread(self, polynomial: int, c: int) -> int:
+        """Write the c-th power of the variable for the variable."""
+        if c == 1:
+            return polynomial
+        return sum(self.coefficient(polynomial, i) << self.digits * i * c for i in range(self.most // c + 1))
+
+    def all(self, state: State) -> int:
+        """Count the graphs that the permutation keeps, with joints between different clusters only."""
+        joints = pair_orbits([c * length for c, cycles in state for length in cycles])
+        for c, cycles in state:
+            for length, count in pair_orbits(cycles).items():
+                joints[c * length] -= count
+        found = 1
+        for length, count in joints.items():
+            choices = range(min(count, self.most // length) + 1)
+            found = found * sum(comb(count, i) << self.digits * i * length for i in choices) & self.mask
+        return found
+
+    def split(self, state: State) -> tuple[int, int]:
+        """Return (graphs without rigid sets of clusters, graphs that are one rigid cluster)."""
+        if state not in self.known:
+            size = sum(c for c, _ in state)
+            left = self.all(state)
+            for drawn, ways in self.drawn(state).items() if size > 1 else ():
+                if drawn != state:
+                    left -= ways * self.split(drawn)[0] & self.mask
+            bound = (self.space * (size - 1) - 1) // (self.space - 1) + 1  # fewer joints leave a DOF of 1 or more
+            free = left & ((1 << self.digits * bound) - 1)
+            self.known[state] = (free, left - free) if size > 1 else (1, 1)
+        return self.known[state]
+
+    def drawn(self, state: State) -> dict[State, int]:
+        """Count the ways to draw clusters together to rigid ones, but not all to one, by what they become."""
+        if state not in self.known_drawn:
+            found: dict[State, int] = {}
+            for c, block, others, choices in first_blocks(state):
+                all_in_one = c == 1 and not others and sum(size for size, _ in block) > 1
+                if all_in_one or not (rigid := self.split(block)[1]):
+                    continue
+                rigid = choices * self.spread(rigid, c)
+                new = c, drawn_together(block)
+                for drawn, ways in self.drawn_at_will(others):
+                    key = tuple(sorted((*drawn, new)))
+                    found[key] = found.get(key, 0) + (rigid * ways & self.mask)
+            self.known_drawn[state] = found
+        return self.known_drawn[state]
+
+    def drawn_at_will(self, state: State) -> Iterator[tuple[State, int]]:
+        """Yield the same, all drawn to one included."""
+        if not state:
+            yield (), 1
+            return
+        yield from self.drawn(state).items()
+        if sum(c for c, _ in state) > 1 and (rigid := self.split(state)[1]):
+            yield ((1, drawn_together(state)),), rigid
+
+
+def drawn_together(block: State) -> Cycles:
+    return tuple(sorted(c * length for c, cycles in block for length in cycles))
+
+
+def first_blocks(state: State) -> Iterator[tuple[int, State, State, int]]:
+    """Yield what may be drawn together with the first orbit: (orbit's length, inside one cluster, others, choices)."""
+    first, kinds = state[0], sorted(set(state[1:]))
+    numbers = [state[1:].count(kind) for kind in kinds]
+    for c in (d for d in range(1, first[0] + 1) if first[0] % d == 0):
+        ranges = [range(number + 1 if kind[0] % c == 0 else 1) for kind, number in zip(kinds, numbers)]
+        for taken in product(*ranges):
+            chosen = [first, *(kind for kind, count in zip(kinds, taken) for _ in range(count))]
+            block = tuple(sorted((size // c, cycles) for size, cycles in chosen))
+            others = tuple(kind for kind, n, count in zip(kinds, numbers, taken) for _ in range(n - count))
+            yield c, block, others, prod(map(comb, numbers, taken)) * c ** (len(chosen) - 1)
+
+
+def pair_orbits(cycles: Cycles | list[int]) -> Counter[int]:
+    """Count the orbits of pairs of points under a permutation, by their length."""
+    found: Counter[int] = Counter()
+    for n in cycles:
+        found[n] += (n - 1) // 2
+        if n % 2 == 0:
+            found[n // 2] += 1
+    for a, b in combinations(cycles, 2):
+        found[lcm(a, b)] += gcd(a, b)
+    return found
+
+
+def partitions(n: int, largest: int) -> Iterator[Cycles]:
+    if n == 0:
+        yield ()
+    for first in range(min(n, largest), 0, -1):
+        for rest in partitions(n - first, first):
+            yield (first, *rest)
+
+
+def joints_of(links: int, space: int) -> int:
+    """Return the number of joints of mobility 1 of a chain of mobility 1."""
+    joints, rest = divmod(space * (links - 1) - 1, space - 1)
+    assert rest == 0
+    return joints
+
+
+def labelled_chains(links: int, space: int = 3) -> int:
+    """Count the chains of mobility 1 whose links are told apart."""
+    joints = joints_of(links, space)
+    clusters = Clusters(links, joints, space)
+    return clusters.coefficient(clusters.split(((1, (1,)),) * links)[0], joints)
+
+
+def chains(links: int, space: int = 3) -> int:
+    """Count the chains of mobility 1 up to isomorphism."""
+    joints = joints_of(links, space)
+    clusters = Clusters(links, joints, space)
+    total = Fraction(0)
+    for cycles in partitions(links, links):
+        fixed = clusters.split(tuple(sorted((length, (1,)) for length in cycles)))[0]
+        order = prod(cycles) * prod(factorial(count) for count in Counter(cycles).values())
+        total += Fraction(clusters.coefficient(fixed, joints), order)
+    assert total.denominator == 1
+    return int(total)
