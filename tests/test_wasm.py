@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from graphsynth.core.native.library import FOLDER
 from graphsynth.core.native.signatures import Signature
 from graphsynth.core.native.wasm import MODULES, read_modules
 from graphsynth.workbench import modules
@@ -55,6 +56,12 @@ def test_the_modules_are_of_these_sources_and_this_list() -> None:
         if kernel_of(f"graphsynth.{kernel}").digest != own["digest"]
     ]
     assert not changed, "build the modules anew: python -m graphsynth.core.native.wasm"
+
+
+def test_nothing_inside_tells_of_the_machine_that_built_it() -> None:
+    built = [*MODULES.glob("*.wasm"), *FOLDER.glob("*.so")]
+    assert len(built) > 4
+    assert not [path.name for path in built if b".py" in path.read_bytes()]
 
 
 @pytest.mark.slow  # numba lowers every kernel

@@ -100,12 +100,17 @@ def lower(signatures: list[Signature]) -> Lowered:
 
 
 def _collect_modules() -> list[Any]:
-    """Make numba keep its LLVM code: nothing is linked, optimised or loaded, and exceptions tell no line."""
+    """Make numba keep its LLVM code: nothing is linked, optimised or loaded, and exceptions tell no line or file."""
     from numba.core.callconv import CPUCallConv
     from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary, JITCPUCodegen
 
     modules: list[Any] = []
     told = CPUCallConv.build_excinfo_struct
+
+    def tell(own: Any, kind: Any, values: tuple[Any, ...] | None, loc: Any, name: Any) -> Any:
+        """Leave out where this machine keeps the sources: numba writes it into some messages, too."""
+        short = [value.partition("\nFile ")[0] if isinstance(value, str) else value for value in values or ()]
+        return told(own, kind, values and tuple(short), None, name)
 
     def finalize(library: Any) -> None:
         library._finalized = True
@@ -114,7 +119,7 @@ def _collect_modules() -> list[Any]:
     CPUCodeLibrary.finalize = finalize
     JITCodeLibrary.get_pointer_to_function = lambda library, name: 0
     JITCPUCodegen.set_env = lambda codegen, name, env: None
-    CPUCallConv.build_excinfo_struct = lambda own, kind, values, loc, name: told(own, kind, values, None, name)
+    CPUCallConv.build_excinfo_struct = tell
     return modules
 
 
