@@ -17,6 +17,7 @@ from graphsynth.mechanism.constraints import residual
 from graphsynth.mechanism.files import to_dict
 from graphsynth.mechanism.laws import Linear, Polynomial
 from graphsynth.workbench.posing import assembled
+from tests.kinematics.test_page_engine import check_turns, turning
 from tests.workbench.test_workbench_scripts import CASES
 
 SHIPPED = Path(__file__).parents[2] / "catalog" / "up-to-10-links.sqlite"
@@ -89,6 +90,8 @@ def test_what_is_put_on_the_table_turns_in_the_library_too(scripts, kinds):
         assert mechanism.graph.without_frame().key == chain.key
         count = len(mechanism.drivers)
         assert count == chain.mobility
+        if chain.mobility == 1:
+            assert mechanism.drivers[0].base == mechanism.graph.frame
         for driver in range(count):
             if mechanism.drivers[driver].base != mechanism.graph.frame:
                 continue  # a loop of six links has two joints on its frame, and three drivers
@@ -98,6 +101,22 @@ def test_what_is_put_on_the_table_turns_in_the_library_too(scripts, kinds):
             assert motion.assembled.all(), (chain.key, motion.reason)
             turned = np.abs(motion.poses[-1, :, :2] - motion.poses[0, :, :2]).max()
             assert turned < 1e-7 * 100, chain.key
+
+
+@pytest.mark.slow  # every frame and driver: an hour of a loaded processor
+def test_all_chains_to_ten_links_turn_as_in_the_library(scripts, tmp_path):
+    """Dimensions that turn for each of 249 chains; then every frame and driver with which they make a full turn."""
+    chains = [chain for links in (4, 6, 8, 10) for chain in enumerate_chains(links)]
+    assert len(chains) == 249
+    made = scripts(TURNED, [given(chain, {}) for chain in chains], modules=("sketch", "motion"))
+    turned = 0
+    for data in made:
+        turns = turning([Mechanism.from_json(json.dumps(data))])
+        assert turns
+        check_turns(tmp_path, turns)
+        turned += len(turns)
+    print(turned, "frames and drivers turn")
+    assert turned > 1000
 
 
 @pytest.mark.long

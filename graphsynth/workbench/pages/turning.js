@@ -84,11 +84,13 @@ const Turning = (() => {
       .sort((p, q) => away(p) - away(q)).slice(0, TRIES).filter(([, set]) => set.every(joint => joint >= 0));
     let best = null, most = 0;
     for (const at of scaled) {
+      let least = Infinity;
       for (const [own, set] of choices) {
+        if (away([own, set]) > least) break; /* a driver away from the frame is not judged: only where none on it turns */
         for (const shrink of SHRINKS) {
           const data = drawn(links, joints, at, own, set, shrink), good = quality(motion, data);
           if (good === null) break;
-          if (good > most) { most = good; best = data; }
+          if (good > most) { most = good; best = data; least = away([own, set]); }
           if (good > 0) break;
         }
         if (most > GOOD) break;
