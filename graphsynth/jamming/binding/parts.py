@@ -33,8 +33,8 @@ class JointStiffness:
         Moment for each radian beyond the limit of the tilt (of a guide of its roll and of its pitch), N m/rad;
         ``math.inf`` for a joint that does not give way.
     axial, radial : float
-        Force for each metre beyond the axial clearance, and beyond the radial one (of a guide across it, in the
-        plane), N/m; by default infinite.
+        Force for each metre beyond the axial clearance, and beyond the radial one (in the plane; of a guide or a slot
+        across it, of gears along their pitch circles, cams are held), N/m; by default infinite.
 
     Examples
     --------

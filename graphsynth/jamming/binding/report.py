@@ -217,15 +217,21 @@ class BindingReport(Shown):
     def exact(self, samples: Sequence[int] | None = None) -> ExactBinding:
         """Solve some samples again with every loop closed exactly in space, as a check of small tilts (rigid links).
 
-        ``samples`` are numbers of assembled samples, all by default.  `GeometryError` for links with sections, or
-        joints that the exact closure does not describe.
+        ``samples`` are numbers of assembled samples, by default all that close without their pins shifted.
+        `GeometryError` for links with sections, samples with shifted pins (the closure has none), or joints that it
+        does not describe.
         """
         from graphsynth.jamming.binding.exact import exact_binding
         from graphsynth.jamming.space.model import Unsupported
 
         if self.bent:
             raise GeometryError("links have sections; the exact closure takes them as rigid: leave links out")
-        chosen = np.flatnonzero(self.motion.assembled) if samples is None else np.asarray(samples, dtype=np.intp)
+        aside = np.asarray((self.shift > 0.0).any(axis=1))
+        whole = np.flatnonzero(self.motion.assembled & ~aside)
+        chosen = whole if samples is None else np.asarray(samples, dtype=np.intp)
+        if aside[chosen].any():
+            name = f"sample {chosen[aside[chosen]][0]} closes only with its pins shifted"
+            raise GeometryError(f"{name}, which the exact closure leaves out; leave it out too")
         try:
             return exact_binding(self.problem, self.springs, self.motion.poses[chosen], self.unit)
         except Unsupported as error:

@@ -17,7 +17,7 @@ from graphsynth.jamming.binding.parts import JointStiffness
 from graphsynth.jamming.binding.plane import Contacts, Plane, Rest, settled
 from graphsynth.jamming.joints.limits import Limits
 from graphsynth.mechanism.constraints import characteristic_length
-from graphsynth.mechanism.joints import Prismatic
+from graphsynth.mechanism.joints import Cam, Prismatic
 from graphsynth.mechanism.model import Mechanism
 
 if TYPE_CHECKING:
@@ -114,6 +114,10 @@ def shifted(motion: Motion, limits: Sequence[Limits], springs: Sequence[JointSti
     if not soft.any() or motion.assembled.all():
         return out
     given = np.isfinite(stiff)
+    for joint in (own for own, gives in zip(motion.mechanism.joints, given.tolist()) if gives and isinstance(own, Cam)):
+        raise GeometryError(
+            f"joint {joint.a}-{joint.b} is a cam contact, which is held in the plane; leave its radial stiffness out"
+        )
     if given.any() and (soft & ~given).any():
         pair = motion.mechanism.joints[int(np.flatnonzero(soft & ~given)[0])].pair
         raise GeometryError(
