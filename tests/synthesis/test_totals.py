@@ -233,3 +233,24 @@ def test_nine_loops_with_few_vertices():
         k = family.vertices
         assert found[k][0] == len(lists[k])
         assert found[k][1] + sums[k] == sum(count_each(family, 0, len(lists[k])).tolist())
+
+
+# --- the certificate of 20 links --------------------------------------------------------------------------------------
+
+
+def test_the_certificate_of_twenty_links_adds_up():
+    path = Path(__file__).parents[2] / "catalog/counts/twenty-links.toml"
+    certificate = tomllib.loads(path.read_text(encoding="utf-8"))
+    rows = {row["vertices"]: row for row in certificate["by_vertices"]}
+    assert list(rows) == list(range(2, 17))
+    assert all(Fraction(row["identities"]) + Fraction(row["others"]) == row["chains"] for row in rows.values())
+    assert sum(row["chains"] for row in rows.values()) == certificate["chains"]
+    assert sum(row["contracted"] for row in rows.values()) == certificate["contracted"]
+    assert {k: Fraction(rows[k]["identities"]) for k in range(2, 6)} == identity_sums(20, vertices=5)
+
+
+@pytest.mark.long
+def test_twenty_links_told_apart_are_fewer_than_twenty_factorial_for_each_chain():
+    path = Path(__file__).parents[2] / "catalog/counts/twenty-links.toml"
+    count = tomllib.loads(path.read_text(encoding="utf-8"))["chains"]
+    assert 0.8 < Fraction(rigid_clusters.labelled_chains(20), factorial(20)) / count < 1
