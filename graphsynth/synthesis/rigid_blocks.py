@@ -30,7 +30,7 @@ def identity_sums(links: int, space: int = 3, vertices: int | None = None) -> di
     most, which takes fewer points.
 
     >>> identity_sums(6), sum(identity_sums(8).values())
-    ({2: Fraction(2, 1)}, Fraction(35, 4))
+    ({2: Fraction(1, 1)}, Fraction(35, 4))
     """
     most = min(_most_vertices(links, space), vertices or links)
     sums = dict.fromkeys(range(2, most + 1), Fraction(0))
