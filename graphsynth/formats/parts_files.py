@@ -151,8 +151,7 @@ def cut_svg(parts: Parts, *, line: float = 0.1) -> str:
     lines = []
     for link, outline, holes in _sheet(parts):
         path = " ".join(_path(shape, corner.imag) for shape in (outline, *holes))
-        at, middle = _label_place(outline, holes), outline.hull[0]
-        pitch = outline.pitch if isinstance(outline, Cut) else 0.0
+        at, middle, pitch = _label_place(outline, holes), outline.hull[0], outline.pitch
         engraved = (
             f'<circle cx="{middle.real:.3f}" cy="{corner.imag - middle.imag:.3f}" r="{pitch:.3f}" fill="none" '
             f'stroke="#0000ff" stroke-width="{line:g}"/>'
@@ -215,7 +214,7 @@ def cut_dxf(parts: Parts) -> Any:
             else:
                 points = [(at.real, at.imag, bulge) for at, bulge in shape.corners]
                 space.add_lwpolyline(points, format="xyb", close=True, dxfattribs=look)
-        if pitch := outline.pitch if isinstance(outline, Cut) else 0.0:
+        if pitch := outline.pitch:
             space.add_circle((outline.hull[0].real, outline.hull[0].imag), pitch, dxfattribs={"layer": "NUMBERS"})
         at = _label_place(outline, holes)
         height = max(2.0, 0.6 * parts.sizes.pin)

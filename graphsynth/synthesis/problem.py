@@ -301,13 +301,10 @@ def counts(items: Iterable[WorkItem | Total], executor: Executor | None) -> Iter
 
 def counted(problem: EnumerationProblem, executor: Executor | None) -> int:
     """Count what a problem enumerates (exact)."""
-    total = Fraction(0)
-    for share in counts(problem.parts(), executor):
-        total += share
-    return whole_sum(total)
+    return whole_sum(sum(counts(problem.parts(), executor), Fraction(0)))
 
 
-def whole_sum(total: Fraction) -> int:
+def whole_sum(total: int | Fraction) -> int:
     """Return the sum of all parts, which is a whole number.
 
     Raises `GraphsynthError` if it is none: then parts are missing.

@@ -104,7 +104,7 @@ class Grown:
         """Stream the symmetric graphs in blocks of equal numbers of vertices; ``totals`` adds up all graphs."""
         from graphsynth.synthesis.kernels.growing import grow, make_growth
 
-        roots = _roots(self.loops, self.vertices)[self.start : self.stop]
+        roots = contracted_graphs(self.loops, self.vertices)[self.start : self.stop]
         growth = make_growth()
         out = np.empty((_BUFFER, MAX_VERTICES, MAX_VERTICES), np.uint8)
         sizes = np.empty(_BUFFER, np.int64)
@@ -125,15 +125,6 @@ class Grown:
 
 
 Total = Identities | Listed | Grown
-
-
-def _roots(loops: int, vertices: int) -> NDArray[np.uint8]:
-    """Return the graphs to grow others from: those that are shipped, and two vertices with one edge more."""
-    if loops <= SHIPPED_LOOPS:
-        return contracted_graphs(loops, vertices)
-    dipole = np.array([[[0, loops + 1], [loops + 1, 0]]], np.uint8)
-    dipole.setflags(write=False)
-    return dipole
 
 
 def is_counted_together(mobility: int, loops: int, higher: tuple[tuple[int, int], ...]) -> bool:
@@ -165,7 +156,7 @@ def _totals(families: tuple[Family, ...]) -> tuple[Total, ...]:
         return tuple(parts)
     for loops in range(GROWN_LOOPS, 1, -1):
         for k in range(2, 3 if loops == GROWN_LOOPS else 2 * loops - 1):
-            count = len(_roots(loops, k))
+            count = len(contracted_graphs(loops, k))
             parts += [Grown(families, loops, k, at, min(at + _ROOTS, count)) for at in range(0, count, _ROOTS)]
     return tuple(parts)
 

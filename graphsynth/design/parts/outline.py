@@ -62,6 +62,7 @@ class Rounded:
 
     hull: tuple[complex, ...]  #: corners counter-clockwise, no three on a line
     radius: float
+    pitch = 0.0  # no circle to engrave
 
     @classmethod
     def around(cls, points: Iterable[complex], radius: float) -> Rounded:

@@ -31,7 +31,7 @@ from graphsynth.design.task.targets import (
 from graphsynth.design.task.task import DesignTask
 from graphsynth.jamming.questions import largest_scale
 from graphsynth.kinematics.dimensional.design import World
-from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, in_order, matched
+from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, passed
 from graphsynth.kinematics.dimensional.problem import carried, lying
 from graphsynth.kinematics.dimensional.verify import (
     SAMPLES,
@@ -310,8 +310,7 @@ def _point_error(task: DesignTask, target: PathTarget | PosesTarget, motion: Mot
     if target.inputs is not None:
         times = np.array(target.inputs)[None] + start
     else:
-        wanted = Wanted(target.goal, turn, target.size, False, free=False)
-        times = in_order(own, wanted) if turn is None else matched(own, wanted)
+        times = passed(own, Wanted(target.goal, turn, target.size, False, free=False))
     at = at_times(own, times)[0][0]
     away = np.abs(at[:, 0] + 1j * at[:, 1] - target.goal) / target.size
     mean = isinstance(target, PathTarget) and target.mean

@@ -176,6 +176,11 @@ def in_order(own: MovingLink, wanted: Wanted) -> Array:
     return min(every, key=lambda found: float(np.abs(_placed(at_times(own, found)[0], wanted)[1]).max()))
 
 
+def passed(own: MovingLink, wanted: Wanted) -> Array:
+    """Find the times (1, N) by which a motion is judged: in order for points of an open path, else as `matched`."""
+    return matched(own, wanted) if wanted.closed or wanted.angles is not None else in_order(own, wanted)
+
+
 def followed(own: MovingLink, times: Array, wanted: Wanted, rounds: int = 4) -> Array:
     """Slide times (sets, N) that are nearly right to where they belong."""
     for _ in range(rounds):

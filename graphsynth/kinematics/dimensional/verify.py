@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.kinematics.dimensional.goals import FunctionGoal, Goals, LineGoal, PathGoal, PosesGoal
-from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, in_order, matched
+from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, passed
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.joints import Cam, JointGeometry, PinSlot, Prismatic, Revolute
 
@@ -180,8 +180,7 @@ def _goal_error(motion: Motion, goals: Goals, inputs: Array, at: NDArray[np.intp
             goals.span if goals.full_turn else 0.0,
         )
         closed = isinstance(target, PathGoal) and target.closed
-        wanted = Wanted(goal, turn, size, closed, free=False)
-        found, _ = at_times(own, matched(own, wanted) if closed or turn is not None else in_order(own, wanted))
+        found, _ = at_times(own, passed(own, Wanted(goal, turn, size, closed, free=False)))
         z, w = found[0, :, 0] + 1j * found[0, :, 1], found[0, :, 2] + 1j * found[0, :, 3]
         rest = w if turn is None else w * np.exp(-1j * turn)
         turned = 0.0 * goal.real if turn is None else np.angle(rest * np.conj(rest.sum()))

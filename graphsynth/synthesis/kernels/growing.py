@@ -17,9 +17,9 @@ from graphsynth.core.compilation import kernel
 from graphsynth.structure.kernels import canon, canon_workspace
 from graphsynth.synthesis.kernels.contracted import _refine, automorphisms
 from graphsynth.synthesis.kernels.layout import MAX_VERTICES, inner
+from graphsynth.synthesis.kernels.splitting import masks_by_layer
 
 GROUP_TOO_LARGE = -1
-_ONE = np.uint64(1)
 # columns of Growth.at: loops, edges between the halves, vertex to split, order of the group
 _LOOPS, _JOINED, _VERTEX, _ORDER = range(4)
 # rows of Growth.state
@@ -219,6 +219,12 @@ def _is_good(n, a, b, mult, degrees, joined):
 
 
 @inner
+def _rank(a, b, mult, degrees):
+    """Order of a pair that is quickly told: many parallel edges first, then high degrees."""
+    return np.int64(mult[a, b]) * 256 + degrees[a] + degrees[b]
+
+
+@inner
 def _is_grown_here(n, v, depth, masks, space, growth):
     """Tell whether {v, n - 1} is the canonical pair of the graph at a depth, but for an automorphism.
 
@@ -233,12 +239,11 @@ def _is_grown_here(n, v, depth, masks, space, growth):
             if mult[a, b]:
                 degrees[a] += mult[a, b]
                 joined[a] |= np.int64(1) << b
-    # quick: many parallel edges first, then high degrees
-    mine = np.int64(mult[u, v]) * 256 + degrees[u] + degrees[v]
+    # most pairs are told apart by what is quick
+    mine = _rank(u, v, mult, degrees)
     for a in range(n):
         for b in range(a):
-            ahead = mult[a, b] and np.int64(mult[a, b]) * 256 + degrees[a] + degrees[b] > mine
-            if ahead and _is_good(n, a, b, mult, degrees, joined):
+            if mult[a, b] and _rank(a, b, mult, degrees) > mine and _is_good(n, a, b, mult, degrees, joined):
                 return 0
     # then colours that do not depend on the numbering
     colours = np.zeros(n, np.int64)
@@ -247,7 +252,7 @@ def _is_grown_here(n, v, depth, masks, space, growth):
     ties = 0
     for a in range(n):
         for b in range(a):
-            if mult[a, b] and np.int64(mult[a, b]) * 256 + degrees[a] + degrees[b] == mine:
+            if mult[a, b] and _rank(a, b, mult, degrees) == mine:
                 rank = colours[a] + colours[b]
                 other = rank == own and (a != u or b != v)
                 if (other or rank > own) and _is_good(n, a, b, mult, degrees, joined):
@@ -276,19 +281,13 @@ def _is_first_pair(n, v, order, mine, degrees, joined, colours, depth, masks, sp
     for a in range(n):
         for b in range(n):
             layers = max(layers, np.int64(mult[a, b]))
-    for c in range(layers):
-        for a in range(n):
-            masks[c, a] = 0
-    for a in range(n):
-        for b in range(n):
-            if mult[a, b]:
-                masks[mult[a, b] - 1, a] |= _ONE << np.uint64(b)
+    masks_by_layer(n, layers, mult, masks)
     nothing = np.zeros(n, np.int64)
     canon(n, layers, masks, nothing, lab, form, gens, index, orbits, wi, wu)
     for i in range(n):
         for j in range(i):
             a, b = lab[i], lab[j]
-            if not mult[a, b] or np.int64(mult[a, b]) * 256 + degrees[a] + degrees[b] != mine:
+            if not mult[a, b] or _rank(a, b, mult, degrees) != mine:
                 continue
             if colours[a] + colours[b] != colours[u] + colours[v] or not _is_good(n, a, b, mult, degrees, joined):
                 continue

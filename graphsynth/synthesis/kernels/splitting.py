@@ -11,9 +11,8 @@ _ONE = np.uint64(1)
 
 
 @kernel
-def _canonical_code(n, layers, mult, masks, colours, space, out):
-    """Write the upper triangle of the canonically relabelled multiplicity matrix."""
-    lab, form, gens, index, orbits, wi, wu = space
+def masks_by_layer(n, layers, mult, masks):
+    """Write who is joined to each vertex by one edge, by two, and so on: the edge colours of `canon`."""
     for c in range(layers):
         for v in range(n):
             masks[c, v] = 0
@@ -21,6 +20,13 @@ def _canonical_code(n, layers, mult, masks, colours, space, out):
         for w in range(n):
             if mult[v, w]:
                 masks[mult[v, w] - 1, v] |= _ONE << np.uint64(w)
+
+
+@kernel
+def _canonical_code(n, layers, mult, masks, colours, space, out):
+    """Write the upper triangle of the canonically relabelled multiplicity matrix."""
+    lab, form, gens, index, orbits, wi, wu = space
+    masks_by_layer(n, layers, mult, masks)
     canon(n, layers, masks, colours, lab, form, gens, index, orbits, wi, wu)
     at = 0
     for i in range(n):

@@ -68,6 +68,11 @@ const Curves = (() => {
     return found;
   }
 
+  /* The error of a similar motion that takes one centre to another, and where it takes a point. */
+  function similar({ error, a, b, mirror, from }, to) {
+    return { error, map: ([x, y]) => { const u = x - from[0], v = mirror * (y - from[1]); return [to[0] + a * u - b * v, to[1] + b * u + a * v]; } };
+  }
+
   /* The similar motion, reflected or not, that takes a curve onto the target, over all beginnings and both senses. */
   function laid(target, curve) {
     const mean = points => [0, 1].map(c => points.reduce((sum, p) => sum + p[c], 0) / points.length);
@@ -89,8 +94,7 @@ const Curves = (() => {
         }
       }
     }
-    const { a, b, mirror } = best;
-    return { error: best.error, map: ([x, y]) => { const u = x - from[0], v = mirror * (y - from[1]); return [to[0] + a * u - b * v, to[1] + b * u + a * v]; } };
+    return similar({ ...best, from }, to);
   }
 
   /* The part of a curve that is most like an open target, and the similar motion that takes it there. */
@@ -115,8 +119,7 @@ const Curves = (() => {
         }
       }
     }
-    const { a, b, mirror, from } = best;
-    return { error: best.error, map: ([x, y]) => { const u = x - from[0], v = mirror * (y - from[1]); return [to[0] + a * u - b * v, to[1] + b * u + a * v]; } };
+    return similar(best, to);
   }
 
   /* A mechanism with these places; the last is the tracing point. */
@@ -218,7 +221,7 @@ const Curves = (() => {
       if (!closed && n % TOLD === 0 && (await tell((0.5 * n) / looked.length)) === false) break;
     }
     near.sort((p, q) => p.error - q.error);
-    const box = [0, 1].map(c => Math.max(...target.map(p => p[c])) - Math.min(...target.map(p => p[c]))), size = Math.hypot(...box), all = [];
+    const size = Turning.extent(target), all = [];
     for (const [k, { own, places }] of near.slice(0, LAID).entries()) {
       if (curve(motion, own, places)) {
         const done = refined(motion, target, own, places, size, closed);

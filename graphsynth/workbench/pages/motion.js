@@ -11,7 +11,7 @@
   Bench.Motion = class {
     constructor(app, kernels) {
       Object.assign(this, { app, kernels, engine: null, sheet: null, swept: null, driver: 0, pulled: null, playing: false, way: 1 });
-      Object.assign(this, { speed: 1, beat: 0, due: true });
+      Object.assign(this, { speed: 1, beat: 0 });
     }
 
     /** The engine for the drawing as it is now; opened when it is first needed. */
@@ -53,12 +53,11 @@
     }
 
     /** Whether what is beside the drawing may wait for a later picture: numbers and charts follow every sixth one. */
-    get waits() { return this.playing && !this.due; }
+    get waits() { return this.playing && this.beat !== 0; }
 
     row(link) { return Array.from(this.engine.pose.subarray(3 * link, 3 * link + 3)); }
     show() {
       this.beat = (this.beat + 1) % 6;
-      this.due = this.beat === 0;
       this.app.pose = Float64Array.from(this.engine.pose);
       this.app.changed("pose");
     }

@@ -70,7 +70,7 @@ const Passing = (() => {
   }
 
   async function found(design, motion, poses, tell = () => true) {
-    const box = [0, 1].map(c => Math.max(...poses.map(p => p[c])) - Math.min(...poses.map(p => p[c]))), size = Math.hypot(...box);
+    const size = Turning.extent(poses);
     if (!(size > 0)) return [];
     const kept = [], all = pairs(dyads(design, poses, size), size);
     const alike = ([a, b], [c, d]) => [[a[0], c[0]], [a[1], c[1]], [b[0], d[0]], [b[1], d[1]]].every(([p, q]) => Math.hypot(p[0] - q[0], p[1] - q[1]) < ALIKE * size);

@@ -32,8 +32,7 @@
   }
 
   Bench.answerTarget = (app, curve) => {
-    const box = [0, 1].map(c => Math.max(...curve.map(p => p[c])) - Math.min(...curve.map(p => p[c]))), size = Math.hypot(...box);
-    const [p, q] = [curve[0], curve[curve.length - 1]], closed = Math.hypot(p[0] - q[0], p[1] - q[1]) <= CLOSED * size;
+    const size = Turning.extent(curve), [p, q] = [curve[0], curve[curve.length - 1]], closed = Math.hypot(p[0] - q[0], p[1] - q[1]) <= CLOSED * size;
     const small = !(size * app.view.camera.scale > 20) || curve.length < 4;
     app.target = small ? null : { curve, closed };
     app.changed("view");

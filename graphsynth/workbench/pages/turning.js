@@ -100,7 +100,10 @@ const Turning = (() => {
     return best || (choices.length ? drawn(links, joints, scaled[0], ...choices[0], 1) : null);
   }
 
-  return { found, graphText, file };
+  /* The diagonal of the box around points. */
+  const extent = points => Math.hypot(...[0, 1].map(c => Math.max(...points.map(p => p[c])) - Math.min(...points.map(p => p[c]))));
+
+  return { found, graphText, file, extent };
 })();
 
 if (typeof module !== "undefined") module.exports = Turning;

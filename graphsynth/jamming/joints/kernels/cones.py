@@ -288,7 +288,7 @@ def solve_cones(M, blocks, W, q, tau):
 
 @kernel
 def advance(M, blocks, W, bench, at, by, target):
-    """Take one predictor-corrector step; whether the equations could be solved."""
+    """Take one predictor-corrector step from ``bench.rx = G^T z``; whether the equations could be solved."""
     (x, s, z), (dx, ds, dz) = at, by
     lam, rx, rz = bench.lam, bench.rx, bench.rz
     cones, k = M.shape[0], M.shape[2]
@@ -296,7 +296,6 @@ def advance(M, blocks, W, bench, at, by, target):
     applied(bench.S, z, lam)
     if not gather(M, blocks, bench):
         return False
-    back_again(M, blocks, z, rx)
     forth(M, blocks, x, rz)
     for i in range(k):
         rx[i] -= W[i]
