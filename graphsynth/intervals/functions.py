@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import wraps
 from inspect import signature
+from itertools import chain
 from typing import Any, Protocol, overload
 
 import numpy as np
@@ -18,22 +19,30 @@ from numpy.typing import NDArray
 from graphsynth.intervals.dual import Dual
 from graphsynth.intervals.interval import Interval, _both, _make, _make_single, _marked, interval
 from graphsynth.intervals.operations import Array, run, single
-from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS
+from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS, OF_ONE
 
-#: Functions that have a kernel for one interval.
-_SINGLE = frozenset({"sin", "cos", "exp", "log", "atan"})
+#: Tells from lower and upper bounds of the arguments, or of the result, where something has to be recorded.
+_Where = Callable[..., Any]
 
 
 def _apply(name: str, *arguments: Interval) -> Interval:
-    """Run a compiled loop over broadcast arguments; decorations of all are joined."""
-    if name in _SINGLE and (ends := arguments[0]._ends) is not None:
-        return _make_single(single(name)(*ends, 1.0), arguments[0].flags)
-    lo, hi = run(name, *[side for a in arguments for side in (a.lo, a.hi)])
-    return _make(lo, hi, _both(*[a.flags for a in arguments]))
+    """Run a compiled operation over broadcast arguments; decorations of all are joined."""
+    x, *others = arguments
+    if x._ends and not others:  # the short way of most
+        return _make_single(single(name)(*x._ends, 1.0), x._flags)
+    flags = _both(*[a.flags for a in arguments])
+    if len(ends := [a._ends for a in arguments if a._ends]) == len(arguments):
+        return _make_single(single(name)(*chain.from_iterable(ends), 1.0), flags)
+    return _make(*run(name, *[side for a in arguments for side in (a.lo, a.hi)]), flags)
 
 
-def _mark(x: Interval, where: NDArray[np.bool_], mark: np.uint8 = CLIPPED) -> Interval:
-    return _make(x.lo, x.hi, _marked(x.flags, where, mark))
+def _mark(result: Interval, where: _Where, *arguments: Interval, mark: np.uint8 = CLIPPED) -> Interval:
+    """Record where ``where(lo, hi, ...)`` of the arguments holds."""
+    if (ends := result._ends) is not None:
+        marked = where(*chain.from_iterable(a._ends or () for a in arguments))
+        return _make_single(ends, _both(result.flags, OF_ONE[mark])) if marked else result
+    found = where(*[side for a in arguments for side in (a.lo, a.hi)])
+    return _make(result.lo, result.hi, _marked(result.flags, found, mark))
 
 
 class _Unary(Protocol):
@@ -152,7 +161,7 @@ def cos(x: Interval) -> Interval:
 def tan(x: Interval) -> Interval:
     """Tangent; the whole line across a pole, recorded (`Decoration.DISCONTINUOUS`)."""
     result = _apply("tan", x)
-    return _mark(result, ~result.is_bounded & ~result.is_empty, DISCONTINUOUS)
+    return _mark(result, lambda lo, hi: (lo == -np.inf) | (hi == np.inf), result, mark=DISCONTINUOUS)
 
 
 @_unary(lambda x, value: 1 / (x.sqr() + 1))
@@ -164,13 +173,13 @@ def atan(x: Interval) -> Interval:
 @_unary(lambda x, value: 1 / sqrt((1 - x) * (1 + x)))
 def asin(x: Interval) -> Interval:
     """Inverse sine; a part outside [-1, 1] is clipped and recorded."""
-    return _mark(_apply("asin", x), (x.lo < -1.0) | (x.hi > 1.0))
+    return _mark(_apply("asin", x), lambda lo, hi: (lo < -1.0) | (hi > 1.0), x)
 
 
 @_unary(lambda x, value: -1 / sqrt((1 - x) * (1 + x)))
 def acos(x: Interval) -> Interval:
     """Inverse cosine; a part outside [-1, 1] is clipped and recorded."""
-    return _mark(_apply("acos", x), (x.lo < -1.0) | (x.hi > 1.0))
+    return _mark(_apply("acos", x), lambda lo, hi: (lo < -1.0) | (hi > 1.0), x)
 
 
 @_unary(lambda x, value: value)
@@ -182,7 +191,7 @@ def exp(x: Interval) -> Interval:
 @_unary(lambda x, value: 1 / x)
 def log(x: Interval) -> Interval:
     """Natural logarithm; a part at or below 0 is clipped and recorded."""
-    return _mark(_apply("log", x), x.lo <= 0.0)
+    return _mark(_apply("log", x), lambda lo, hi: lo <= 0.0, x)
 
 
 def _atan2_slopes(y: Dual, x: Dual, value: Interval) -> Dual:
@@ -199,8 +208,9 @@ def atan2(y: Interval, x: Interval) -> Interval:
     >>> atan2(Interval(1), Interval(1)).contains(0.7853981633974483)
     True
     """
-    result = _mark(_apply("atan2", y, x), (y.lo < 0.0) & (y.hi >= 0.0) & (x.lo < 0.0), DISCONTINUOUS)
-    return _mark(result, (y.lo <= 0.0) & (y.hi >= 0.0) & (x.lo <= 0.0) & (x.hi >= 0.0))
+    across = lambda y_lo, y_hi, x_lo, x_hi: (y_lo < 0.0) & (y_hi >= 0.0) & (x_lo < 0.0)  # noqa: E731
+    origin = lambda y_lo, y_hi, x_lo, x_hi: (y_lo <= 0.0) & (y_hi >= 0.0) & (x_lo <= 0.0) & (x_hi >= 0.0)  # noqa: E731
+    return _mark(_mark(_apply("atan2", y, x), across, y, x, mark=DISCONTINUOUS), origin, y, x)
 
 
 @_binary(lambda x, y, value: Dual(value, (x.value / value) * x.grad + (y.value / value) * y.grad))

@@ -11,7 +11,7 @@ are carried through every further operation, so the last result tells whether a 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,36 +19,57 @@ from numpy.typing import ArrayLike
 from graphsynth.core.errors import FormatError, IntervalError
 from graphsynth.intervals import operations
 from graphsynth.intervals.guard import check_rounding
-from graphsynth.intervals.measures import Measures
-from graphsynth.intervals.operations import Array, Flags, Mask
-from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, decimal_outward, read_bounds, read_points
+from graphsynth.intervals.measures import Measures, fill
+from graphsynth.intervals.operations import Flags, Mask
+from graphsynth.intervals.reading import (
+    CLIPPED,
+    FLOAT_INPUT,
+    NO_FLAGS,
+    OF_ONE,
+    decimal_outward,
+    read_bounds,
+    read_points,
+)
 
 _MOST = int(np.finfo(np.float64).max)
 _EXACT = 2**53  # integers up to this are floats
-_CLIPPED: Flags = np.asarray(CLIPPED)
+_CLIPPED, _FLOAT = OF_ONE[CLIPPED], OF_ONE[FLOAT_INPUT]
 
 
 def _both(*flags: Flags) -> Flags:
     result = flags[0]
     for flag in flags[1:]:
         if flag is not result:
-            result = np.asarray(np.bitwise_or(result, flag))
+            single = not (result.ndim or flag.ndim)
+            result = OF_ONE[result.item() | flag.item()] if single else np.asarray(np.bitwise_or(result, flag))
     return result
 
 
 def _operator(name: str) -> Callable[[Interval, Any], Interval]:
-    """Return the method of an operator: `Interval._binary`, with a short way for single intervals of the same flags."""
+    """Return the method of an operator: `Interval._binary`, with a short way for single intervals of the same flags.
+
+    What could be told in fewer lines is written out there: each look-up and call is a tenth of the time.
+    """
     kernel: Callable[..., tuple[float, float]] | None = None
+    divides = name == "divide"
 
     def operator(self: Interval, other: Any) -> Interval:
         nonlocal kernel
-        if type(other) is int:
+        if type(other) is int or type(other) is float:
             other = interval(other)
-        if type(other) is Interval and (flags := self.flags) is other.flags:
-            p, q = self._ends, other._ends
-            if p is not None and q is not None and (name != "divide" or q[0] > 0.0 or q[1] < 0.0):
-                kernel = kernel or operations.single(name)  # looked up once: a tenth of the time
-                return _make_single(kernel(*p, *q, 1.0), flags)
+        if (
+            type(other) is Interval
+            and (flags := self._flags) is other._flags
+            and (p := self._ends)
+            and (q := other._ends)
+            and (not divides or q[0] > 0.0 or q[1] < 0.0)
+        ):
+            kernel = kernel or operations.single(name)
+            ends = kernel(p[0], p[1], q[0], q[1], 1.0)
+            if ends[0] == ends[0]:  # what `_make_single` does
+                result = _new(Interval)
+                result._ends, result._flags = ends, flags
+                return result
         return self._binary(name, other)
 
     return operator
@@ -96,8 +117,7 @@ class Interval(Measures):
     Interval([0.25, 0.66666666666666675])
     """
 
-    __slots__ = ("_ends", "flags", "hi", "lo")
-    _ends: tuple[float, float] | None  # of one interval; its arrays are made when they are asked for
+    __slots__ = ()
     __array_ufunc__ = None  # numpy arrays leave mixed operations to this class
     __hash__ = None  # type: ignore[assignment]
 
@@ -107,21 +127,7 @@ class Interval(Measures):
         else:
             lo, hi = read_bounds(value, upper)
             flags = NO_FLAGS
-        _fill(self, np.asarray(lo, dtype=np.float64), np.asarray(hi, dtype=np.float64), flags)
-
-    def __setattr__(self, name: str, value: Any) -> NoReturn:
-        raise AttributeError(f"an Interval does not change; {name} cannot be set")
-
-    if not TYPE_CHECKING:  # to type checkers there are no other attributes than those that are told
-
-        def __getattr__(self, name: str) -> Any:
-            if name == "_ends":
-                _set_ends(self, (self.lo.item(), self.hi.item()) if self.lo.ndim == 0 else None)
-            elif name in ("lo", "hi"):
-                _fill_bounds(self, *map(np.array, self._ends))
-            else:
-                raise AttributeError(f"an Interval has no attribute {name!r}")
-            return object.__getattribute__(self, name)
+        fill(self, np.asarray(lo, dtype=np.float64), np.asarray(hi, dtype=np.float64), flags)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _make, (self.lo, self.hi, self.flags)
@@ -353,12 +359,17 @@ class Interval(Measures):
         return self._binary("divide", other, reverse=True)
 
     def __neg__(self) -> Interval:
+        if ends := self._ends:
+            return _make_single((-ends[1], -ends[0]), self._flags)
         return _make(-self.hi, -self.lo, self.flags)
 
     def __pos__(self) -> Interval:
         return self
 
     def __abs__(self) -> Interval:
+        if ends := self._ends:
+            low, high = ends
+            return self if low > high else _make_single((max(low, -high, 0.0), max(-low, high)), self._flags)
         void = self.is_empty
         lo, hi = np.maximum(np.maximum(self.lo, -self.hi), 0.0), np.maximum(-self.lo, self.hi)
         return _make(np.where(void, np.inf, lo), np.where(void, -np.inf, hi), self.flags)
@@ -366,12 +377,15 @@ class Interval(Measures):
     def __pow__(self, exponent: int) -> Interval:
         if not isinstance(exponent, int | np.integer):
             raise IntervalError(f"exponent {exponent!r} is not an integer; use exp(b * log(a)) for other powers")
-        if abs(int(exponent)) >= 2**31:
-            raise IntervalError(f"exponent {exponent} is too large; powers of at most 2^31 - 1 are taken")
         if exponent == 2:
             return self.sqr()
-        flags = _marked(self.flags, (self.lo <= 0.0) & (self.hi >= 0.0)) if exponent < 0 else self.flags
-        return _make(*operations.run("power", self.lo, self.hi, extra=(int(exponent),)), flags)
+        if abs(power := int(exponent)) >= 2**31:
+            raise IntervalError(f"exponent {exponent} is too large; powers of at most 2^31 - 1 are taken")
+        if ends := self._ends:
+            flags = _both(self._flags, _CLIPPED) if power < 0 and ends[0] <= 0.0 <= ends[1] else self._flags
+            return _make_single(operations.single("power")(*ends, power, 1.0), flags)
+        flags = _marked(self.flags, (self.lo <= 0.0) & (self.hi >= 0.0)) if power < 0 else self.flags
+        return _make(*operations.run("power", self.lo, self.hi, extra=(power,)), flags)
 
     def sqr(self) -> Interval:
         """Square: never negative, and tighter than ``x * x``."""
@@ -411,23 +425,7 @@ def _marked(flags: Flags, where: Mask, mark: np.uint8 = CLIPPED) -> Flags:
     return np.asarray(np.bitwise_or(flags, np.where(where, mark, np.uint8(0))))
 
 
-# an Interval refuses to be set; its slots are filled once, through their descriptors
-_set_ends, _set_lo, _set_hi, _set_flags = (vars(Interval)[name].__set__ for name in ("_ends", "lo", "hi", "flags"))
-_new = Interval.__new__
-
-
-def _fill_bounds(target: Interval, lo: Array, hi: Array) -> None:
-    lo.setflags(write=False)
-    hi.setflags(write=False)
-    _set_lo(target, lo)
-    _set_hi(target, hi)
-
-
-def _fill(target: Interval, lo: Array, hi: Array, flags: Flags) -> None:
-    _fill_bounds(target, lo, hi)
-    if flags.ndim and flags.shape != lo.shape:
-        flags = np.broadcast_to(flags, lo.shape)
-    _set_flags(target, flags)
+_new = object.__new__  # looked up once
 
 
 def _make_single(ends: tuple[float, float], flags: Flags) -> Interval:
@@ -435,15 +433,14 @@ def _make_single(ends: tuple[float, float], flags: Flags) -> Interval:
     if ends[0] != ends[0]:
         check_rounding()
     result = _new(Interval)
-    _set_ends(result, ends)
-    _set_flags(result, flags)
+    result._ends, result._flags = ends, flags
     return result
 
 
 def _make(lo: ArrayLike, hi: ArrayLike, flags: Flags = NO_FLAGS) -> Interval:
     """Make an interval from bounds known to be right; views of others' arrays are not frozen."""
-    result = Interval.__new__(Interval)
-    _fill(result, np.asarray(lo, dtype=np.float64).view(), np.asarray(hi, dtype=np.float64).view(), flags)
+    result = _new(Interval)
+    fill(result, np.asarray(lo, dtype=np.float64).view(), np.asarray(hi, dtype=np.float64).view(), flags)
     return result
 
 
@@ -468,6 +465,8 @@ def interval(value: Any) -> Interval:
     if type(value) is int and -_EXACT <= value <= _EXACT:
         number = float(value)
         return _make_single((number, number), NO_FLAGS)
+    if type(value) is float and value - value == 0.0:  # finite
+        return _make_single((value, value), _FLOAT)
     if hasattr(value, "__interval_priority__"):
         raise TypeError
     return Interval(value)

@@ -18,11 +18,32 @@ from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS, FLOAT_INPUT, fr
 class Measures:
     """The part of `Interval` that reads its bounds and makes no new intervals."""
 
-    __slots__ = ()
+    __slots__ = ("_ends", "_flags", "_hi", "_lo")
+    _ends: tuple[float, float] | None  # of one interval; its arrays are made when they are asked for
+    _lo: Array
+    _hi: Array
+    _flags: Flags
 
-    lo: Array
-    hi: Array
-    flags: Flags
+    @property
+    def lo(self) -> Array:
+        """Lower bounds, read-only."""
+        try:
+            return self._lo
+        except AttributeError:
+            return _spread(self)[0]
+
+    @property
+    def hi(self) -> Array:
+        """Upper bounds, read-only."""
+        try:
+            return self._hi
+        except AttributeError:
+            return _spread(self)[1]
+
+    @property
+    def flags(self) -> Flags:
+        """Decorations, of the shape of the bounds or a scalar for all."""
+        return self._flags
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -136,3 +157,20 @@ def _number(point: Any) -> Fraction | float | None:
     if isinstance(point, int | np.integer | Fraction | Decimal) and not isinstance(point, bool):
         return Fraction(int(point) if isinstance(point, np.integer) else point)
     raise FormatError(f"{point!r} is not a number; give a number, a Fraction, a Decimal, text or an array of floats")
+
+
+def fill(target: Measures, lo: Array, hi: Array, flags: Flags) -> None:
+    """Give an interval its arrays, which are made read-only, and the ends of a single one."""
+    lo.setflags(write=False)
+    hi.setflags(write=False)
+    if flags.ndim and flags.shape != lo.shape:
+        flags = np.broadcast_to(flags, lo.shape)
+    target._lo, target._hi, target._flags = lo, hi, flags
+    target._ends = None if lo.ndim else (lo.item(), hi.item())
+
+
+def _spread(single: Measures) -> tuple[Array, Array]:
+    """Make the arrays of a single interval; its ends are known."""
+    lo, hi = map(np.array, single._ends or ())
+    fill(single, lo, hi, single._flags)
+    return lo, hi

@@ -21,8 +21,10 @@ from graphsynth.intervals.operations import Array, Flags
 CLIPPED: Final = np.uint8(1)
 DISCONTINUOUS: Final = np.uint8(2)
 FLOAT_INPUT: Final = np.uint8(4)
-NO_FLAGS: Flags = np.zeros((), dtype=np.uint8)
-_FLOAT: Flags = np.asarray(FLOAT_INPUT)
+#: Decorations of one interval, each made once: equal ones are the same.
+OF_ONE: Final = tuple(np.broadcast_to(np.uint8(flags), ()) for flags in range(8))  # read-only
+NO_FLAGS: Flags = OF_ONE[0]
+_FLOAT: Flags = OF_ONE[FLOAT_INPUT]
 
 _PAIR = re.compile(r"\s*\[\s*([^,\]]+?)\s*,\s*([^,\]]+?)\s*\]\s*")
 _SPREAD = re.compile(r"\s*(\S+)\s*(?:\+-|\+/-|±)\s*(\S+)\s*")

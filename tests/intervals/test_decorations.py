@@ -5,8 +5,24 @@ from itertools import product
 
 import numpy as np
 import pytest
+from interval_samples import bounds
 
-from graphsynth.intervals import Decoration, Interval, acos, asin, atan2, hypot, log, sqrt, tan
+from graphsynth.intervals import (
+    Decoration,
+    Interval,
+    acos,
+    asin,
+    atan,
+    atan2,
+    cos,
+    exp,
+    hypot,
+    log,
+    sin,
+    sqr,
+    sqrt,
+    tan,
+)  # fmt: skip
 from graphsynth.intervals.linear import _tighten
 
 TINY, UP, DOWN = math.ulp(0.0), math.nextafter(1.0, 2.0), math.nextafter(1.0, 0.0)
@@ -71,3 +87,26 @@ def test_a_contraction_goes_on_until_it_gains_little(norm):
     assert (D.hi >= 1.0 / (1.0 - norm)).all() and (D.hi <= 1.03 / (1.0 - norm)).all()
     again = D.intersect(residual + rest[None].times(D[None])[0])
     assert (again.width >= 0.99 * D.width).all()
+
+
+#: Every operation that one interval takes a shorter way for than an array does.
+SHORT = {
+    "add": lambda x, y: x + y, "subtract": lambda x, y: x - y, "multiply": lambda x, y: x * y,
+    "divide": lambda x, y: x / y, "float": lambda x, y: x * 0.1, "integer": lambda x, y: 7 - x,
+    "minus": lambda x, y: -x, "abs": lambda x, y: abs(x), "sqr": lambda x, y: sqr(x), "sqrt": lambda x, y: sqrt(x),
+    "cube": lambda x, y: x**3, "inverse": lambda x, y: x**-3, "one": lambda x, y: x**0, "hypot": hypot, "atan2": atan2,
+    **{f.__name__: lambda x, y, f=f: f(x) for f in (sin, cos, tan, atan, asin, acos, exp, log)},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_one_interval_is_an_array_of_one(name):
+    rng = np.random.default_rng(3)
+    operation = SHORT[name]
+    for xl, xh, yl, yh in zip(*bounds(rng, 200), *bounds(rng, 200)):
+        x, y = (Interval(0.5) * 0 + Interval.from_bounds(*ends) for ends in ((xl, xh), (yl, yh)))
+        for other in (y, Interval.from_bounds(yl, yh)):  # of equal and of other decorations
+            single, several = operation(x, other), operation(x.reshape(1), other.reshape(1))
+            assert (single.lo == several.lo[0]) and (single.hi == several.hi[0]), (x, other)
+            assert single.flags == np.broadcast_to(several.flags, 1)[0], (x, other)
+            assert not (single.lo.flags.writeable or single.hi.flags.writeable)

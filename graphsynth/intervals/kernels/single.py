@@ -48,6 +48,18 @@ square = _of_one("square", arithmetic.square)
 root = _of_one("root", arithmetic.root)
 exp = _of_one("exp", exponential.exp)
 log = _of_one("log", exponential.log)
+hypot = _of_two("hypot", exponential.hypot)
 atan = _of_one("atan", inverse.atan)
+asin = _of_one("asin", inverse.asin)
+acos = _of_one("acos", inverse.acos)
+atan2 = _of_two("atan2", inverse.atan2)
 sin = _of_one("sin", trigonometry.sin)
 cos = _of_one("cos", trigonometry.cos)
+tan = _of_one("tan", trigonometry.tan)
+
+
+@kernel
+def power(al, ah, n, one):
+    """Integer power."""
+    lo, hi = arithmetic.power(al, ah, n)
+    return lo if is_nearest(one) else NAN, hi

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from graphsynth.synthesis.kernels.layout import HEAVIEST, MASK, NEED, U, V, inner
+from graphsynth.synthesis.kernels.layout import HEAVIEST, LEFT, MASK, NEED, U, V, inner
 
 _GOLDEN = np.int64(-7046029254386353131)
 _MIX = np.int64(-4658895280553007687)
@@ -17,7 +17,7 @@ def _mix(x):
 
 
 @inner
-def _refine(k, mult, colour):
+def refine(k, mult, colour):
     """Colour refinement by hashing: equivalent vertices keep equal colours (a collision only weakens pruning)."""
     fresh = np.empty(k, np.int64)
     distinct = 0
@@ -84,7 +84,7 @@ def automorphisms(k, mult, perms):
     for v in range(k):
         perms[0, v] = v
     colour = np.zeros(k, np.int64)
-    if _refine(k, mult, colour) == k:
+    if refine(k, mult, colour) == k:
         return 1
     order = _search_order(k, mult, colour)
     image = np.full(k, -1, np.int64)
@@ -146,59 +146,11 @@ def critical_sets(k, m, classes, space, subsets, sets):
     ``classes`` and ``subsets`` (workspace) are those of ``Work``; of each critical set ``sets`` takes the bit mask of
     the classes inside it (MASK) and its need (NEED).  Returns the number of critical sets, or -1 when there is no room.
     """
-    need, best = subsets[0], subsets[1]
-    size = 1 << k
-    # classes by their lower vertex
-    first = np.zeros(k + 1, np.int64)
-    other = np.empty(m, np.int64)
-    weight = np.empty(m, np.int64)
-    at = 0
-    for u in range(k):
-        first[u] = at
-        for e in range(m):
-            if classes[U, e] == u:
-                other[at] = classes[V, e]
-                weight[at] = classes[HEAVIEST, e]
-                at += 1
-    first[k] = at
-    # need[] first holds the sum of HEAVIEST inside U minus Pi |U|; the lowest vertex of U is added last
-    need[0] = 0
-    for u in range(1, size):
-        low = 0
-        while not (u >> low) & 1:
-            low += 1
-        acc = need[u & (u - 1)] - space
-        for i in range(first[low], first[low + 1]):
-            if (u >> other[i]) & 1:
-                acc += weight[i]
-        need[u] = acc
-    # best[] becomes the largest need of a subset; single vertices and the empty set need nothing
-    for u in range(size):
-        need[u] += space + 1
-        best[u] = need[u]
-    best[0] = 0
-    for v in range(k):
-        best[1 << v] = 0
-        need[1 << v] = 0
-    need[0] = 0
-    for v in range(k):
-        bit = 1 << v
-        for base in range(0, size, 2 * bit):
-            for u in range(base, base + bit):
-                if best[u] > best[u + bit]:
-                    best[u + bit] = best[u]
-    # keep the sets that need more than each of their subsets
+    need = _needs(k, m, classes, space, subsets)
     count = 0
-    for u in range(3, size - 1):
+    for u in range(3, (1 << k) - 1):
         n = need[u]
-        if n <= 0 or best[u] > n:
-            continue
-        implied = False
-        for v in range(k):
-            if (u >> v) & 1 and best[u ^ (1 << v)] >= n:
-                implied = True
-                break
-        if implied:
+        if n <= 0 or _is_implied(k, u, n, need, count, sets):
             continue
         if count == sets.shape[1]:
             return -1
@@ -208,5 +160,45 @@ def critical_sets(k, m, classes, space, subsets, sets):
                 mask |= np.int64(1) << e
         sets[MASK, count] = mask
         sets[NEED, count] = n
+        sets[LEFT, count] = u  # its vertices; the searches write what is left of its need
         count += 1
     return count
+
+
+@inner
+def _needs(k, m, classes, space, subsets):
+    """Return ``need[u]`` of every vertex set u: doubled vertex by vertex, by what the new one adds to each."""
+    need, inside = subsets[0], subsets[1]
+    weight = np.zeros((k, k), np.int16)
+    for e in range(m):
+        weight[classes[V, e], classes[U, e]] = classes[HEAVIEST, e]
+    need[0] = space + 1
+    for v in range(k):
+        inside[0] = -space
+        for w in range(v):
+            size = 1 << w
+            for u in range(size):
+                inside[size + u] = inside[u] + weight[v, w]
+        size = 1 << v
+        for u in range(size):
+            need[size + u] = need[u] + inside[u]
+    need[0] = 0
+    for v in range(k):  # single vertices need nothing
+        need[1 << v] = 0
+    return need
+
+
+@inner
+def _is_implied(k, u, n, need, count, sets):
+    """Tell whether a proper subset of u needs n or more: one vertex less (quick), or a critical set found before.
+
+    If there is such a subset, descending through subsets that need at least as much ends at a critical one; its number
+    as a bit mask is smaller, so it has been found.
+    """
+    for v in range(k):
+        if (u >> v) & 1 and need[u ^ (1 << v)] >= n:
+            return True
+    found = False
+    for s in range(count):
+        found |= sets[LEFT, s] & ~u == 0 and sets[NEED, s] >= n
+    return found

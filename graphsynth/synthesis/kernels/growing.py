@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.compilation import kernel
 from graphsynth.structure.kernels import canon, canon_workspace
-from graphsynth.synthesis.kernels.contracted import _refine, automorphisms
+from graphsynth.synthesis.kernels.contracted import automorphisms, refine
 from graphsynth.synthesis.kernels.layout import MAX_VERTICES, inner
 from graphsynth.synthesis.kernels.splitting import masks_by_layer
 
@@ -247,7 +247,7 @@ def _is_grown_here(n, v, depth, masks, space, growth):
                 return 0
     # then colours that do not depend on the numbering
     colours = np.zeros(n, np.int64)
-    discrete = _refine(n, mult, colours) == n
+    discrete = refine(n, mult, colours) == n
     own = colours[u] + colours[v]
     ties = 0
     for a in range(n):
