@@ -10,39 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import wraps
 from inspect import signature
-from itertools import chain
 from typing import Any, Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals.dual import Dual
-from graphsynth.intervals.interval import Interval, _both, _make, _make_single, _marked, interval
-from graphsynth.intervals.operations import Array, run, single
-from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS, OF_ONE
-
-#: Tells from lower and upper bounds of the arguments, or of the result, where something has to be recorded.
-_Where = Callable[..., Any]
-
-
-def _apply(name: str, *arguments: Interval) -> Interval:
-    """Run a compiled operation over broadcast arguments; decorations of all are joined."""
-    x, *others = arguments
-    if x._ends and not others:  # the short way of most
-        return _make_single(single(name)(*x._ends, 1.0), x._flags)
-    flags = _both(*[a.flags for a in arguments])
-    if len(ends := [a._ends for a in arguments if a._ends]) == len(arguments):
-        return _make_single(single(name)(*chain.from_iterable(ends), 1.0), flags)
-    return _make(*run(name, *[side for a in arguments for side in (a.lo, a.hi)]), flags)
-
-
-def _mark(result: Interval, where: _Where, *arguments: Interval, mark: np.uint8 = CLIPPED) -> Interval:
-    """Record where ``where(lo, hi, ...)`` of the arguments holds."""
-    if (ends := result._ends) is not None:
-        marked = where(*chain.from_iterable(a._ends or () for a in arguments))
-        return _make_single(ends, _both(result.flags, OF_ONE[mark])) if marked else result
-    found = where(*[side for a in arguments for side in (a.lo, a.hi)])
-    return _make(result.lo, result.hi, _marked(result.flags, found, mark))
+from graphsynth.intervals.interval import Interval, _apply, _both, _make, _mark, interval
+from graphsynth.intervals.operations import Array
+from graphsynth.intervals.reading import DISCONTINUOUS
 
 
 class _Unary(Protocol):

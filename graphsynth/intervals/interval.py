@@ -20,20 +20,11 @@ from graphsynth.core.errors import FormatError, IntervalError
 from graphsynth.intervals import operations
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.measures import Measures, fill
-from graphsynth.intervals.operations import Flags, Mask
-from graphsynth.intervals.reading import (
-    CLIPPED,
-    FLOAT_INPUT,
-    NO_FLAGS,
-    OF_ONE,
-    decimal_outward,
-    read_bounds,
-    read_points,
-)
+from graphsynth.intervals.operations import Array, Flags, Mask
+from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, OF_FLOAT, OF_ONE, decimal_outward, read_bounds, read_points
 
 _MOST = int(np.finfo(np.float64).max)
 _EXACT = 2**53  # integers up to this are floats
-_CLIPPED, _FLOAT = OF_ONE[CLIPPED], OF_ONE[FLOAT_INPUT]
 
 
 def _both(*flags: Flags) -> Flags:
@@ -338,14 +329,8 @@ class Interval(Measures):
         except TypeError:
             return NotImplemented  # type: ignore[no-any-return]
         a, b = (other, self) if reverse else (self, other)
-        flags = a.flags if a.flags is b.flags else _both(a.flags, b.flags)
-        if (p := a._ends) is not None and (q := b._ends) is not None:
-            if name == "divide" and q[0] <= 0.0 <= q[1]:
-                flags = _both(flags, _CLIPPED)
-            return _make_single(operations.single(name)(*p, *q, 1.0), flags)
-        if name == "divide":
-            flags = _marked(flags, (b.lo <= 0.0) & (b.hi >= 0.0))
-        return _make(*operations.run(name, a.lo, a.hi, b.lo, b.hi), flags)
+        result = _apply(name, a, b)
+        return _mark(result, _hold_zero, b) if name == "divide" else result
 
     __add__ = __radd__ = _operator("add")
     __sub__ = _operator("subtract")
@@ -381,24 +366,17 @@ class Interval(Measures):
             return self.sqr()
         if abs(power := int(exponent)) >= 2**31:
             raise IntervalError(f"exponent {exponent} is too large; powers of at most 2^31 - 1 are taken")
-        if ends := self._ends:
-            flags = _both(self._flags, _CLIPPED) if power < 0 and ends[0] <= 0.0 <= ends[1] else self._flags
-            return _make_single(operations.single("power")(*ends, power, 1.0), flags)
-        flags = _marked(self.flags, (self.lo <= 0.0) & (self.hi >= 0.0)) if power < 0 else self.flags
-        return _make(*operations.run("power", self.lo, self.hi, extra=(power,)), flags)
+        result = _apply("power", self, extra=(power,))
+        return _mark(result, _hold_zero, self) if power < 0 else result
 
     def sqr(self) -> Interval:
         """Square: never negative, and tighter than ``x * x``."""
-        if (ends := self._ends) is not None:
-            return _make_single(operations.single("square")(*ends, 1.0), self.flags)
-        return _make(*operations.run("square", self.lo, self.hi), self.flags)
+        return _apply("square", self)
 
     def sqrt(self) -> Interval:
         """Square root; a negative part of the argument is clipped and recorded."""
-        if (ends := self._ends) is not None:
-            flags = _both(self.flags, _CLIPPED) if ends[0] < 0.0 else self.flags
-            return _make_single(operations.single("root")(*ends, 1.0), flags)
-        return _make(*operations.run("root", self.lo, self.hi), _marked(self.flags, self.lo < 0.0))
+        root = _apply("root", self)
+        return root if (ends := self._ends) and ends[0] >= 0.0 else _mark(root, lambda lo, hi: lo < 0.0, self)
 
     def __eq__(self, other: object) -> Any:
         raise TypeError("intervals have no ==; use equal, certainly_less, possibly_equal or subset")
@@ -418,11 +396,34 @@ def _one(lo: float, hi: float) -> str:
     return "empty" if lo > hi else f"[{decimal_outward(lo, -1)}, {decimal_outward(hi, 1)}]"
 
 
-def _marked(flags: Flags, where: Mask, mark: np.uint8 = CLIPPED) -> Flags:
-    """Mark the places where an argument was clipped, or crossed a discontinuity."""
-    if not where.any():
-        return flags
-    return np.asarray(np.bitwise_or(flags, np.where(where, mark, np.uint8(0))))
+def _apply(name: str, x: Interval, y: Interval | None = None, extra: tuple[Any, ...] = ()) -> Interval:
+    """Run a compiled operation over one or two broadcast arguments; decorations of both are joined."""
+    p: tuple[float, ...] | None = x._ends
+    q, flags = ((), x._flags) if y is None else (y._ends, _both(x._flags, y._flags))
+    if p and q is not None:
+        return _make_single(operations.single(name)(*p, *q, *extra, 1.0), flags)
+    return _make(*operations.run(name, *_sides(x, y), extra=extra), flags)
+
+
+def _mark(
+    result: Interval, where: Callable[..., Any], x: Interval, y: Interval | None = None, mark: np.uint8 = CLIPPED
+) -> Interval:
+    """Record that arguments were clipped, or crossed a discontinuity, where ``where(lo, hi, ...)`` of them holds."""
+    if ends := result._ends:
+        found = where(*(x._ends or ()), *((y is not None and y._ends) or ()))
+        return _make_single(ends, _both(result._flags, OF_ONE[mark])) if found else result
+    found = where(*_sides(x, y))
+    if not found.any():
+        return result
+    return _make(result.lo, result.hi, np.asarray(np.bitwise_or(result.flags, np.where(found, mark, np.uint8(0)))))
+
+
+def _sides(x: Interval, y: Interval | None) -> tuple[Array, ...]:
+    return (x.lo, x.hi) if y is None else (x.lo, x.hi, y.lo, y.hi)
+
+
+def _hold_zero(lo: Any, hi: Any) -> Any:
+    return (lo <= 0.0) & (hi >= 0.0)
 
 
 _new = object.__new__  # looked up once
@@ -466,7 +467,7 @@ def interval(value: Any) -> Interval:
         number = float(value)
         return _make_single((number, number), NO_FLAGS)
     if type(value) is float and value - value == 0.0:  # finite
-        return _make_single((value, value), _FLOAT)
+        return _make_single((value, value), OF_FLOAT)
     if hasattr(value, "__interval_priority__"):
         raise TypeError
     return Interval(value)

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from decimal import Decimal
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
 from graphsynth.core.errors import FormatError
 from graphsynth.intervals import operations
 from graphsynth.intervals.operations import Array, Flags, Mask
-from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS, FLOAT_INPUT, fraction
+from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS, FLOAT_INPUT, OF_ONE, fraction
+
+
+def _refuse(self: Measures, value: Any) -> NoReturn:
+    raise AttributeError("an Interval does not change; make a new one")
 
 
 class Measures:
@@ -44,6 +48,9 @@ class Measures:
     def flags(self) -> Flags:
         """Decorations, of the shape of the bounds or a scalar for all."""
         return self._flags
+
+    if not TYPE_CHECKING:  # to type checkers they are read-only
+        lo, hi, flags = (member.setter(_refuse) for member in (lo, hi, flags))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -165,6 +172,8 @@ def fill(target: Measures, lo: Array, hi: Array, flags: Flags) -> None:
     hi.setflags(write=False)
     if flags.ndim and flags.shape != lo.shape:
         flags = np.broadcast_to(flags, lo.shape)
+    elif not lo.ndim:
+        flags = OF_ONE[flags.item()]  # equal ones are the same, which the short ways of `Interval` look for
     target._lo, target._hi, target._flags = lo, hi, flags
     target._ends = None if lo.ndim else (lo.item(), hi.item())
 

@@ -24,7 +24,7 @@ FLOAT_INPUT: Final = np.uint8(4)
 #: Decorations of one interval, each made once: equal ones are the same.
 OF_ONE: Final = tuple(np.broadcast_to(np.uint8(flags), ()) for flags in range(8))  # read-only
 NO_FLAGS: Flags = OF_ONE[0]
-_FLOAT: Flags = OF_ONE[FLOAT_INPUT]
+OF_FLOAT: Flags = OF_ONE[FLOAT_INPUT]
 
 _PAIR = re.compile(r"\s*\[\s*([^,\]]+?)\s*,\s*([^,\]]+?)\s*\]\s*")
 _SPREAD = re.compile(r"\s*(\S+)\s*(?:\+-|\+/-|±)\s*(\S+)\s*")
@@ -182,7 +182,7 @@ def read_points(value: Any) -> tuple[Array, Array, Flags]:
         if not np.isfinite(array).all():
             bad = array[~np.isfinite(array)].ravel()[0]
             raise IntervalError(f"{bad} is not a point; give finite numbers, or bounds that may be infinite")
-        return array, array.copy(), _FLOAT
+        return array, array.copy(), OF_FLOAT
     if isinstance(value, np.ndarray | list | tuple):
         nested = [read_points(item) for item in value]
         if not nested:
@@ -194,7 +194,7 @@ def read_points(value: Any) -> tuple[Array, Array, Flags]:
             flags = np.stack([np.broadcast_to(part[2], part[0].shape) for part in nested])
         return np.stack([part[0] for part in nested]), np.stack([part[1] for part in nested]), flags
     lo, hi, guaranteed = read_one(value)
-    flag = NO_FLAGS if guaranteed else _FLOAT
+    flag = NO_FLAGS if guaranteed else OF_FLOAT
     return np.asarray(lo), np.asarray(hi), flag
 
 
