@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals.dual import Dual
+from graphsynth.intervals.guard import in_default_mode
 from graphsynth.intervals.interval import Interval, _apply, _both, _make, _mark, interval
 from graphsynth.intervals.operations import Array
 from graphsynth.intervals.reading import DISCONTINUOUS
@@ -196,12 +197,14 @@ def hypot(x: Interval, y: Interval) -> Interval:
 
 
 @_binary(lambda x, y, value: _selected(value, x, y, x.value.hi < y.value.lo, y.value.hi < x.value.lo))
+@in_default_mode
 def minimum(x: Interval, y: Interval) -> Interval:
     """Smaller of two; the derivative holds both where either may be the smaller."""
     return _combined(x, y, np.minimum(x.lo, y.lo), np.minimum(x.hi, y.hi))
 
 
 @_binary(lambda x, y, value: _selected(value, x, y, x.value.lo > y.value.hi, y.value.lo > x.value.hi))
+@in_default_mode
 def maximum(x: Interval, y: Interval) -> Interval:
     """Larger of two; the derivative holds both where either may be the larger."""
     return _combined(x, y, np.maximum(x.lo, y.lo), np.maximum(x.hi, y.hi))
@@ -237,6 +240,7 @@ def pi() -> Interval:
     return _make(*PI)
 
 
+@in_default_mode
 def divide_extended(a: Any, b: Any) -> tuple[Interval, Interval]:
     """Quotient as the union of two intervals, the second empty unless 0 lies inside the divisor.
 

@@ -2,18 +2,29 @@
 
 Every bound of this package comes from operations rounded to nearest, with gradual underflow.  Other libraries in the
 same process may have left the processor rounding upward (codac does) or flushing tiny numbers to zero (shared
-libraries linked with ``-ffast-math`` do).  Bounds would then be silently wrong, so `check_rounding` runs when the
-package is imported and at the start of every public solve, and `check_quickly` in every operation on an `Interval`.
+libraries linked with ``-ffast-math`` do).  Bounds would then be silently wrong.  So an operation on an `Interval` is
+made in the processor's default mode, whatever mode the thread is in (`in_default_mode`: looking costs a tenth of a
+microsecond, and only another mode is left and restored).  A solve runs for long and calls functions of others, whose
+own numbers would change with the mode: `check_rounding` refuses it, and the import of the package too.
 See theory/interval-tests 4, item 1.
 """
 
 from __future__ import annotations
+
+import ctypes
+import platform
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import wraps
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 
 from graphsynth.core.arguments import checker
 from graphsynth.core.errors import GraphsynthError, IntervalError
 
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
 #: Lets a function keep what its annotations say; an `IntervalError` names the argument that is something else.
 checked = checker(IntervalError, {"System": "Callable", "CompiledSystem": "Callable"})
 
@@ -57,7 +68,39 @@ def check_rounding() -> None:
         )
 
 
-def check_quickly() -> None:
-    """Do what `check_rounding` does, in a tenth of a microsecond where all is well."""
-    if _ONE + _PART != _NEXT or -_ONE - _PART != -_NEXT or _LEAST * 0.5 == 0.0:
+@contextmanager
+def default_mode() -> Iterator[None]:
+    """Hold the default floating-point mode of this thread within the block; after it the mode is what it was.
+
+    Raises
+    ------
+    GraphsynthError
+        Where another mode is not left: outside glibc on x86-64 and AArch64, as `check_rounding`.
+    """
+    try:
+        mathematics = ctypes.CDLL("libm.so.6") if platform.machine() in ("x86_64", "aarch64") else None
+    except OSError:
+        mathematics = None
+    before = (ctypes.c_uint64 * 64)()  # more room than a floating-point environment takes
+    if mathematics:
+        mathematics.fegetenv(before)
+        mathematics.fesetenv(ctypes.c_void_p(-1))  # FE_DFL_ENV of glibc
+    try:
         check_rounding()
+        yield
+    finally:
+        if mathematics:
+            mathematics.fesetenv(before)
+
+
+def in_default_mode(operation: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Let an operation give the same bits in every floating-point mode of the processor."""
+
+    @wraps(operation)
+    def guarded(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        if _ONE + _PART == _NEXT and -_ONE - _PART == -_NEXT and _LEAST * 0.5 != 0.0:
+            return operation(*args, **kwargs)
+        with default_mode():
+            return operation(*args, **kwargs)
+
+    return guarded

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from graphsynth.core.errors import FormatError, IntervalError
 from graphsynth.intervals import operations
-from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.guard import default_mode, in_default_mode
 from graphsynth.intervals.measures import Measures, fill
 from graphsynth.intervals.operations import Array, Flags, Mask
 from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, OF_FLOAT, OF_ONE, decimal_outward, read_bounds, read_points
@@ -57,7 +57,7 @@ def _operator(name: str) -> Callable[[Interval, Any], Interval]:
         ):
             kernel = kernel or operations.single(name)
             ends = kernel(p[0], p[1], q[0], q[1], 1.0)
-            if ends[0] == ends[0]:  # what `_make_single` does
+            if ends[0] == ends[0]:  # else the processor is not in its default mode, which `_apply` sees to
                 result = _new(Interval)
                 result._ends, result._flags = ends, flags
                 return result
@@ -95,9 +95,9 @@ class Interval(Measures):
     Notes
     -----
     Guarantee: certified.  + - * /, squares and square roots give the tightest bounds for operands of any size;
-    elementary functions at most one or two steps more; a power n at most 2 n steps more.  Every operation checks that
-    the processor rounds to nearest.  Source: theory/interval-tests 4; [Dekker 1971]; Rump, Zimmermann, Boldo,
-    Melquiond (2009); proofs in ``docs/explanation/intervals.md``.
+    elementary functions at most one or two steps more; a power n at most 2 n steps more.  Every operation gives
+    the same bits whatever floating-point mode the processor is in.  Source: theory/interval-tests 4; [Dekker 1971];
+    Rump, Zimmermann, Boldo, Melquiond (2009); proofs in ``docs/explanation/intervals.md``.
 
     Examples
     --------
@@ -251,16 +251,19 @@ class Interval(Measures):
         operations.common_shape(self.lo, read.lo)
         return read
 
+    @in_default_mode
     def certainly_less(self, other: Any) -> Mask:
         """Whether every point lies below every point of the other; true for an empty one."""
         other = self._beside(other)
         return np.asarray((self.hi < other.lo) | self.is_empty | other.is_empty)
 
+    @in_default_mode
     def certainly_less_equal(self, other: Any) -> Mask:
         """Whether no point lies above a point of the other; true for an empty one."""
         other = self._beside(other)
         return np.asarray((self.hi <= other.lo) | self.is_empty | other.is_empty)
 
+    @in_default_mode
     def possibly_less(self, other: Any) -> Mask:
         """Whether some point lies below some point of the other."""
         other = self._beside(other)
@@ -270,11 +273,13 @@ class Interval(Measures):
         """Whether they have a point in common."""
         return ~self.intersect(other).is_empty
 
+    @in_default_mode
     def subset(self, other: Any) -> Mask:
         """Whether inside the other; the empty one always is."""
         other = self._beside(other)
         return np.asarray(self.is_empty | ((other.lo <= self.lo) & (self.hi <= other.hi)))
 
+    @in_default_mode
     def interior(self, other: Any) -> Mask:
         """Whether inside the interior of the other, in the topology of the line."""
         other = self._beside(other)
@@ -286,11 +291,13 @@ class Interval(Measures):
         """Whether without a common point."""
         return self.intersect(other).is_empty
 
+    @in_default_mode
     def equal(self, other: Any) -> Mask:
         """Whether the bounds are the same."""
         other = self._beside(other)
         return np.asarray((self.lo == other.lo) & (self.hi == other.hi))
 
+    @in_default_mode
     def intersect(self, other: Any) -> Interval:
         """Return the common part."""
         other = self._beside(other)
@@ -298,11 +305,13 @@ class Interval(Measures):
         void = lo > hi
         return _make(np.where(void, np.inf, lo), np.where(void, -np.inf, hi), _both(self.flags, other.flags))
 
+    @in_default_mode
     def hull(self, other: Any) -> Interval:
         """Return the smallest interval around both."""
         other = self._beside(other)
         return _make(np.minimum(self.lo, other.lo), np.maximum(self.hi, other.hi), _both(self.flags, other.flags))
 
+    @in_default_mode
     def inflate(self, relative: float = 0.1, absolute: float = 0.0) -> Interval:
         """Widen both ends by ``relative`` times the radius plus ``absolute``, and at least one step.
 
@@ -316,6 +325,7 @@ class Interval(Measures):
         grow = _make(0.0, relative) * _make(radius, radius) + _make(absolute, absolute) + _make(5e-324, 5e-324)
         return _make((self - grow).lo, (self + grow).hi, self.flags)
 
+    @in_default_mode
     def bisect(self) -> tuple[Interval, Interval]:
         """Cut at the midpoint; both halves hold it, those of the empty set are empty."""
         mid = self.mid
@@ -351,6 +361,7 @@ class Interval(Measures):
     def __pos__(self) -> Interval:
         return self
 
+    @in_default_mode
     def __abs__(self) -> Interval:
         if ends := self._ends:
             low, high = ends
@@ -373,6 +384,7 @@ class Interval(Measures):
         """Square: never negative, and tighter than ``x * x``."""
         return _apply("square", self)
 
+    @in_default_mode
     def sqrt(self) -> Interval:
         """Square root; a negative part of the argument is clipped and recorded."""
         root = _apply("root", self)
@@ -401,10 +413,16 @@ def _apply(name: str, x: Interval, y: Interval | None = None, extra: tuple[Any, 
     p: tuple[float, ...] | None = x._ends
     q, flags = ((), x._flags) if y is None else (y._ends, _both(x._flags, y._flags))
     if p and q is not None:
-        return _make_single(operations.single(name)(*p, *q, *extra, 1.0), flags)
+        kernel, bounds = operations.single(name), (*p, *q, *extra, 1.0)
+        ends = kernel(*bounds)
+        if ends[0] != ends[0]:  # the processor is not in its default mode
+            with default_mode():
+                ends = kernel(*bounds)
+        return _make_single(ends, flags)
     return _make(*operations.run(name, *_sides(x, y), extra=extra), flags)
 
 
+@in_default_mode
 def _mark(
     result: Interval, where: Callable[..., Any], x: Interval, y: Interval | None = None, mark: np.uint8 = CLIPPED
 ) -> Interval:
@@ -430,9 +448,7 @@ _new = object.__new__  # looked up once
 
 
 def _make_single(ends: tuple[float, float], flags: Flags) -> Interval:
-    """Make one interval from bounds known to be right; NaN comes from a processor that does not round to nearest."""
-    if ends[0] != ends[0]:
-        check_rounding()
+    """Make one interval from bounds known to be right."""
     result = _new(Interval)
     result._ends, result._flags = ends, flags
     return result

@@ -11,6 +11,7 @@ import numpy as np
 
 from graphsynth.core.errors import FormatError
 from graphsynth.intervals import operations
+from graphsynth.intervals.guard import in_default_mode
 from graphsynth.intervals.operations import Array, Flags, Mask
 from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS, FLOAT_INPUT, OF_ONE, fraction
 
@@ -83,6 +84,7 @@ class Measures:
         return np.where(self.is_empty, np.nan, operations.run("subtract", self.hi, self.hi, self.lo, self.lo)[1])
 
     @property
+    @in_default_mode
     def mid(self) -> Array:
         """Midpoint, always inside; 0 for the line, the largest number of its sign for a half line, NaN for empty."""
         big = float(np.finfo(np.float64).max)
@@ -93,6 +95,7 @@ class Measures:
         return np.asarray(middle)
 
     @property
+    @in_default_mode
     def rad(self) -> Array:
         """Smallest float with ``[mid - rad, mid + rad]`` around the interval, rounded up; NaN for empty."""
         mid = self.mid
@@ -101,11 +104,13 @@ class Measures:
         return np.where(self.is_empty, np.nan, np.maximum(above, below))
 
     @property
+    @in_default_mode
     def mag(self) -> Array:
         """Largest absolute value; NaN for empty."""
         return np.where(self.is_empty, np.nan, np.maximum(np.abs(self.lo), np.abs(self.hi)))
 
     @property
+    @in_default_mode
     def mig(self) -> Array:
         """Smallest absolute value; NaN for empty."""
         return np.where(self.is_empty, np.nan, np.maximum(np.maximum(self.lo, -self.hi), 0.0))
@@ -120,6 +125,7 @@ class Measures:
         """Where no plain float came in."""
         return np.asarray((self.flags & FLOAT_INPUT) == 0)
 
+    @in_default_mode
     def contains(self, point: Any) -> Any:
         """Whether a number lies inside, exactly decided; text and fractions for one interval, floats for arrays.
 

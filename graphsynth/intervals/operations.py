@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import IntervalError
-from graphsynth.intervals.guard import check_quickly
+from graphsynth.intervals.guard import in_default_mode
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -48,9 +48,9 @@ def common_shape(*operands: Array) -> tuple[int, ...]:
     return shape
 
 
+@in_default_mode
 def run(name: str, *bounds: Array, extra: tuple[Any, ...] = ()) -> tuple[Array, Array]:
     """Apply an operation to lower and upper bounds in turn, with numpy's broadcasting."""
-    check_quickly()
     shape = common_shape(*bounds)
     lo, hi = np.empty(shape), np.empty(shape)
     _loop(name)(*[_flat(a, shape) for a in bounds], *extra, lo.reshape(-1), hi.reshape(-1))

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from graphsynth.core.errors import FormatError, GeometryError, IntervalError
-from graphsynth.intervals.guard import check_quickly
+from graphsynth.intervals.guard import in_default_mode
 from graphsynth.intervals.operations import Array, Flags
 
 CLIPPED: Final = np.uint8(1)
@@ -41,13 +41,13 @@ class Decoration(IntFlag):
     FLOAT_INPUT = 4  # a plain float came in: whatever rounding made it is not included
 
 
+@in_default_mode
 def lower_bound(value: Fraction) -> float:
     """Return the largest double not above ``value``.
 
     >>> lower_bound(Fraction(1, 10)) < Fraction(1, 10) < upper_bound(Fraction(1, 10))
     True
     """
-    check_quickly()
     try:
         nearest = float(value)
     except OverflowError:
