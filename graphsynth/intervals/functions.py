@@ -7,6 +7,7 @@ mostly neighbouring doubles, at worst three apart.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import wraps
 from inspect import signature
@@ -68,6 +69,8 @@ def _unary(slope: Callable[[Interval, Interval], Interval]) -> Callable[[Callabl
     def decorated(function: Callable[[Interval], Interval]) -> _Unary:
         @wraps(function)
         def apply(x: Any) -> Any:
+            if type(x) is Interval:
+                return function(x)
             if isinstance(x, Dual):
                 value = function(x.value)
                 return x.chain(value, slope(x.value, value))
@@ -85,6 +88,8 @@ def _binary(slopes: Callable[[Dual, Dual, Interval], Dual]) -> Callable[[Callabl
     def decorated(function: Callable[[Interval, Interval], Interval]) -> _Binary:
         @wraps(function)
         def apply(x: Any, y: Any, /) -> Any:
+            if type(x) is Interval is type(y) and x._ends and y._ends:
+                return function(x, y)
             if isinstance(x, Dual) or isinstance(y, Dual):
                 x, y = (a if isinstance(a, Dual) else Dual(interval(a), b.grad * 0) for a, b in ((x, y), (y, x)))
                 return slopes(x, y, function(x.value, y.value))
@@ -138,6 +143,8 @@ def cos(x: Interval) -> Interval:
 def tan(x: Interval) -> Interval:
     """Tangent; the whole line across a pole, recorded (`Decoration.DISCONTINUOUS`)."""
     result = _apply("tan", x)
+    if (ends := result._ends) and ends[1] - ends[0] < math.inf:
+        return result
     return _mark(result, lambda lo, hi: (lo == -np.inf) | (hi == np.inf), result, mark=DISCONTINUOUS)
 
 
@@ -150,13 +157,20 @@ def atan(x: Interval) -> Interval:
 @_unary(lambda x, value: 1 / sqrt((1 - x) * (1 + x)))
 def asin(x: Interval) -> Interval:
     """Inverse sine; a part outside [-1, 1] is clipped and recorded."""
-    return _mark(_apply("asin", x), lambda lo, hi: (lo < -1.0) | (hi > 1.0), x)
+    return _of_a_sine("asin", x)
 
 
 @_unary(lambda x, value: -1 / sqrt((1 - x) * (1 + x)))
 def acos(x: Interval) -> Interval:
     """Inverse cosine; a part outside [-1, 1] is clipped and recorded."""
-    return _mark(_apply("acos", x), lambda lo, hi: (lo < -1.0) | (hi > 1.0), x)
+    return _of_a_sine("acos", x)
+
+
+def _of_a_sine(name: str, x: Interval) -> Interval:
+    result = _apply(name, x)
+    if (ends := x._ends) and ends[0] >= -1.0 and ends[1] <= 1.0:
+        return result
+    return _mark(result, lambda lo, hi: (lo < -1.0) | (hi > 1.0), x)
 
 
 @_unary(lambda x, value: value)
@@ -168,7 +182,8 @@ def exp(x: Interval) -> Interval:
 @_unary(lambda x, value: 1 / x)
 def log(x: Interval) -> Interval:
     """Natural logarithm; a part at or below 0 is clipped and recorded."""
-    return _mark(_apply("log", x), lambda lo, hi: lo <= 0.0, x)
+    result = _apply("log", x)
+    return result if (ends := x._ends) and ends[0] > 0.0 else _mark(result, lambda lo, hi: lo <= 0.0, x)
 
 
 def _atan2_slopes(y: Dual, x: Dual, value: Interval) -> Dual:
@@ -185,9 +200,12 @@ def atan2(y: Interval, x: Interval) -> Interval:
     >>> atan2(Interval(1), Interval(1)).contains(0.7853981633974483)
     True
     """
+    result = _apply("atan2", y, x)
+    if (ends := x._ends) and ends[0] > 0.0 and y._ends:
+        return result
     across = lambda y_lo, y_hi, x_lo, x_hi: (y_lo < 0.0) & (y_hi >= 0.0) & (x_lo < 0.0)  # noqa: E731
     origin = lambda y_lo, y_hi, x_lo, x_hi: (y_lo <= 0.0) & (y_hi >= 0.0) & (x_lo <= 0.0) & (x_hi >= 0.0)  # noqa: E731
-    return _mark(_mark(_apply("atan2", y, x), across, y, x, mark=DISCONTINUOUS), origin, y, x)
+    return _mark(_mark(result, across, y, x, mark=DISCONTINUOUS), origin, y, x)
 
 
 @_binary(lambda x, y, value: Dual(value, (x.value / value) * x.grad + (y.value / value) * y.grad))
