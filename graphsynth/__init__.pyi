@@ -51,6 +51,7 @@ from .mechanism.laws import Driver as Driver
 from .mechanism.model import Mechanism as Mechanism
 from .pipeline.runner import run as run
 from .structure.graph import Joint as Joint, MechanismGraph as MechanismGraph
+from .structure.modes import count_assembly_modes as count_assembly_modes, coupler_curve_degree as coupler_curve_degree
 from .structure.system.assortment import LinkAssortment as LinkAssortment
 from .structure.system.spec import StructuralSpec as StructuralSpec
 from .synthesis.api import (

@@ -26,6 +26,7 @@ from graphsynth.design import (
 from graphsynth.design.curves.fourier import coefficients, orders, unit
 from graphsynth.drawing.svg import number, painted, picture, words
 from graphsynth.jamming import Bearing
+from graphsynth.kinematics.triad.assembly_modes import assembly_modes
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.model import TracePoint
 from graphsynth.systems.antenna.mechanism import PointingMechanism
@@ -433,6 +434,25 @@ def modes() -> str:
         board.joint(elbow)
         board.text(elbow + aside, name)
     return board.svg("The two assembly modes of a platform: the same rocker angles, two poses")
+
+
+def six_modes() -> str:
+    """Draw a structure of five links in all six ways in which it can be assembled."""
+    fixed, carried = (0j, 2 + 0j, 0.73 + 1.56j), (0j, 1.41 + 0j, 1.17 - 0.97j)
+    poses = assembly_modes(fixed, carried, (1.76, 1.94, 1.7)).poses
+    board = Board(640, 470, 0j, 46.0)
+    for k, (x, y, alpha) in enumerate(sorted(poses.tolist())):
+        corners = [complex(x, y) + cmath.exp(1j * alpha) * vertex for vertex in carried]
+        whole = [*fixed, *corners]
+        middle = complex(*(0.5 * (min(side) + max(side)) for side in zip(*((z.real, z.imag) for z in whole))))
+        board.origin = complex(110 + 210 * (k % 3), 120 + 230 * (k // 3)) - board.scale * middle.conjugate()
+        board.line(*fixed, fill="ink", width=1.6)
+        board.line(*corners, fill="a", colour="a", width=2)
+        for anchor, corner in zip(fixed, corners):
+            board.line(anchor, corner, width=3)
+            board.joint(anchor)
+            board.joint(corner)
+    return board.svg("A structure of five links in its six assembly modes")
 
 
 def singular() -> str:
@@ -982,6 +1002,7 @@ DRAWINGS = {
     "theory-cognates": six_bar_cognates,
     "theory-conventions": conventions,
     "theory-curve-index": curve_index,
+    "theory-assembly-modes": six_modes,
     "theory-cuts": cuts,
     "theory-drawing-tolerances": drawn_link,
     "theory-drive": drive,

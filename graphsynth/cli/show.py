@@ -14,6 +14,8 @@ from graphsynth.core.wholefiles import replacing
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
+#: Links up to which assembly modes and degrees of curves are told, which takes a second there.
+_COUNTED = 16
 #: Suffixes of pictures; see graphsynth.drawing.export.
 PICTURES = (".svg", ".png", ".pdf", ".tikz", ".tex", ".dxf")
 
@@ -118,31 +120,58 @@ def _facts(graph: MechanismGraph, driver: int | None) -> dict[str, Any]:
     if graph.frame is None:
         if driver is not None:
             raise SpecError("--driver needs a mechanism: choose a frame first (text form '... f0')")
+        if graph.mobility == 0 and _is_revolute(graph):
+            from graphsynth.structure.modes import count_assembly_modes
+
+            facts["assembly modes"] = f"{count_assembly_modes(graph)} at most"
         return facts
     facts["levels"] = _sets(graph.levels)
     if facts["rigid sub-chain"] == "none":
         facts["Assur groups"] = _groups(graph, driver)
+        if graph.mobility == 1 and _is_revolute(graph):
+            facts["coupler curves"] = _curves(graph)
     return facts
+
+
+def _is_revolute(graph: MechanismGraph) -> bool:
+    """Whether assembly modes are counted: in the plane, with joints of mobility 1, few links."""
+    return graph.space == 3 and graph.links <= _COUNTED and all(joint.mobility == 1 for joint in graph.joints)
+
+
+def _curves(graph: MechanismGraph) -> str:
+    """Say of which degree the curves of each moving link are."""
+    from graphsynth.structure.modes import coupler_curve_degree
+
+    degrees = {link: coupler_curve_degree(graph, link) for link in range(graph.links) if link != graph.frame}
+    of_degree = {own: [link for link in degrees if degrees[link] == own] for own in sorted(set(degrees.values()))}
+    return "; ".join(f"degree {own}: links {', '.join(map(str, links))}" for own, links in of_degree.items())
 
 
 def _groups(graph: MechanismGraph, driver: int | None) -> list[str]:
     """Say how the mechanism is assembled, for one driven link or for every link jointed to the frame."""
-    from graphsynth.structure.assur import decompose
-
     if graph.mobility != 1 and driver is None:
         return [f"{graph.mobility} drivers needed: not listed"]
     if driver is not None:
         if driver not in graph.levels[1]:
             raise GraphError(f"driver {driver} is not jointed to the frame; choose one of {_sets(graph.levels[1:2])}")
         needed = f"one of {graph.mobility} drivers needed, groups not listed"
-        return [f"driver {driver}: {decompose(graph, [driver]) if graph.mobility == 1 else needed}"]
+        return [f"driver {driver}: {_assembled(graph, driver) if graph.mobility == 1 else needed}"]
     lines = []
     for link in graph.levels[1]:
         try:
-            lines.append(f"driver {link}: {decompose(graph, [link])}")
+            lines.append(f"driver {link}: {_assembled(graph, link)}")
         except GraphError as error:
             lines.append(f"driver {link}: {error}")
     return lines
+
+
+def _assembled(graph: MechanismGraph, driver: int) -> str:
+    """Say how the mechanism is assembled with this driver, and in how many ways."""
+    from graphsynth.structure.assur import decompose
+    from graphsynth.structure.modes import count_assembly_modes
+
+    groups = str(decompose(graph, [driver]))
+    return f"{groups}; {count_assembly_modes(graph, [driver])} assembly modes" if _is_revolute(graph) else groups
 
 
 def _sets(sets: Iterable[tuple[int, ...]]) -> str:
