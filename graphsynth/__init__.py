@@ -22,6 +22,7 @@ _shown.WORK.update(
         "static forces": "graphsynth.dynamics.inverse:static_forces",
         "embody": "graphsynth.kinematics.dimensional.api:embody",
         "draw graph": "graphsynth.drawing.methods:draw_graph",
+        "draw multiple joints": "graphsynth.drawing.methods:draw_multiple_joints",
         "graph picture": "graphsynth.drawing.methods:graph_picture",
         "open mechanism": "graphsynth.workbench.opening:open_workbench",
         "draw mechanism": "graphsynth.drawing.methods:draw_posed",

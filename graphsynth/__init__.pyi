@@ -52,6 +52,7 @@ from .mechanism.model import Mechanism as Mechanism
 from .pipeline.runner import run as run
 from .structure.graph import Joint as Joint, MechanismGraph as MechanismGraph
 from .structure.modes import count_assembly_modes as count_assembly_modes, coupler_curve_degree as coupler_curve_degree
+from .structure.multiple_joints import MultipleJointChain as MultipleJointChain
 from .structure.system.assortment import LinkAssortment as LinkAssortment
 from .structure.system.spec import StructuralSpec as StructuralSpec
 from .synthesis.api import (
@@ -64,6 +65,10 @@ from .synthesis.api import (
     enumerate_chains as enumerate_chains,
     enumerate_mechanisms as enumerate_mechanisms,
     sample_mechanisms as sample_mechanisms,
+)
+from .synthesis.multiple_joints import (
+    count_multiple_joint_chains as count_multiple_joint_chains,
+    enumerate_multiple_joint_chains as enumerate_multiple_joint_chains,
 )
 from .systems.antenna.mechanism import PointingMechanism as PointingMechanism
 from .systems.lambda_linkage.model import LambdaLinkage as LambdaLinkage

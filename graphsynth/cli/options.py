@@ -44,6 +44,7 @@ _WORK = (
     _option("--frame", "choose a frame: mechanisms instead of chains"),
     _option("--assur N", "Assur groups with N moving links instead of chains", int),
     _option("--truss N", "Baranov trusses with N links instead of chains", int),
+    _option("--multiple-joints K", "chains with K multiple joints (pins with three links or more), or any", str),
     _option("--symmetry P", "require an automorphism of prime order P", int),
     _SHARD,
     _WORKERS,

@@ -81,6 +81,8 @@ def problem_of(options: argparse.Namespace, *, counted: bool = False) -> Enumera
             raise SpecError(f"Pi = {space} must be a whole number from 2 to 6")
         links = options.truss if options.assur is None else options.assur + 1
         return EnumerationProblem.trusses(links, int(space), options.assur is not None)
+    if options.multiple_joints is not None:
+        return _with_multiple_joints(options, given)
     if options.frame or options.spec or options.set or set(given) - _OF_CHAINS:
         spec = spec_of(options)
         if spec.bounds("W") == (None, None) and "p" not in spec.ranges:
@@ -96,6 +98,23 @@ def problem_of(options: argparse.Namespace, *, counted: bool = False) -> Enumera
     plane, mobility = asked.get("Pi", 3), asked.get("W", 1)
     numbers = asked["N"], mobility, plane, joints, options.fractionated, options.symmetry
     return EnumerationProblem.chains(*numbers, counted=counted)
+
+
+def _with_multiple_joints(options: argparse.Namespace, given: dict[str, str]) -> EnumerationProblem:
+    from graphsynth.synthesis.problem import EnumerationProblem
+
+    others = sorted(set(given) - {"N", "W"})
+    if others or options.spec or options.set or options.fractionated or options.symmetry or "N" not in given:
+        raise SpecError(
+            f"--multiple-joints takes --links, --mobility and --frame, and needs --links (given besides: "
+            f"{', '.join(others) or 'more'}): leave the rest out"
+        )
+    number = options.multiple_joints
+    for text in (given["N"], given.get("W", "1"), "1" if number == "any" else number):
+        if not text.isdecimal():
+            raise SpecError(f"{text} must be a whole number for chains with multiple joints")
+    multiple = None if number == "any" else int(number)
+    return EnumerationProblem.multiple_joints(int(given["N"]), int(given.get("W", "1")), multiple, framed=options.frame)
 
 
 def shard(text: str) -> tuple[int, int]:

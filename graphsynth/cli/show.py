@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,8 @@ PICTURES = (".svg", ".png", ".pdf", ".tikz", ".tex", ".dxf")
 
 def run(options: argparse.Namespace) -> int:
     """Describe one graph, and draw it if asked."""
+    if re.search(r"^1m[0-9]| m[0-9]{1,3}$", options.graph):
+        return _with_multiple_joints(options)
     graph = read_graph(options.graph, options.line)
     if options.output:
         from graphsynth.formats.registry import FORMATS, write
@@ -42,6 +45,31 @@ def run(options: argparse.Namespace) -> int:
         _draw(graph, options.output, options.view, options.driver)
     elif options.output:
         write(graph, options.output)
+    return 0
+
+
+def _with_multiple_joints(options: argparse.Namespace) -> int:
+    from graphsynth.structure.multiple_joints import MultipleJointChain
+
+    text = options.graph
+    chain = MultipleJointChain.from_key(text) if " " not in text else MultipleJointChain.from_text(text)
+    if options.output:
+        check_place(options.output, PICTURES)
+        chain.draw(options.output, driver=options.driver)
+    facts = {
+        "key": chain.key,
+        "text": chain.to_text(),
+        "links": chain.links,
+        "joints": " ".join("-".join(map(str, joint)) for joint in chain.joints),
+        "multiple joints": chain.multiple,
+        "mobility": chain.mobility,
+        "loops": chain.loops,
+        "automorphisms": chain.automorphism_order,
+    }
+    if options.json:
+        console.put_json(facts)
+    else:
+        console.facts([(name, str(value)) for name, value in facts.items()])
     return 0
 
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import cmath
 import math
-from typing import TYPE_CHECKING
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import GraphError
 from graphsynth.drawing.diagram import mechanism_sketch
@@ -17,7 +18,9 @@ from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
 
 if TYPE_CHECKING:
+    from graphsynth.kinematics.dimensional.sketch import JointLayout
     from graphsynth.structure.graph import MechanismGraph
+    from graphsynth.structure.multiple_joints import MultipleJointChain
 
 
 def graph_sketch(
@@ -43,14 +46,43 @@ def graph_sketch(
     if graph.space != 3 or any(joint.mobility > 2 for joint in graph.joints):
         raise GraphError("only planar graphs (space 3) with joints of mobility 1 and 2 have a kinematic diagram")
     places = layout(graph)
+    pairs = {(a, b): k for k, (a, b, _) in enumerate(graph.joints)}
+    return _sketched(
+        graph, places, pairs, driver, {"width": width, "height": height, "numbers": numbers, "title": title}
+    )
+
+
+def multiple_joint_sketch(
+    chain: MultipleJointChain, *, driver: int | None = None, **options: Any
+) -> tuple[Sketch, list[tuple[float, float, float]]]:
+    """Build the kinematic diagram of a chain with multiple joints, these as two circles; as `graph_sketch`."""
+    from graphsynth.kinematics.dimensional.sketch import layout
+
+    graph = chain.graph()
+    places = layout(chain.incidence, chain.multiple)
+    number = {pair: k for k, joint in enumerate(chain.joints) for pair in combinations(joint, 2)}
+    sketch, pose = _sketched(graph, places, number, driver, options)
+    for k, joint in enumerate(chain.joints):
+        if len(joint) > 2:
+            link = chain.frame if chain.frame in joint else joint[0]
+            sketch.on(link, "joint", f"multiple joint {'-'.join(map(str, joint))}")
+            sketch.multiple_joint(complex(*places.positions[k]))
+    sketch.on()
+    return sketch, pose
+
+
+def _sketched(
+    graph: MechanismGraph, places: JointLayout, number: dict[tuple[int, int], int], driver: int | None, options: Any
+) -> tuple[Sketch, list[tuple[float, float, float]]]:
+    """Draw a graph whose joints have the places of these numbers."""
     framed = graph if graph.frame is not None else graph.with_frame(0)
     if driver is not None and not any({driver, graph.frame} == {a, b} for a, b, _ in graph.joints):
         raise GraphError(f"driver {driver} is not jointed to the frame; choose a link that is")
     drivers = () if driver is None or graph.frame is None else (Driver(graph.frame, driver),)
     pose = [(0.0, 0.0, 0.0)] * graph.links
     joints: list[JointGeometry] = []
-    for (a, b, mobility), position in zip(places.graph.joints, places.positions):
-        x, y = map(float, position)
+    for a, b, mobility in graph.joints:
+        x, y = map(float, places.positions[number[a, b]])
         if mobility == 1:
             joints.append(Revolute(a, b, (x, y), (x, y)))
             continue
@@ -59,10 +91,7 @@ def graph_sketch(
         way = complex(cx - x, cy - y)
         joints.append(PinSlot(a, b, (x, y), (x, y), cmath.phase(way) if abs(way) > 1e-9 else 0.0))
     mechanism = Mechanism(framed, tuple(joints), drivers, pose=tuple(pose))
-    sketch = mechanism_sketch(
-        mechanism, pose, width=width, height=height, numbers=numbers, grounded=graph.frame is not None, title=title
-    )
-    return sketch, pose
+    return mechanism_sketch(mechanism, pose, grounded=graph.frame is not None, **options), pose
 
 
 def graph_svg(graph: MechanismGraph, *, driver: int | None = None, width: float = 480.0, title: str = "") -> str:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
+    from graphsynth.structure.multiple_joints import MultipleJointChain
 
 
 @dataclass(frozen=True, repr=False)
@@ -73,6 +74,13 @@ def draw_graph(graph: MechanismGraph, path: str | Path | None, **options: Any) -
     from graphsynth.drawing.graphs import graph_sketch
 
     return _drawing(*graph_sketch(graph, **options), path)
+
+
+def draw_multiple_joints(chain: MultipleJointChain, path: str | Path | None, **options: Any) -> Drawing:
+    """Work of `MultipleJointChain.draw`."""
+    from graphsynth.drawing.graphs import multiple_joint_sketch
+
+    return _drawing(*multiple_joint_sketch(chain, **options), path)
 
 
 def graph_picture(graph: MechanismGraph) -> str:

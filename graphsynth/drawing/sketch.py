@@ -98,6 +98,11 @@ class Sketch:
         """Draw a revolute joint: an open circle."""
         self._disc(point, radius * self.symbol, Style("link", 2.0, "paper"))
 
+    def multiple_joint(self, point: Point) -> None:
+        """Draw a joint of three links or more: two circles."""
+        self._disc(point, 9.0 * self.symbol, Style("link", 1.6))
+        self.joint(point)
+
     def ground(self, point: Point, size: float = 17.0, direction: Point = -1j, joint: bool = True) -> None:
         """Draw a joint on the frame: a triangle below the joint, standing on hatched ground.
 

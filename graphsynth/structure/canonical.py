@@ -65,8 +65,12 @@ def label(graph: MechanismGraph) -> Labelling:
     >>> label(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (3, 0)])).order
     8
     """
+    return label_coloured(graph, link_colours(graph))
+
+
+def label_coloured(graph: MechanismGraph, colours: list[int]) -> Labelling:
+    """Label a graph canonically whose links have the given colours; links are ordered by colour first."""
     global _labelled_without_kernel
-    colours = link_colours(graph)
     if graph.links <= _KERNEL_LINKS_MAX:
         if _labelled_without_kernel >= _GRAPHS_WORTH_THE_KERNEL:
             return _label(graph, colours, compiled=True)
@@ -124,8 +128,12 @@ def key(graph: MechanismGraph) -> str:
     >>> key(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (3, 0)]))
     '1BAN4'
     """
-    canonical = graph.canonical()
-    packed = canonical.packed
+    return key_of(graph.canonical())
+
+
+def key_of(graph: MechanismGraph) -> str:
+    """Return the key of a graph that is canonical already."""
+    packed = graph.packed
     coloured = any(mobility != 1 for mobility in packed[2::3])
     size = graph.links * (graph.links - 1) // 2
     total = size + (len(packed) if coloured else 0)

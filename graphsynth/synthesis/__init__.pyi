@@ -9,3 +9,7 @@ from .api import (
     enumerate_mechanisms as enumerate_mechanisms,
     sample_mechanisms as sample_mechanisms,
 )
+from .multiple_joints import (
+    count_multiple_joint_chains as count_multiple_joint_chains,
+    enumerate_multiple_joint_chains as enumerate_multiple_joint_chains,
+)

@@ -58,7 +58,7 @@ class Chunk:
             yield out[:kept]
 
     def graphs(self) -> Iterator[MechanismGraph]:
-        """Stream the chains."""
+        """Stream the chains; of chains with multiple joints, the incidence graphs."""
         from graphsynth.structure.graph import MechanismGraph
 
         links, space = self.family.links, self.family.space
@@ -75,6 +75,9 @@ class Chunk:
         from graphsynth.synthesis.kernels.expanding import expand_text
 
         family = self.family
+        if family.pins:
+            yield from ((f"{graph.to_text()} m{family.pins}\n".encode(), 1) for graph in self.graphs())
+            return
         if family.links > _ONE_BYTE:
             yield from ((f"{graph.to_text()}\n".encode(), 1) for graph in self.graphs())
             return

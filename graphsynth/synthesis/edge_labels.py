@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import TooLargeError
-from graphsynth.synthesis.kernels.layout import Tables
+from graphsynth.synthesis.kernels.layout import BETWEEN_LINKS, COPIES_MASK, KIND_SHIFT, LOOSE, TO_PIN, Tables
 
 PathType = tuple[int, ...]
 _MAX_LABELS = 2_000_000
@@ -61,11 +61,17 @@ class EdgeLabels:
     multiplicities: tuple[int, ...]  # numbers of parallel paths that occur
     #: the two end vertices are the whole contracted graph (only then may a Baranov truss have weight Pi there)
     whole: bool
+    pins: bool = False  # some vertices are multiple joints
+
+    @property
+    def _lend(self) -> int:
+        """Freedom that paths of negative weight may add; one more than W - 1 where all the others are one link."""
+        return self.mobility - (not self.pins) if self.mobility > 1 else 0
 
     @property
     def limits(self) -> tuple[int, ...]:
         """Resources to use up: binary links, joints of each higher mobility, and freedom to lend (for W >= 2)."""
-        lend = (self.mobility - 1,) if self.mobility > 1 else ()
+        lend = (self._lend,) if self.mobility > 1 else ()
         return (self.binary_links, *(count for _, count in self.higher), *lend)
 
     def _cost(self, path: PathType) -> tuple[int, ...]:
@@ -78,7 +84,7 @@ class EdgeLabels:
     @cached_property
     def path_types(self) -> tuple[PathType, ...]:
         """Every path that fits the limits, in lexicographic order."""
-        lightest = 1 if self.mobility == 0 else 1 - self.mobility
+        lightest = 1 if self.mobility == 0 else -self._lend
         mobilities = (1, *(i for i, _ in self.higher))
         longest = min(self.space - lightest, self.binary_links + 1)
         found = [
@@ -107,11 +113,28 @@ class EdgeLabels:
             for rest in self._multisets(count - 1, i, total, heavier, direct or len(path) == 1):
                 yield (path, *rest)
 
-    def labels(self, multiplicity: int, marked: bool) -> list[EdgeLabel]:
-        """List the labels of a class of the given multiplicity.
+    def _fits_ends(self, paths: tuple[PathType, ...], ends: int) -> bool:
+        """Tell whether parallel paths may connect such ends: no set of two links or more is rigid.
+
+        Paths of negative weight add freedom and never matter; of the others, one that is a joint on the same link, or
+        the only link between two multiple joints, may take all freedom.
+        """
+        if ends == BETWEEN_LINKS:
+            return True
+        shortest = 1 if ends == TO_PIN else 2
+        stiff = [path for path in paths if sum(path) <= self.space]
+        if ends == LOOSE or any(len(path) < shortest for path in paths):
+            return ends == LOOSE and not stiff
+        one = len(stiff) == 1 and len(stiff[0]) == shortest
+        weight = sum(self.space - sum(path) for path in stiff)
+        return one or (weight <= self.space - 1 - shortest and (ends == TO_PIN or bool(stiff)))
+
+    def labels(self, connection: int, marked: bool) -> list[EdgeLabel]:
+        """List the labels of a class, given as an entry of the matrix of the contracted graph.
 
         Raises `TooLargeError` for more labels than the kernels are laid out for.
         """
+        ends, multiplicity = divmod(connection, COPIES_MASK + 1)
         zero = (0,) * len(self.limits)
         if not marked:
             found = [EdgeLabel(paths, 0) for paths in self._multisets(multiplicity, 0, zero, 0, False)]
@@ -121,6 +144,7 @@ class EdgeLabels:
                 weight = max(0, self.space - sum(path))
                 for paths in self._multisets(multiplicity - 1, 0, self._cost(path), weight, False):
                     found.extend(EdgeLabel((path, *paths), mark) for mark in range(1, len(path)))
+        found = [label for label in found if self._fits_ends(label.paths, ends)]
         if len(found) > _MAX_LABELS:
             raise TooLargeError(
                 f"{len(found)} kinds of {multiplicity} parallel paths (bound {_MAX_LABELS}): "
@@ -249,9 +273,17 @@ def _columns(rows: Sequence[tuple[int, ...]], width: int) -> NDArray[np.int64]:
 
 @lru_cache(maxsize=256)
 def edge_labels_for(
-    space: int, mobility: int, binary_links: int, higher: tuple[tuple[int, int], ...], loops: int, vertices: int
+    space: int,
+    mobility: int,
+    binary_links: int,
+    higher: tuple[tuple[int, int], ...],
+    loops: int,
+    vertices: int,
+    pins: bool = False,
 ) -> EdgeLabels:
     """Return the labels for all contracted graphs with the given numbers of loops and vertices."""
     most = loops + 1 if vertices == 2 else loops  # parallel paths between two of the vertices
     multiplicities = (loops + 1,) if vertices == 2 else tuple(range(1, most))
-    return EdgeLabels(space, mobility, binary_links, higher, multiplicities, vertices == 2)
+    kinds = range(LOOSE + (mobility > 1) if pins else 1)
+    connections = tuple(mu | ends << KIND_SHIFT for ends in kinds for mu in multiplicities)
+    return EdgeLabels(space, mobility, binary_links, higher, connections, vertices == 2, pins)

@@ -6,14 +6,14 @@ A ring of links has a single loop and no contracted graph; rings are told apart 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.errors import SpecError
+from graphsynth.core.errors import SpecError, TooLargeError
 from graphsynth.core.wording import shown, whole
 from graphsynth.synthesis.contracted import contracted_graphs
 from graphsynth.synthesis.edge_labels import EdgeLabels, edge_labels_for
@@ -43,15 +43,17 @@ class Family:
     frame_degree: int = 0  # joints of a frame that is a vertex of the contracted graph; 0: any
     degrees: tuple[int, ...] | None = None  # the sorted degrees the contracted graph must have
     levels: Levels = ()  # wanted sizes of adjacency levels
+    #: vertices that are multiple joints; signatures of problems do without it
+    pins: int = field(default=0, repr=False)
 
     @property
     def links(self) -> int:
-        """Number of links N, the frame included."""
+        """Number of links N, the frame included; each multiple joint is one more."""
         return self.vertices + self.binary_links
 
     @property
     def joints(self) -> int:
-        """Number of joints p."""
+        """Number of joints p; with multiple joints, of links on joints that are not simple and of simple joints."""
         return self.loops + self.links - 1
 
     @property
@@ -62,11 +64,14 @@ class Family:
     @property
     def edge_labels(self) -> EdgeLabels:
         """The labels of the paths."""
-        return edge_labels_for(self.space, self.mobility, self.binary_links, self.higher, self.loops, self.vertices)
+        numbers = self.space, self.mobility, self.binary_links, self.higher, self.loops, self.vertices
+        return edge_labels_for(*numbers, self.pins > 0)
 
     @property
     def graphs(self) -> NDArray[np.uint8]:
         """Multiplicity matrices ``(graphs, k, k)`` of the contracted graphs."""
+        if self.pins:
+            return _coloured(self.loops, self.vertices, self.pins, self.mobility if self.mobility > 1 else 0)
         return _graphs(self.loops, self.vertices, self.degrees)
 
 
@@ -79,6 +84,20 @@ def _graphs(loops: int, vertices: int, degrees: tuple[int, ...] | None) -> NDArr
     chosen = np.ascontiguousarray(mults[(found == np.array(degrees)).all(axis=1)])
     chosen.setflags(write=False)  # the kernels are compiled once, for read-only lists
     return chosen
+
+
+@lru_cache(maxsize=4)  # some are tens of megabytes
+def _coloured(loops: int, vertices: int, pins: int, loose: int) -> NDArray[np.uint8]:
+    from graphsynth.synthesis.kernels.colouring import colour_graphs
+
+    mults = contracted_graphs(loops, vertices)
+    count = colour_graphs(vertices, mults, pins, loose, np.zeros((0, vertices, vertices), np.uint8))
+    if count < 0:
+        raise TooLargeError("a contracted graph has too many symmetries: ask for fewer links")
+    found = np.zeros((count, vertices, vertices), np.uint8)
+    colour_graphs(vertices, mults, pins, loose, found)
+    found.setflags(write=False)  # the kernels are compiled once, for read-only lists
+    return found
 
 
 def chain_numbers(
@@ -154,6 +173,19 @@ def mechanism_families(assortment: LinkAssortment, levels: Levels = ()) -> list[
             tuple(degrees),
             levels,
         )
+    ]
+
+
+def multiple_joint_families(links: int, mobility: int, pins: int, framed: bool) -> list[Family]:
+    """List the families of planar chains with so many multiple joints (1 or more; with every frame, if ``framed``).
+
+    The numbers are such that there are two loops or more.
+    """
+    loops = (links - 1 - mobility) // 2
+    frames = FRAME_VERTEX + FRAME_PATH if framed else FRAME_NONE
+    return [
+        Family(3, mobility, loops, vertices, links - vertices + pins, (), frames, pins=pins)
+        for vertices in range(max(2, pins), min(2 * (loops - 1), links + pins) + 1)
     ]
 
 

@@ -26,6 +26,7 @@ from graphsynth.synthesis.families import (
     chain_joints,
     chain_numbers,
     mechanism_families,
+    multiple_joint_families,
 )
 from graphsynth.synthesis.fractionated import OneByOne
 from graphsynth.synthesis.totals import Total, is_counted_together, totals_of
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 _PRIMES = (2, 3, 5, 7, 11, 13)
 _LISTED_PER_SECOND = 1e6  # order of magnitude, one core
 _MOST_LOOPS = 10  # what the kernels are laid out for
+_MOST_PINNED = 7  # contracted graphs with vertices of two kinds are kept in memory
 _COUNTED_LOOPS = 6  # counts of so many loops take a moment
 # 1-DOF planar chains with 2, 3, ..., 8 loops (published and recomputed): where there is nothing smaller to count
 _KNOWN = (2, 16, 230, 6856, 318162, 19819281, 1535380884)
@@ -108,6 +110,30 @@ class EnumerationProblem:
             one_by_one.append(OneByOne("fractionated", *common, symmetry=order))
         families = chain_families(links, mobility, space, higher, framed)
         return cls(title + (f" symmetry={order}" if order else ""), tuple(families), tuple(one_by_one), order)
+
+    @classmethod
+    def multiple_joints(
+        cls, links: int, mobility: int, multiple: int | None, *, framed: bool = False
+    ) -> EnumerationProblem:
+        """State the enumeration of non-fractionated planar chains with so many multiple joints; None: one or more.
+
+        Raises `SpecError` for a value out of its bounds, `TooLargeError` for too many loops.
+        """
+        links, mobility, _, _ = chain_numbers(links, mobility, 3, None)
+        wanted = None if multiple is None else whole(multiple, "multiple joints", 1, MOST_LINKS)
+        title = f"W={mobility} N={links} multiple joints={'any' if wanted is None else wanted}"
+        title += " framed" if _truth(framed, "framed") else ""
+        loops, odd = divmod(links - 1 - mobility, 2)
+        if odd or loops < 2:
+            return cls(title, (), reason=_reason(links, mobility, 3, {}) if odd else f"{title}: ask for more links")
+        if loops > _MOST_PINNED:
+            raise TooLargeError(
+                f"{links} links make {loops} independent loops, more than the bound of {_MOST_PINNED} for chains with "
+                f"multiple joints: ask for {2 * _MOST_PINNED + mobility + 1} links at most"
+            )
+        numbers = range(1, 2 * loops - 1) if wanted is None else [wanted]
+        families = [family for pins in numbers for family in multiple_joint_families(links, mobility, pins, framed)]
+        return cls(title, tuple(families))
 
     @classmethod
     def mechanisms(cls, question: StructuralSpec | LinkAssortment, symmetry: int | None) -> EnumerationProblem:

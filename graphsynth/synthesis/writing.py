@@ -21,6 +21,7 @@ from graphsynth.core.errors import GraphsynthError
 from graphsynth.core.journal import Journal, Work, digest_of
 from graphsynth.core.ordered import in_order
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.structure.multiple_joints import MultipleJointChain
 from graphsynth.synthesis.chunks import Chunk
 from graphsynth.synthesis.problem import EnumerationProblem, WorkItem, counts, graphs, texts, whole_sum
 from graphsynth.synthesis.shards import shard_of
@@ -49,7 +50,11 @@ def _work(
     return Work(form, problem.title, digest_of(problem.signature, form, cut), remedy=remedy, again=again)
 
 
-def _json_line(graph: MechanismGraph) -> str:
+def _json_line(graph: MechanismGraph, multiple: int = 0) -> str:
+    if multiple:
+        chain = MultipleJointChain(graph, multiple)
+        named = {"key": chain.key, "links": chain.links, "frame": chain.frame, "joints": chain.joints}
+        return json.dumps(named) + "\n"
     record: dict[str, Any] = {"key": graph.key, "links": graph.links, "space": graph.space, "frame": graph.frame}
     record["joints"] = [list(joint) for joint in graph.joints]
     if graph.frame is not None:
@@ -58,7 +63,8 @@ def _json_line(graph: MechanismGraph) -> str:
 
 
 def _json_lines(item: WorkItem) -> tuple[bytes, int]:
-    lines = list(map(_json_line, item.graphs()))
+    multiple = item.family.pins if isinstance(item, Chunk) else 0
+    lines = [_json_line(graph, multiple) for graph in item.graphs()]
     return "".join(lines).encode(), len(lines)
 
 
@@ -137,8 +143,8 @@ def estimated_size(
         return weight, weight * line
     chosen = chunks[:: max(1, len(chunks) // _SAMPLED)]
     made = [sum(lines for _, lines in chunk.texts()) for chunk in chosen]
-    some = [next(graphs([chunk], None)) for chunk, lines in zip(chosen, made) if lines]
-    size = sum(len(_json_line(graph)) if form == "jsonl" else len(graph.to_text()) + 1 for graph in some)
+    some = [(next(graphs([chunk], None)), chunk.family.pins) for chunk, lines in zip(chosen, made) if lines]
+    size = sum(len(_json_line(*one)) if form == "jsonl" else len(one[0].to_text()) + 4 for one in some)
     number = weight * sum(made) / sum(chunk.weight for chunk in chosen)
     return number, number * size / max(len(some), 1)
 

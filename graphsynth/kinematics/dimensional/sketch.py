@@ -46,9 +46,10 @@ class JointLayout:
     ----------
     graph : MechanismGraph
     positions : ndarray, shape (joints, 2)
-        In the order of ``graph.joints``; the mean distance between neighbours on a link is 1.
+        In the order of ``graph.joints`` (joints on multiple joints left out), then the multiple joints; the mean
+        distance between neighbours on a link is 1.
     polygons : tuple of tuple of int
-        For each link its joints (indices into ``graph.joints``) in the order of its outline.
+        For each link its joints (indices into ``positions``) in the order of its outline.
     planar : bool
         Whether the drawing was made without crossings.
     crossings : int
@@ -66,13 +67,15 @@ class JointLayout:
         return np.asarray(self.positions[list(self.polygons[link])])
 
 
-def layout(graph: MechanismGraph) -> JointLayout:
+def layout(graph: MechanismGraph, multiple: int = 0) -> JointLayout:
     """Sketch a chain or a mechanism: places of its joints.
 
     Parameters
     ----------
     graph : MechanismGraph
         Connected; joint mobilities do not matter.  A frame is drawn at the bottom.
+    multiple : int
+        So many of its last vertices are not links but multiple joints, single points.
 
     Returns
     -------
@@ -94,21 +97,35 @@ def layout(graph: MechanismGraph) -> JointLayout:
     """
     if not graph.joints or not graph.is_connected:
         raise GraphError("a sketch needs a connected graph with at least one joint")
-    found = _embedding(graph)
+    at = _places(graph, multiple)
+    found = _embedding(graph, at, multiple)
     if found is None:
-        return _with_crossings(graph)
+        return _with_crossings(graph, at, multiple)
     loops, polygons = found
     if len(loops) > 2:
-        return JointLayout(graph, _best_outer(graph, loops, polygons), polygons, True)
-    count, z = len(loops[0]), np.zeros(len(graph.joints), dtype=np.complex128)  # a regular polygon of sides 1
+        return JointLayout(graph, _best_outer(_at_frame(graph, at), loops, polygons), polygons, True)
+    count, z = len(loops[0]), np.zeros(max(at) + 1, dtype=np.complex128)  # a regular polygon of sides 1
     z[loops[0]] = np.exp(1j * math.tau * np.arange(count) / count) / (2.0 * math.sin(math.pi / count))
-    return JointLayout(graph, _upright(graph, z, loops[0]), polygons, True)
+    return JointLayout(graph, _upright(_at_frame(graph, at), z, loops[0]), polygons, True)
+
+
+def _places(graph: MechanismGraph, multiple: int) -> list[int]:
+    """Return which place each joint takes: one of its own, or that of its multiple joint."""
+    links = graph.links - multiple
+    simple = sum(joint.b < links for joint in graph.joints)
+    own = iter(range(simple))
+    return [next(own) if joint.b < links else simple + joint.b - links for joint in graph.joints]
+
+
+def _at_frame(graph: MechanismGraph, at: list[int]) -> set[int]:
+    """Return the places of the joints of the frame; empty without one."""
+    return {at[k] for k, joint in enumerate(graph.joints) if graph.frame in (joint.a, joint.b)}
 
 
 # --- planar embedding
 
 
-def _embedding(graph: MechanismGraph) -> tuple[list[list[int]], Polygons] | None:
+def _embedding(graph: MechanismGraph, at: list[int], multiple: int) -> tuple[list[list[int]], Polygons] | None:
     """Loops as cycles of joints and outlines of the links; None if the graph has no such embedding."""
     import networkx as nx
 
@@ -118,26 +135,25 @@ def _embedding(graph: MechanismGraph) -> tuple[list[list[int]], Polygons] | None
     planar, embedding = nx.check_planarity(plain)
     if not planar:
         return None
-    index = {pair: k for k, joint in enumerate(graph.joints) for pair in ((joint.a, joint.b), (joint.b, joint.a))}
-    outlines = tuple(
-        tuple(index[link, other] for other in embedding.neighbors_cw_order(link)) for link in range(graph.links)
-    )
+    index = {pair: k for k, joint in zip(at, graph.joints) for pair in ((joint.a, joint.b), (joint.b, joint.a))}
+    links = range(graph.links - multiple)
+    outlines = tuple(tuple(index[link, other] for other in embedding.neighbors_cw_order(link)) for link in links)
     seen: set[tuple[int, int]] = set()
     found = []  # the faces in a fixed order
     for edge in sorted(index):
         if edge not in seen:
             around = embedding.traverse_face(*edge, mark_half_edges=seen)
-            found.append([index[pair] for pair in zip(around, [*around[1:], around[0]])])
+            joints = [index[pair] for pair in zip(around, [*around[1:], around[0]])]
+            found.append([k for k, before in zip(joints, [joints[-1], *joints]) if k != before])
     return found, outlines
 
 
-def _best_outer(graph: MechanismGraph, loops: list[list[int]], polygons: Polygons) -> Array:
+def _best_outer(own: set[int], loops: list[list[int]], polygons: Polygons) -> Array:
     """Draw with the outer face that gives the roomiest picture; with the frame outside if there is one."""
-    frame_joints = {k for k, joint in enumerate(graph.joints) if graph.frame in (joint.a, joint.b)}
-    allowed = [k for k, loop in enumerate(loops) if graph.frame is None or len(frame_joints & set(loop)) >= 2]
+    allowed = [k for k, loop in enumerate(loops) if not own or len(own & set(loop)) >= 2]
     longest = max(len(loops[k]) for k in allowed)
     near = sorted((k for k in allowed if len(loops[k]) >= longest - 1), key=lambda k: -len(loops[k]))
-    drawings = [_Drawing(graph, loops, k, polygons) for k in near[:_OUTER]]
+    drawings = [_Drawing(loops, k, polygons) for k in near[:_OUTER]]
     for drawing in drawings:
         drawing.even_out(_ROUGH)
     rooms = [drawing.room() for drawing in drawings]
@@ -145,19 +161,19 @@ def _best_outer(graph: MechanismGraph, loops: list[list[int]], polygons: Polygon
     best = next(drawing for drawing, room in zip(drawings, rooms) if room >= (1.0 - 1e-6) * max(rooms))
     best.even_out(_STEPS)
     for _ in range(_ROUNDS):  # large graphs begin crowded
-        z = best.z[: len(graph.joints)]
+        z = best.z[: best.joints]
         closest = np.abs(z[:, None] - z)[np.triu_indices(len(z), 1)].min()
         if closest / best.mean_side() >= _CLOSE:
             break
         best.even_out(_STEPS, crowded=True)
-    return _upright(graph, best.z[: len(graph.joints)], best.outer)
+    return _upright(own, best.z[: best.joints], best.outer)
 
 
 class _Drawing:
     """A drawing under way: joints, then the hubs of the inner loops, as complex numbers."""
 
-    def __init__(self, graph: MechanismGraph, loops: list[list[int]], outer: int, polygons: Polygons) -> None:
-        count, self.outer = len(graph.joints), loops[outer]
+    def __init__(self, loops: list[list[int]], outer: int, polygons: Polygons) -> None:
+        count, self.outer = 1 + max(map(max, polygons)), loops[outer]
         inner = loops[:outer] + loops[outer + 1 :]
         sides = _sides(polygons)
         spokes = [(count + hub, joint) for hub, loop in enumerate(inner) for joint in loop]
@@ -235,10 +251,9 @@ def _areas(z: Complex, triangles: IntArray) -> Array:
     return np.asarray((np.conj(q - p) * (r - p)).imag)
 
 
-def _upright(graph: MechanismGraph, z: Complex, outer: list[int]) -> Array:
-    """Turn the frame to the bottom, a side of it on the outer face horizontal; centre at the origin."""
+def _upright(own: set[int], z: Complex, outer: list[int]) -> Array:
+    """Turn the frame, with its own joints, to the bottom, a side of it on the outer face horizontal; centre at 0."""
     z = z - z.mean()
-    own = [k for k, joint in enumerate(graph.joints) if graph.frame in (joint.a, joint.b)]
     pairs = [(p, q) for p, q in zip(outer, [*outer[1:], *outer[:1]]) if p in own and q in own]
     if pairs:
         direction = z[pairs[0][1]] - z[pairs[0][0]]
@@ -246,7 +261,7 @@ def _upright(graph: MechanismGraph, z: Complex, outer: list[int]) -> Array:
         if (z[pairs[0][0]].imag + z[pairs[0][1]].imag) > 0.0:
             z = -z
     elif own:
-        middle = z[own].mean()
+        middle = z[sorted(own)].mean()
         if abs(middle) > 1e-9:
             z = z * (-1j * np.conj(middle) / abs(middle))
     return np.column_stack([z.real, z.imag])
@@ -255,27 +270,28 @@ def _upright(graph: MechanismGraph, z: Complex, outer: list[int]) -> Array:
 # --- without a plane embedding
 
 
-def _with_crossings(graph: MechanismGraph) -> JointLayout:
+def _with_crossings(graph: MechanismGraph, at: list[int], multiple: int) -> JointLayout:
     """Let binary links cross as diagonals of a quadrilateral; where that is not enough, by forces.
 
     These are springs between all joints of a link and repulsion, the best of many starts.
     """
-    own = [[k for k, joint in enumerate(graph.joints) if link in (joint.a, joint.b)] for link in range(graph.links)]
-    if not graph.is_planar and (pairs := crossing_pairs(graph)):
+    links = range(graph.links - multiple)
+    own = [[k for k, joint in zip(at, graph.joints) if link in (joint.a, joint.b)] for link in links]
+    if not multiple and not graph.is_planar and (pairs := crossing_pairs(graph)):
         number = merged(graph, pairs)
         pairs_of = [(number[a], number[b]) for a, b, _ in graph.joints]
         frame = None if graph.frame is None else number[graph.frame]
         simple = MechanismGraph(max(number) + 1, pairs_of, frame=frame)
-        if _embedding(simple) is not None:
+        if _embedding(simple, _places(simple, 0), 0) is not None:
             drawn = layout(simple)
             index = {(a, b): k for k, (a, b, _) in enumerate(simple.joints)}
             places = drawn.positions[[index[min(pair), max(pair)] for pair in pairs_of]]
             polygons = tuple(_around(places, joints) for joints in own)
             return JointLayout(graph, places, polygons, False, len(pairs))
     if max(map(len, own)) < 2:
-        return JointLayout(graph, np.zeros((len(graph.joints), 2)), tuple(map(tuple, own)), True)
-    z, crossings = fewest_crossings(own, len(graph.joints))
-    places = _upright(graph, z, [])
+        return JointLayout(graph, np.zeros((max(at) + 1, 2)), tuple(map(tuple, own)), True)
+    z, crossings = fewest_crossings(own, max(at) + 1)
+    places = _upright(_at_frame(graph, at), z, [])
     return JointLayout(graph, places, tuple(_around(places, joints) for joints in own), False, crossings)
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from graphsynth.synthesis.kernels.layout import HEAVIEST, LEFT, MASK, NEED, U, V, inner
+from graphsynth.core.intrinsics import popcount
+from graphsynth.synthesis.kernels.layout import BETWEEN_PINS, HEAVIEST, KIND_SHIFT, LEFT, MASK, NEED, U, V, inner
 
 _GOLDEN = np.int64(-7046029254386353131)
 _MIX = np.int64(-4658895280553007687)
@@ -100,7 +101,7 @@ def automorphisms(k, mult, perms):
             image[v] = -1
         w = candidate[depth]
         while w < k:
-            if not used[w] and colour[w] == colour[v]:
+            if not used[w] and colour[w] == colour[v] and mult[w, w] == mult[v, v]:
                 fits = True  # as far as the vertices placed before are concerned
                 for i in range(depth):
                     u = order[i]
@@ -136,19 +137,25 @@ def automorphisms(k, mult, perms):
 
 
 @inner
-def critical_sets(k, m, classes, space, subsets, sets):
+def critical_sets(k, m, mult, classes, space, subsets, sets):
     """Find the vertex sets whose sparsity condition is neither automatic nor implied by a smaller set.
 
     A class e (all parallel paths between two vertices) has weight D_e = HEAVIEST_e - y_e with y_e >= 0.  The condition
     sum of D_e inside U <= Pi (|U| - 1) - 1 reads: sum of y_e inside U >= need(U).  U is dropped when need(U) <= 0 or
     when a proper subset needs at least as much.  The whole vertex set is dropped too: there the sum is prescribed.
+    Multiple joints take 1 from the bound each; with them the whole set is looked at (``_is_one_link``).
 
     ``classes`` and ``subsets`` (workspace) are those of ``Work``; of each critical set ``sets`` takes the bit mask of
     the classes inside it (MASK) and its need (NEED).  Returns the number of critical sets, or -1 when there is no room.
     """
-    need = _needs(k, m, classes, space, subsets)
+    need = _needs(k, m, mult, classes, space, subsets)
+    pins = np.int64(0)
+    for v in range(k):
+        pins |= np.int64(mult[v, v]) << v
     count = 0
-    for u in range(3, (1 << k) - 1):
+    for u in range(3, (1 << k) - (pins == 0)):
+        if pins and need[u] > 0 and _is_one_link(k, u, pins, mult):
+            need[u] = 0
         n = need[u]
         if n <= 0 or _is_implied(k, u, n, need, count, sets):
             continue
@@ -166,7 +173,7 @@ def critical_sets(k, m, classes, space, subsets, sets):
 
 
 @inner
-def _needs(k, m, classes, space, subsets):
+def _needs(k, m, mult, classes, space, subsets):
     """Return ``need[u]`` of every vertex set u: doubled vertex by vertex, by what the new one adds to each."""
     need, inside = subsets[0], subsets[1]
     weight = np.zeros((k, k), np.int16)
@@ -174,7 +181,7 @@ def _needs(k, m, classes, space, subsets):
         weight[classes[V, e], classes[U, e]] = classes[HEAVIEST, e]
     need[0] = space + 1
     for v in range(k):
-        inside[0] = -space
+        inside[0] = np.int64(mult[v, v]) - space
         for w in range(v):
             size = 1 << w
             for u in range(size):
@@ -186,6 +193,24 @@ def _needs(k, m, classes, space, subsets):
     for v in range(k):  # single vertices need nothing
         need[1 << v] = 0
     return need
+
+
+@inner
+def _is_one_link(k, u, pins, mult):
+    """Tell whether labels alone decide that what is inside u is one link and joints on it, or not rigid.
+
+    So it is for two vertices, and for one link and multiple joints without a path of weight >= 0 between two of these.
+    """
+    links = popcount(np.uint64(u & ~pins))
+    if popcount(np.uint64(u)) == 2 or links > 1:
+        return links < 2
+    if links == 0:
+        return False
+    for v in range(k):
+        for w in range(v):
+            if (u >> v) & (u >> w) & 1 and mult[v, w] >> KIND_SHIFT == BETWEEN_PINS:
+                return False
+    return True
 
 
 @inner

@@ -177,8 +177,15 @@ def degree_of(k, mult, v):
     """Sum the multiplicities at vertex v."""
     total = 0
     for w in range(k):
-        total += mult[v, w]
+        if w != v:
+            total += mult[v, w] & lay.COPIES_MASK
     return total
+
+
+@inner
+def can_be_frame(k, mult, v, degree):
+    """Tell whether vertex v is a link, with the wanted number of joints (0: any)."""
+    return mult[v, v] == 0 and (degree == 0 or degree_of(k, mult, v) == degree)
 
 
 @kernel
@@ -203,7 +210,7 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
                 continue
             frames = 1 if mode == FRAME_NONE else (k if mode == FRAME_VERTEX else m)
             for frame in range(frames):
-                if mode == FRAME_VERTEX and frame_degree and degree_of(k, mult, frame) != frame_degree:
+                if mode == FRAME_VERTEX and not can_be_frame(k, mult, frame, frame_degree):
                     continue
                 kept = frame_stabiliser(order, mode, frame, work)
                 if kept == 0:  # the first of its orbit stands for this frame

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.compilation import kernel
 from graphsynth.synthesis.kernels.counting import FRAME_NONE, FRAME_PATH, FRAME_VERTEX
-from graphsynth.synthesis.kernels.layout import HEADER, inner
+from graphsynth.synthesis.kernels.layout import COPIES_MASK, HEADER, inner
 
 
 class Expansion(NamedTuple):
@@ -33,7 +33,7 @@ def _expand(k, mult, row, expansion, ends):
     e = 0
     for u in range(k):
         for v in range(u + 1, k):
-            copies = mult[u, v]
+            copies = mult[u, v] & COPIES_MASK
             if copies == 0:
                 continue
             label = row[HEADER + e]
@@ -126,12 +126,29 @@ def _arrange(k, mult, row, expansion, ends, matrix, order, level):
     for j in range(joints):
         matrix[ends[0, j], ends[1, j]] = ends[2, j]
         matrix[ends[1, j], ends[0, j]] = ends[2, j]
-    if frame < 0:
-        return links, frame
-    levels = _level_order(links, frame, matrix, order, level)
-    if not _levels_fit(links, levels, level, expansion):
-        return 0, frame
+    if frame >= 0:
+        levels = _level_order(links, frame, matrix, order, level)
+        if not _levels_fit(links, levels, level, expansion):
+            return 0, frame
+    _put_pins_last(k, mult, links, order, level)
     return links, frame
+
+
+@inner
+def _put_pins_last(k, mult, links, order, other):
+    """Move multiple joints behind all links; the order remains the same otherwise."""
+    count = 0
+    pins = 0
+    for i in range(links):
+        v = order[i]
+        if v < k and mult[v, v]:
+            other[pins] = v
+            pins += 1
+        else:
+            order[count] = v
+            count += 1
+    for i in range(pins):
+        order[count + i] = other[i]
 
 
 @kernel

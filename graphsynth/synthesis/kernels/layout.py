@@ -22,6 +22,11 @@ MAX_CLASSES = 48
 MAX_SETS = 1024
 MAX_ENTRIES = 1 << 18
 MAX_PAIRS = 64
+# entries of the matrix of a contracted graph: 1 on the diagonal for a multiple joint; besides it the number of parallel
+# paths, and what they connect, shifted: two links, a link and a multiple joint, two multiple joints (LOOSE: all of
+# these paths add freedom)
+COPIES_MASK, KIND_SHIFT = 15, 4
+BETWEEN_LINKS, TO_PIN, BETWEEN_PINS, LOOSE = range(4)
 HEADER = 3  # columns of a listed row before the labels: graph, frame mode, frame
 
 # a byte for each critical set: the largest number, the top bits, the lowest bits

@@ -18,7 +18,7 @@ from graphsynth.synthesis.kernels.counting import (
     FRAME_PATH,
     FRAME_VERTEX,
     TOO_LARGE,
-    degree_of,
+    can_be_frame,
     frame_stabiliser,
 )
 from graphsynth.synthesis.kernels.layout import inner
@@ -141,7 +141,7 @@ def _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, wo
                 st[ORDER] = 0
             continue
         st[WITNESS] = -1
-        if st[MODE] == FRAME_VERTEX and frame_degree and degree_of(k, mult, st[FRAME]) != frame_degree:
+        if st[MODE] == FRAME_VERTEX and not can_be_frame(k, mult, st[FRAME], frame_degree):
             continue
         st[KEPT] = frame_stabiliser(st[ORDER], st[MODE], st[FRAME], work)
         if st[KEPT] and st[MODE] == FRAME_PATH:

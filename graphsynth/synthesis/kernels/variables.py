@@ -24,7 +24,7 @@ def load_graph(k, mult, tables, work):
                 work.class_of[u, v] = m
                 work.class_of[v, u] = m
                 m += 1
-    return m, critical_sets(k, m, work.classes, tables.space, work.subsets, work.sets)
+    return m, critical_sets(k, m, mult, work.classes, tables.space, work.subsets, work.sets)
 
 
 @inner
