@@ -1,6 +1,7 @@
 __version__: str
 
 from .atlas.catalogue import Catalogue as Catalogue
+from .atlas.dataset import Dataset as Dataset
 from .core.angles import degrees as degrees
 from .core.errors import GraphsynthError as GraphsynthError
 from .design.parts.api import parts as parts

@@ -49,7 +49,7 @@ NOT_RUN = {
 }
 SLOW = r"catalog |animate|worked-example|^design |graphsynth-out"
 #: Commands that need an optional package, and which one.
-NEEDS = {r"\.dxf\b|--form (dxf|stl)": "ezdxf", r"parquet": "pyarrow"}
+NEEDS = {r"\.dxf\b|--form (dxf|stl)": "ezdxf", r"parquet": "pyarrow", r"dataset": "duckdb"}
 
 
 def commands():

@@ -48,6 +48,14 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
         raise
 
 
+def is_planar(edges: str) -> bool:
+    """Whether a contracted graph, as text, and so each chain that it makes, can be drawn without crossings."""
+    import networkx
+
+    pairs = [edge.partition("x")[0].split("-") for edge in edges.split()]
+    return bool(networkx.check_planarity(networkx.Graph(pairs))[0])
+
+
 class Writer:
     """Writes rows and numbers what they refer to, in the order of first appearance in the file."""
 
@@ -85,11 +93,8 @@ class Writer:
 
     def _of_contracted(self, vertices: int, edges: str) -> tuple[int, int]:
         """Return (number, whether it is planar) of a contracted graph, of which the chain is a subdivision."""
-        import networkx
-
         if edges not in self._planar:
-            pairs = [edge.partition("x")[0].split("-") for edge in edges.split()]
-            self._planar[edges] = int(networkx.check_planarity(networkx.Graph(pairs))[0])
+            self._planar[edges] = int(is_planar(edges))
         values = {"edges": edges, "vertices": vertices, "planar": self._planar[edges]}
         return self._number("contracted", "contracted_id", values), self._planar[edges]
 

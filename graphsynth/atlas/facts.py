@@ -96,7 +96,7 @@ def analyse_block(links: int, mobility: int, packed: Bytes) -> Block:
 def rows_of(block: Block, rows: Rows) -> None:
     """Append the rows of a block; what is in ``rows`` already keeps its place."""
     start = len(rows.chains)
-    rows.chains += zip(*_columns(block), _contracted(block, rows))
+    rows.chains += zip(*_columns(block), contracted_of(block, rows))
     for c, orbit in enumerate(block.orbit.tolist()):
         levels = block.levels[c].tolist()
         for frame in sorted(set(orbit)):
@@ -105,7 +105,7 @@ def rows_of(block: Block, rows: Rows) -> None:
     n = block.orbit.shape[1]
     chains, places = np.nonzero(block.parents[:, :, 0])
     streams = _lines(block.parents[chains, places, 1 : 1 + _stream(n - 2)]) if len(chains) else []
-    rows.dyads += sorted({(start + c, _key(n - 2, stream)) for c, stream in zip(chains.tolist(), streams)})
+    rows.dyads += sorted({(start + c, chain_key(n - 2, stream)) for c, stream in zip(chains.tolist(), streams)})
     _mechanisms(block, start, rows)
 
 
@@ -113,14 +113,12 @@ def _columns(block: Block) -> Iterator[Iterable[Any]]:
     """Columns of the chains, without the last one."""
     count, n = block.orbit.shape
     joints = block.joints.shape[1]
-    yield [_key(n, stream) for stream in _lines(block.keys)]
-    yield _graph6(n, block.keys)
+    yield [chain_key(n, stream) for stream in _lines(block.keys)]
+    yield graph6_of(n, block.keys)
     yield [n] * count
     yield [joints] * count
     yield [joints - n + 1] * count
-    degrees = (block.joints.reshape(count, -1)[:, :, None] == np.arange(n)).sum(axis=1)
-    kinds = (degrees[:, :, None] == np.arange(n)).sum(axis=1)
-    yield ["-".join(map(str, kind[2 : top + 1])) for kind, top in zip(kinds.tolist(), degrees.max(axis=1).tolist())]
+    yield assortments(block)
     yield block.order.tolist()
     orbits = block.orbit.tolist()
     yield [_orbits(orbit) for orbit in orbits]
@@ -129,17 +127,26 @@ def _columns(block: Block) -> Iterator[Iterable[Any]]:
     yield (block.cuts != 0).astype(int).tolist()
 
 
+def assortments(block: Block) -> list[str]:
+    """Numbers of links with 2, 3, ... joints of every chain, as text: '4-4'."""
+    count, n = block.orbit.shape
+    degrees = (block.joints.reshape(count, -1)[:, :, None] == np.arange(n)).sum(axis=1)
+    kinds = (degrees[:, :, None] == np.arange(n)).sum(axis=1)
+    return ["-".join(map(str, kind[2 : top + 1])) for kind, top in zip(kinds.tolist(), degrees.max(axis=1).tolist())]
+
+
 def _lines(array: Bytes) -> list[bytes]:
     """Rows of an array as bytes."""
     data, width = np.ascontiguousarray(array).tobytes(), array.shape[1]
     return [data[at : at + width] for at in range(0, len(data), width)]
 
 
-def _key(links: int, stream: bytes, flags: int = 0) -> str:
+def chain_key(links: int, stream: bytes, flags: int = 0) -> str:
+    """Write the bits of a canonical graph of revolute joints as its key."""
     return KEY_VERSION + urlsafe_b64encode(bytes((links, 3 | flags)) + stream).decode("ascii").rstrip("=")
 
 
-def _graph6(links: int, keys: Bytes) -> list[str]:
+def graph6_of(links: int, keys: Bytes) -> list[str]:
     """Write canonical graphs as graph6: the bits of the key, six to a letter."""
     size = links * (links - 1) // 2
     bits = np.zeros((len(keys), -(-size // 6) * 6), np.uint8)
@@ -156,7 +163,7 @@ def _orbits(orbit: list[int]) -> str:
     return " ".join(",".join(links) for links in members.values())
 
 
-def _contracted(block: Block, rows: Rows) -> list[int]:
+def contracted_of(block: Block, rows: Rows) -> list[int]:
     """Place of the contracted graph of every chain, in the order of first appearance."""
     known: dict[bytes, int] = {}
     lines = _lines(block.contracted)
@@ -178,12 +185,33 @@ def edges_text(vertices: int, matrix: bytes) -> str:
 
 def _mechanisms(block: Block, start: int, rows: Rows) -> None:
     """Append mechanisms, and the structures and groups they are the first to have."""
+    chains, frames, drives, structures = mechanisms_of(block, rows)
+    names = {mask: driven_text(mask) for mask in set(drives.tolist())}
+    drivers = (names[mask] for mask in drives.tolist())
+    rows.mechanisms += zip((start + chains).tolist(), frames.tolist(), drivers, structures.tolist(), strict=True)
+
+
+def driven_text(mask: int) -> int | str:
+    """Name driven links: a number, or text for several.
+
+    >>> driven_text(2), driven_text(10)
+    (1, '1,3')
+    """
     from graphsynth.structure.connectivity import bits
 
+    links = bits(mask)
+    return links[0] if len(links) == 1 else ",".join(map(str, links))
+
+
+def mechanisms_of(block: Block, rows: Rows) -> tuple[NDArray[np.int64], Bytes, NDArray[np.uint64], NDArray[np.int64]]:
+    """Return chain, frame, mask of driven links and structure of each mechanism of a block.
+
+    Structures and groups that are the first of their kind are appended to ``rows``.
+    """
     filled = np.arange(block.frames.shape[1]) < block.mechanisms[:, None]
     chains = np.nonzero(filled)[0]
     if not len(chains):
-        return
+        return chains, block.frames[filled], block.drives[filled], chains
     # a mechanism is described by the sizes and forms of its groups: distinct descriptions, numbered by appearance
     sizes, outers, forms = block.sizes[filled], block.outers[filled], block.forms[filled]
     whole = np.concatenate([sizes[:, :, None], np.where(sizes[:, :, None] > 0, forms, np.uint8(0))], axis=2)
@@ -192,14 +220,7 @@ def _mechanisms(block: Block, start: int, rows: Rows) -> None:
     order = np.argsort(first)
     place = np.empty(len(order), np.int64)
     place[order] = _structures(sizes[first[order]], outers[first[order]], forms[first[order]], rows)
-    names: dict[int, int | str] = {}  # of driven links: a number, or text for several
-    drives = block.drives[filled].tolist()
-    for mask in set(drives):
-        links = bits(mask)
-        names[mask] = links[0] if len(links) == 1 else ",".join(map(str, links))
-    drivers, structures = (names[mask] for mask in drives), place[which.ravel()].tolist()
-    frames = block.frames[filled].tolist()
-    rows.mechanisms += zip((start + chains).tolist(), frames, drivers, structures, strict=True)
+    return chains, block.frames[filled], block.drives[filled], place[which.ravel()]
 
 
 def _structures(sizes: Bytes, outers: Bytes, forms: Bytes, rows: Rows) -> list[int]:
@@ -217,7 +238,7 @@ def _structures(sizes: Bytes, outers: Bytes, forms: Bytes, rows: Rows) -> list[i
     classes_of(vertices, streams, classes)
     numbers: dict[tuple[int, int, bytes], int] = {}
     for (links, order, form), own in zip(known, classes.tolist(), strict=True):
-        row = GroupRow(_key(links + 1, form[: _stream(links + 1)], _FRAMED), links, order, own)
+        row = GroupRow(chain_key(links + 1, form[: _stream(links + 1)], _FRAMED), links, order, own)
         numbers[links, order, form] = rows.groups.setdefault(row, len(rows.groups))
     places = (tuple(numbers[group] for group in groups) for groups in lists)
     return [rows.structures.setdefault(own, len(rows.structures)) for own in places]

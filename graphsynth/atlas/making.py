@@ -22,6 +22,7 @@ from graphsynth.core.errors import SpecError, TooLargeError
 from graphsynth.synthesis.chunks import Chunk, estimates
 
 if TYPE_CHECKING:
+    from graphsynth.atlas.kernels.facts import Block
     from graphsynth.synthesis.problem import EnumerationProblem, WorkItem
 
 Watch = Callable[[BuildStep], None]
@@ -194,15 +195,21 @@ def share_of(tasks: list[Task], shard: tuple[int, int] | None) -> list[Task]:
     return tasks[own.start : own.stop]
 
 
-def rows_of_task(task: Task) -> Rows:
-    """Return the rows of all chains of a piece (computed in the worker)."""
+def blocks_of(task: Task) -> Iterator[Block]:
+    """Yield the facts of all chains of a piece (computed in the worker)."""
     if isinstance(task.piece, Chunk):
         blocks = task.piece.packed()
     else:
         graphs = [graph.packed for graph in task.piece.graphs()]
         blocks = iter([np.frombuffer(b"".join(graphs), np.uint8).reshape(len(graphs), -1)] if graphs else [])
-    rows = Rows()
     for packed in blocks:
         for at in range(0, len(packed), _CHAINS_AT_ONCE):
-            rows_of(analyse_block(task.links, task.mobility, packed[at : at + _CHAINS_AT_ONCE]), rows)
+            yield analyse_block(task.links, task.mobility, packed[at : at + _CHAINS_AT_ONCE])
+
+
+def rows_of_task(task: Task) -> Rows:
+    """Return the rows of all chains of a piece (computed in the worker)."""
+    rows = Rows()
+    for block in blocks_of(task):
+        rows_of(block, rows)
     return rows

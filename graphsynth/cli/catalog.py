@@ -1,4 +1,4 @@
-"""``graphsynth catalog``: build, evaluate, query, verify, export, merge, site."""
+"""``graphsynth catalog``: build, dataset, evaluate, query, verify, export, merge, site."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import argparse
 import json
 import math
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -28,16 +30,25 @@ _MANY = 1000
 
 def run(options: argparse.Namespace) -> int:
     """Do one action of the verb."""
-    actions = (_build, _query, _verify, _export, _merge, _evaluate, _site)
+    actions = (_build, _dataset, _query, _verify, _export, _merge, _evaluate, _site)
     return {action.__name__[1:]: action for action in actions}[options.action](options)
 
 
 def _build(options: argparse.Namespace) -> int:
+    begin = time.perf_counter()
+    with _building(options) as more:
+        for mobility in options.mobility:
+            Catalogue.build(options.output, options.links, mobility, **more).close()
+    return _summary(options, begin)
+
+
+@contextmanager
+def _building(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    """Give what a build takes beside its question: who computes, and who is told; say what stays when it is stopped."""
     from graphsynth.atlas import making
     from graphsynth.synthesis.writing import Step
 
     big = max(options.links) > 10 + min(options.mobility)  # more than a second of work
-    begin = time.perf_counter()
     try:
         with console.executor(options, making.processes, big) as executor, console.progress("building") as bar:
 
@@ -45,20 +56,35 @@ def _build(options: argparse.Namespace) -> int:
                 if bar:
                     bar(Step(step.chains, step.done))
 
-            for mobility in options.mobility:
-                Catalogue.build(
-                    options.output,
-                    options.links,
-                    mobility,
-                    fractionated=options.fractionated,
-                    executor=executor,
-                    shard=options.shard,
-                    watch=watch,
-                ).close()
+            own = {"fractionated": options.fractionated, "shard": options.shard}
+            yield {**own, "executor": executor, "watch": watch}
     except KeyboardInterrupt:
         console.note(f"{options.output} keeps what is written: give the same command to go on")
         raise
-    return _summary(options, begin)
+
+
+def _dataset(options: argparse.Namespace) -> int:
+    """Make a data set and say what it holds."""
+    from graphsynth.atlas.dataset import Dataset
+
+    begin = time.perf_counter()
+    with _building(options) as more:
+        for mobility in options.mobility:
+            data = Dataset.build(options.output, options.links, mobility, mechanisms=not options.chains_only, **more)
+    size = sum(path.stat().st_size for path in options.output.rglob("*") if path.is_file())
+    seconds = round(time.perf_counter() - begin, 3)
+    if options.json:
+        held = {"bytes": size, "seconds": seconds, "families": _records(data.families)}
+        console.put_json({"folder": str(options.output), **held})
+        return 0
+    _put_frame(data.families)
+    part = (
+        ""
+        if options.shard is None
+        else ", part {}/{} made: give the command without --shard at last".format(*options.shard)
+    )
+    console.put(f"{options.output}: {len(data)} chains{part}, {size / 1e6:.1f} MB ({seconds:.1f} s)")
+    return 0
 
 
 def _summary(options: argparse.Namespace, begin: float) -> int:
@@ -81,6 +107,8 @@ def _summary(options: argparse.Namespace, begin: float) -> int:
 def _query(options: argparse.Namespace) -> int:
     if sum((options.sql is not None, options.entry is not None, options.where != "1")) > 1:
         raise SpecError("give one of --where, --sql and --entry")
+    if options.file.is_dir():
+        return _put_answer(_asked_dataset(options), options)
     with Catalogue(options.file) as catalogue:
         if options.entry is not None:
             with catalogue.reading():  # what is printed may be of any type
@@ -91,6 +119,24 @@ def _query(options: argparse.Namespace) -> int:
             frame = catalogue.sql(options.sql, limit=limit, seconds=seconds)
         else:
             frame = catalogue.query(options.table, options.where, limit=limit, seconds=seconds)
+    return _put_answer(frame, options)
+
+
+def _asked_dataset(options: argparse.Namespace) -> pd.DataFrame:
+    """Ask a data set."""
+    from graphsynth.atlas.dataset import TABLES, Dataset
+
+    if options.entry is not None:
+        raise SpecError("--entry asks a catalogue, and this is a data set; ask it by --sql")
+    if options.table not in TABLES:
+        raise SpecError(f"a data set has no table {options.table!r}; choose {' or '.join(TABLES)}")
+    sql = options.sql or f"SELECT * FROM {options.table} WHERE {options.where}"
+    frame = Dataset(options.file).query(sql, limit=options.limit or None)
+    frame.attrs.setdefault("more", False)
+    return frame
+
+
+def _put_answer(frame: pd.DataFrame, options: argparse.Namespace) -> int:
     more = frame.attrs["more"]
     if options.json:
         console.put_json({"rows": None if more else len(frame), "shown": _records(frame)})
@@ -126,7 +172,24 @@ def _put_entry(catalogue: Catalogue, options: argparse.Namespace) -> None:
                 _put(f"  driver {own['driver']}: class {own['class']}, order {own['order']}: {'; '.join(words)}")
 
 
+def _verify_dataset(options: argparse.Namespace) -> int:
+    from graphsynth.atlas.dataset import Dataset
+
+    found = Dataset(options.file).verify()
+    if options.json:
+        document = {"passed": found.passed, "differences": list(found.differences)}
+        console.put_json({**document, "files": found.files, "rows": found.rows})
+    else:
+        for difference in found.differences:
+            _put(difference)
+        told = "as they were made and counted" if found.passed else "that is not as it was made"
+        console.put(f"{options.file}: {found.files} files, {found.rows} rows, {told}")
+    return 0 if found.passed else DIFFERENT
+
+
 def _verify(options: argparse.Namespace) -> int:
+    if options.file.is_dir():
+        return _verify_dataset(options)
     with Catalogue(options.file) as catalogue:
         found = catalogue.verify(chains=options.chains, seed=options.seed, quick=options.quick)
     if options.json:

@@ -178,7 +178,7 @@ _EXECUTOR = (
     _option("--executor", "who computes (default processes)", choices=("processes", "dask"), default="processes"),
     _option("--scheduler ADDRESS", "dask scheduler, for example tcp://node1:8786"),
 )
-_FILE = _option("FILE", "the catalogue", Path, dest="file")
+_FILE = _option("FILE", "the catalogue (query, verify: or the folder of a data set)", Path, dest="file")
 _CATALOG = "Build, evaluate, ask, check, export and merge catalogues of chains and mechanisms."
 _ACTIONS: dict[str, tuple[str, *tuple[Option, ...]]] = {
     "build": (
@@ -191,8 +191,19 @@ _ACTIONS: dict[str, tuple[str, *tuple[Option, ...]]] = {
         _option("--workers K", "worker processes (default: all cores)", workers),
         *_EXECUTOR,
     ),
+    "dataset": (
+        "Write all chains and mechanisms as Parquet files with a manifest, or go on with them.",
+        _option("--links N..M", "numbers of links, 18 at most", numbers, required=True),
+        _option("--mobility W", "mobility, or W..V (default 1)", numbers, default=[1]),
+        _option("--fractionated", "for W >= 2: include chains that one link or joint holds together"),
+        _option("--chains-only", "leave out the mechanisms: forty for each chain of 14 links"),
+        _option("-o --output DIR", "folder of the data set (default dataset)", Path, default=Path("dataset")),
+        _SHARD,
+        _option("--workers K", "worker processes (default: all cores)", workers),
+        *_EXECUTOR,
+    ),
     "query": (
-        "Ask a catalogue.",
+        "Ask a catalogue, or a data set in SQL.",
         _FILE,
         _option("--where CONDITION", "SQL condition on the rows of the table", default="1"),
         _option("--table NAME", "table (default chains)", default="chains"),
