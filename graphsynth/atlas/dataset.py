@@ -190,7 +190,8 @@ class Dataset(Shown):
         try:
             answer = self._connection.execute(sql, list(parameters))
             if limit is None:
-                return answer.df()  # type: ignore[no-any-return]
+                whole: pd.DataFrame = answer.df()
+                return whole
             chunks = [answer.fetch_df_chunk()]
             while len(chunks[-1]) and sum(map(len, chunks)) <= limit:
                 chunks.append(answer.fetch_df_chunk())
@@ -367,7 +368,7 @@ class _Family:
         data = Dataset(self.folder)
         rows = {table: sum(own["rows"][table] for own in parts) for table in TABLES}
         labelled = str(sum(int(own["labelled"]) for own in parts))
-        mine = {"mobility": self.mobility, "links": self.links, "fractionated": self.fractionated}
+        mine: dict[str, Any] = {"mobility": self.mobility, "links": self.links, "fractionated": self.fractionated}
         mine |= {"counted": counted, "rows": rows, "labelled": labelled, "parts": parts}
         others = [own for key, own in data._rows.items() if key != (self.mobility, self.links)]
         _write_manifest(self.folder, sorted([*others, mine], key=lambda own: (own["mobility"], own["links"])))

@@ -79,8 +79,8 @@ def make_part(job: Job) -> Part:
         kinds += assortments(block)
         shapes += contracted_of(block, rows)
         if job.mechanisms:
-            chains, *rest = mechanisms_of(block, rows)
-            driven.append((start + chains, *rest))
+            chains, frames, drives, structures = mechanisms_of(block, rows)
+            driven.append((start + chains, frames, drives, structures))
         start += len(block.keys)
     if not start:
         return Part(job.number, {}, {"chains": 0, "mechanisms": 0}, 0)
