@@ -54,6 +54,7 @@ from .pipeline.runner import run as run
 from .structure.graph import Joint as Joint, MechanismGraph as MechanismGraph
 from .structure.modes import count_assembly_modes as count_assembly_modes, coupler_curve_degree as coupler_curve_degree
 from .structure.multiple_joints import MultipleJointChain as MultipleJointChain
+from .structure.slider_chains import SliderChain as SliderChain
 from .structure.system.assortment import LinkAssortment as LinkAssortment
 from .structure.system.spec import StructuralSpec as StructuralSpec
 from .synthesis.api import (
@@ -70,6 +71,10 @@ from .synthesis.api import (
 from .synthesis.multiple_joints import (
     count_multiple_joint_chains as count_multiple_joint_chains,
     enumerate_multiple_joint_chains as enumerate_multiple_joint_chains,
+)
+from .synthesis.sliders import (
+    count_slider_chains as count_slider_chains,
+    enumerate_slider_chains as enumerate_slider_chains,
 )
 from .systems.antenna.mechanism import PointingMechanism as PointingMechanism
 from .systems.lambda_linkage.model import LambdaLinkage as LambdaLinkage

@@ -44,8 +44,8 @@ def run(options: argparse.Namespace) -> int:
             for data in blocks:
                 sys.stdout.buffer.write(data)
             return 0
-        if entry is not None and options.multiple_joints is not None:
-            raise SpecError(f"{options.output.suffix} has no place for multiple joints: use .txt or .jsonl")
+        if entry is not None and (options.multiple_joints or options.sliders):
+            raise SpecError(f"{options.output.suffix} has no place for such joints: use .txt or .jsonl")
         if entry is not None and (options.resume or options.json):
             raise SpecError(
                 f"{options.output.suffix} is written in one piece: use .g6 or .jsonl with --resume or --json"

@@ -81,8 +81,9 @@ def problem_of(options: argparse.Namespace, *, counted: bool = False) -> Enumera
             raise SpecError(f"Pi = {space} must be a whole number from 2 to 6")
         links = options.truss if options.assur is None else options.assur + 1
         return EnumerationProblem.trusses(links, int(space), options.assur is not None)
-    if options.multiple_joints is not None:
-        return _with_multiple_joints(options, given)
+    slides = options.cylinders or options.sliding_links or options.sliding_loops
+    if options.multiple_joints is not None or options.sliders is not None or slides:
+        return _with_special_joints(options, given)
     if options.frame or options.spec or options.set or set(given) - _OF_CHAINS:
         spec = spec_of(options)
         if spec.bounds("W") == (None, None) and "p" not in spec.ranges:
@@ -100,21 +101,33 @@ def problem_of(options: argparse.Namespace, *, counted: bool = False) -> Enumera
     return EnumerationProblem.chains(*numbers, counted=counted)
 
 
-def _with_multiple_joints(options: argparse.Namespace, given: dict[str, str]) -> EnumerationProblem:
+def _with_special_joints(options: argparse.Namespace, given: dict[str, str]) -> EnumerationProblem:
+    """Return the question of chains with multiple or prismatic joints."""
     from graphsynth.synthesis.problem import EnumerationProblem
 
+    name, number = ("multiple-joints", options.multiple_joints)
+    slides = options.cylinders, options.sliding_links, options.sliding_loops
+    if number is None:
+        name, number = "sliders", options.sliders
+    elif options.sliders is not None or any(slides):
+        raise SpecError("--multiple-joints and --sliders ask for different things: give one of them")
     others = sorted(set(given) - {"N", "W"})
     if others or options.spec or options.set or options.fractionated or options.symmetry or "N" not in given:
         raise SpecError(
-            f"--multiple-joints takes --links, --mobility and --frame, and needs --links (given besides: "
+            f"--{name} takes --links, --mobility and --frame, and needs --links (given besides: "
             f"{', '.join(others) or 'more'}): leave the rest out"
         )
-    number = options.multiple_joints
-    for text in (given["N"], given.get("W", "1"), "1" if number == "any" else number):
+    any_number = number == "any" and name != "sliders"
+    for text in (given["N"], given.get("W", "1"), "1" if any_number else number or ""):
         if not text.isdecimal():
-            raise SpecError(f"{text} must be a whole number for chains with multiple joints")
-    multiple = None if number == "any" else int(number)
-    return EnumerationProblem.multiple_joints(int(given["N"]), int(given.get("W", "1")), multiple, framed=options.frame)
+            raise SpecError(f"{text or 'nothing'} must be a whole number for chains with --{name}")
+    links, mobility = int(given["N"]), int(given.get("W", "1"))
+    if name == "sliders":
+        cylinders, links_slide, loops_slide = slides
+        loose = links_slide, loops_slide, cylinders, options.frame
+        return EnumerationProblem.sliders(links, int(number), mobility, *loose)
+    multiple = None if any_number else int(number)
+    return EnumerationProblem.multiple_joints(links, mobility, multiple, framed=options.frame)
 
 
 def shard(text: str) -> tuple[int, int]:

@@ -23,8 +23,8 @@ PICTURES = (".svg", ".png", ".pdf", ".tikz", ".tex", ".dxf")
 
 def run(options: argparse.Namespace) -> int:
     """Describe one graph, and draw it if asked."""
-    if re.search(r"^1m[0-9]| m[0-9]{1,3}$", options.graph):
-        return _with_multiple_joints(options)
+    if re.search(r"^1m[0-9]| m[0-9]{1,3}$|^1p\.| P:", options.graph):
+        return _with_special_joints(options)
     graph = read_graph(options.graph, options.line)
     if options.output:
         from graphsynth.formats.registry import FORMATS, write
@@ -48,11 +48,14 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _with_multiple_joints(options: argparse.Namespace) -> int:
+def _with_special_joints(options: argparse.Namespace) -> int:
+    """Describe and draw a chain with multiple or prismatic joints."""
     from graphsynth.structure.multiple_joints import MultipleJointChain
+    from graphsynth.structure.slider_chains import SliderChain
 
     text = options.graph
-    chain = MultipleJointChain.from_key(text) if " " not in text else MultipleJointChain.from_text(text)
+    kind = SliderChain if text.startswith("1p.") or " P:" in text else MultipleJointChain
+    chain = kind.from_text(text) if " " in text else kind.from_key(text)
     if options.output:
         check_place(options.output, PICTURES)
         chain.draw(options.output, driver=options.driver)
@@ -61,9 +64,7 @@ def _with_multiple_joints(options: argparse.Namespace) -> int:
         "text": chain.to_text(),
         "links": chain.links,
         "joints": " ".join("-".join(map(str, joint)) for joint in chain.joints),
-        "multiple joints": chain.multiple,
         "mobility": chain.mobility,
-        "loops": chain.loops,
         "automorphisms": chain.automorphism_order,
     }
     if options.json:

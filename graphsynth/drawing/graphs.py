@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Mapping
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import GraphError
 from graphsynth.drawing.diagram import mechanism_sketch
 from graphsynth.drawing.sketch import Sketch
-from graphsynth.mechanism.joints import JointGeometry, PinSlot, Revolute
+from graphsynth.mechanism.joints import JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.dimensional.sketch import JointLayout
     from graphsynth.structure.graph import MechanismGraph
     from graphsynth.structure.multiple_joints import MultipleJointChain
+    from graphsynth.structure.slider_chains import SliderChain
 
 
 def graph_sketch(
@@ -71,10 +73,39 @@ def multiple_joint_sketch(
     return sketch, pose
 
 
-def _sketched(
-    graph: MechanismGraph, places: JointLayout, number: dict[tuple[int, int], int], driver: int | None, options: Any
+def slider_sketch(
+    chain: SliderChain, *, driver: int | None = None, **options: Any
 ) -> tuple[Sketch, list[tuple[float, float, float]]]:
-    """Draw a graph whose joints have the places of these numbers."""
+    """Build the kinematic diagram of a chain with prismatic joints, these as blocks on guides; as `graph_sketch`.
+
+    A guide points to the middle of a link, unless another one of its two links does so: no two on a link are parallel.
+    """
+    from graphsynth.kinematics.dimensional.sketch import layout
+
+    graph = chain.graph
+    places = layout(graph)
+    number = {(a, b): k for k, (a, b, _) in enumerate(graph.joints)}
+    ways: dict[tuple[int, int], float] = {}
+    for a, b in chain.sliders:
+        at = complex(*places.positions[number[a, b]])
+        middles = [complex(*places.outline(link).mean(axis=0)) - at for link in (a, b)]
+        wanted = [cmath.phase(way) for way in middles if abs(way) > 1e-9]
+        wanted += [k * math.pi / 6 for k in range(6)]
+        others = [way for pair, way in ways.items() if {a, b} & set(pair)]
+        apart = [min((abs(math.sin(way - other)) for other in others), default=1.0) > 0.4 for way in wanted]
+        ways[a, b] = wanted[apart.index(True) if any(apart) else 0]
+    return _sketched(graph, places, number, driver, options, ways)
+
+
+def _sketched(
+    graph: MechanismGraph,
+    places: JointLayout,
+    number: dict[tuple[int, int], int],
+    driver: int | None,
+    options: Any,
+    ways: Mapping[tuple[int, int], float] | None = None,
+) -> tuple[Sketch, list[tuple[float, float, float]]]:
+    """Draw a graph whose joints have the places of these numbers; of prismatic joints the directions are given."""
     framed = graph if graph.frame is not None else graph.with_frame(0)
     if driver is not None and not any({driver, graph.frame} == {a, b} for a, b, _ in graph.joints):
         raise GraphError(f"driver {driver} is not jointed to the frame; choose a link that is")
@@ -83,6 +114,9 @@ def _sketched(
     joints: list[JointGeometry] = []
     for a, b, mobility in graph.joints:
         x, y = map(float, places.positions[number[a, b]])
+        if ways and (a, b) in ways:
+            joints.append(Prismatic(a, b, (x, y), (x, y), ways[a, b], ways[a, b]))
+            continue
         if mobility == 1:
             joints.append(Revolute(a, b, (x, y), (x, y)))
             continue

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
     from graphsynth.structure.multiple_joints import MultipleJointChain
+    from graphsynth.structure.slider_chains import SliderChain
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,6 +82,13 @@ def draw_multiple_joints(chain: MultipleJointChain, path: str | Path | None, **o
     from graphsynth.drawing.graphs import multiple_joint_sketch
 
     return _drawing(*multiple_joint_sketch(chain, **options), path)
+
+
+def draw_sliders(chain: SliderChain, path: str | Path | None, **options: Any) -> Drawing:
+    """Work of `SliderChain.draw`."""
+    from graphsynth.drawing.graphs import slider_sketch
+
+    return _drawing(*slider_sketch(chain, **options), path)
 
 
 def graph_picture(graph: MechanismGraph) -> str:

@@ -13,3 +13,4 @@ from .multiple_joints import (
     count_multiple_joint_chains as count_multiple_joint_chains,
     enumerate_multiple_joint_chains as enumerate_multiple_joint_chains,
 )
+from .sliders import count_slider_chains as count_slider_chains, enumerate_slider_chains as enumerate_slider_chains

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import TooLargeError
-from graphsynth.synthesis.edge_labels import EdgeLabels
+from graphsynth.synthesis.edge_labels import SLIDER, EdgeLabels
 from graphsynth.synthesis.families import Family, Levels
 from graphsynth.synthesis.kernels.counting import NO_ROOM, count_block
 from graphsynth.synthesis.kernels.layout import HEADER, Work, make_work
@@ -25,6 +25,7 @@ LISTING_SIZE = 200_000.0  # bound on the labellings of a chunk to list, before s
 COUNTING_SIZE = 512  # contracted graphs in a chunk to count
 _ROWS = 4096
 _MOST_STATES = 1 << 24
+_SLIDES = 2  # where a joint of mobility 2 would be written; chains with prismatic joints have none
 _ONE_BYTE = 62  # most links whose number the text form writes in one byte, as the kernel does
 
 
@@ -87,7 +88,8 @@ class Chunk:
         out = np.empty(_ROWS * line, np.uint8)
         for rows, count in self._blocks():
             size, kept = expand_text(family.vertices, family.links, family.graphs, rows, count, expansion, *form, out)
-            yield out[:size].tobytes(), kept
+            text = out[:size].tobytes()
+            yield text.replace(b" 2:", b" P:") if SLIDER in dict(family.higher) else text, kept
 
     def _blocks(self) -> Iterator[tuple[NDArray[np.int32], int]]:
         """Stream the labellings as (rows, count); the rows are overwritten by the next step."""
@@ -200,7 +202,7 @@ def expansion_of(edge_labels: EdgeLabels, levels: Levels) -> Expansion:
     for i, label in enumerate(labels):
         paths[i, : len(label.paths)] = [number[path] for path in label.paths]
     for path, i in number.items():
-        joints[i, : len(path)] = path
+        joints[i, : len(path)] = [_SLIDES if mobility == SLIDER else mobility for mobility in path]
     return Expansion(
         label_paths=paths,
         label_mark=np.array([label.mark for label in labels] or [0], np.int32),

@@ -12,18 +12,42 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import product
+from itertools import pairwise, product
 from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import TooLargeError
-from graphsynth.synthesis.kernels.layout import BETWEEN_LINKS, COPIES_MASK, KIND_SHIFT, LOOSE, TO_PIN, Tables
+from graphsynth.synthesis.kernels.layout import (
+    BETWEEN_LINKS,
+    COPIES_MASK,
+    KIND_SHIFT,
+    LOOSE,
+    NO_SLIDING_LINK,
+    NO_SLIDING_LOOP,
+    TO_PIN,
+    Tables,
+)
 
 PathType = tuple[int, ...]
 _MAX_LABELS = 2_000_000
+#: Stands for a prismatic joint, which has mobility 1 as a revolute one, in types of paths and in ``higher``.
+SLIDER = 9
+#: Besides the rules of the kernels: prismatic joints only between two binary links with a revolute joint each.
+CYLINDERS = 4
 _DIGIT = 8
+
+
+def freedom(path: PathType) -> int:
+    """Return the sum F of the mobilities of a path."""
+    return sum(path) - (SLIDER - 1) * path.count(SLIDER)
+
+
+def may_slide(path: PathType, rules: int) -> bool:
+    """Tell whether the binary links of a path have the revolute joints that the rules want."""
+    cylinders = not rules & CYLINDERS or (path[0] != SLIDER and path[-1] != SLIDER)
+    return cylinders and not (rules & (NO_SLIDING_LINK | CYLINDERS) and (SLIDER, SLIDER) in pairwise(path))
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +68,12 @@ class EdgeLabel:
             return EdgeLabel((paths[0], *sorted(paths[1:])), len(paths[0]) - self.mark)
         return EdgeLabel(tuple(sorted(paths)), 0)
 
+    def cover(self) -> int:
+        """Return which revolute joints the label gives: see ``graphsynth.synthesis.kernels.covers``."""
+        low, high = (any(path[end] != SLIDER for path in self.paths) for end in (0, -1))
+        fewest = min(len(path) - path.count(SLIDER) for path in self.paths)
+        return low + 2 * high + 4 * min(2, fewest)
+
     def fold(self) -> int:
         """Return the largest number of equal paths, the marked one excluded."""
         free = self.paths[1:] if self.mark else self.paths
@@ -62,6 +92,7 @@ class EdgeLabels:
     #: the two end vertices are the whole contracted graph (only then may a Baranov truss have weight Pi there)
     whole: bool
     pins: bool = False  # some vertices are multiple joints
+    rules: int = 0  # of prismatic joints: NO_SLIDING_LINK + NO_SLIDING_LOOP + CYLINDERS
 
     @property
     def _lend(self) -> int:
@@ -75,7 +106,7 @@ class EdgeLabels:
         return (self.binary_links, *(count for _, count in self.higher), *lend)
 
     def _cost(self, path: PathType) -> tuple[int, ...]:
-        lend = (max(0, sum(path) - self.space),) if self.mobility > 1 else ()
+        lend = (max(0, freedom(path) - self.space),) if self.mobility > 1 else ()
         return (len(path) - 1, *(path.count(i) for i, _ in self.higher), *lend)
 
     def _fits(self, cost: tuple[int, ...]) -> bool:
@@ -91,7 +122,7 @@ class EdgeLabels:
             path
             for length in range(1, longest + 1)
             for path in product(mobilities, repeat=length)
-            if self.space - sum(path) >= lightest and self._fits(self._cost(path))
+            if self.space - freedom(path) >= lightest and self._fits(self._cost(path)) and may_slide(path, self.rules)
         ]
         return tuple(sorted(found))
 
@@ -107,7 +138,7 @@ class EdgeLabels:
             if len(path) == 1 and direct:
                 continue
             total = tuple(a + b for a, b in zip(cost, self._cost(path)))
-            heavier = weight + max(0, self.space - sum(path))
+            heavier = weight + max(0, self.space - freedom(path))
             if heavier > heaviest or not self._fits(total):
                 continue
             for rest in self._multisets(count - 1, i, total, heavier, direct or len(path) == 1):
@@ -122,12 +153,17 @@ class EdgeLabels:
         if ends == BETWEEN_LINKS:
             return True
         shortest = 1 if ends == TO_PIN else 2
-        stiff = [path for path in paths if sum(path) <= self.space]
+        stiff = [path for path in paths if freedom(path) <= self.space]
         if ends == LOOSE or any(len(path) < shortest for path in paths):
             return ends == LOOSE and not stiff
         one = len(stiff) == 1 and len(stiff[0]) == shortest
-        weight = sum(self.space - sum(path) for path in stiff)
+        weight = sum(self.space - freedom(path) for path in stiff)
         return one or (weight <= self.space - 1 - shortest and (ends == TO_PIN or bool(stiff)))
+
+    def _turns(self, paths: tuple[PathType, ...]) -> bool:
+        """Tell whether every loop of two of the paths has two revolute joints, if it has to."""
+        fewest = sorted(len(path) - path.count(SLIDER) for path in paths)[:2]
+        return not self.rules & NO_SLIDING_LOOP or len(paths) == 1 or sum(fewest) >= 2
 
     def labels(self, connection: int, marked: bool) -> list[EdgeLabel]:
         """List the labels of a class, given as an entry of the matrix of the contracted graph.
@@ -141,10 +177,10 @@ class EdgeLabels:
         else:
             found = []
             for path in self.path_types:
-                weight = max(0, self.space - sum(path))
+                weight = max(0, self.space - freedom(path))
                 for paths in self._multisets(multiplicity - 1, 0, self._cost(path), weight, False):
                     found.extend(EdgeLabel((path, *paths), mark) for mark in range(1, len(path)))
-        found = [label for label in found if self._fits_ends(label.paths, ends)]
+        found = [label for label in found if self._fits_ends(label.paths, ends) and self._turns(label.paths)]
         if len(found) > _MAX_LABELS:
             raise TooLargeError(
                 f"{len(found)} kinds of {multiplicity} parallel paths (bound {_MAX_LABELS}): "
@@ -154,7 +190,7 @@ class EdgeLabels:
 
     def weight(self, label: EdgeLabel) -> int:
         """Return D, the weight that counts in the sparsity conditions."""
-        return sum(max(0, self.space - sum(path)) for path in label.paths)
+        return sum(max(0, self.space - freedom(path)) for path in label.paths)
 
     def cost(self, label: EdgeLabel) -> tuple[int, ...]:
         """Return the resources a label uses."""
@@ -228,11 +264,12 @@ class EdgeLabels:
         for limit in self.limits[:-1]:
             steps.append(steps[-1] * (limit + 1))
         shifts = range(0, _DIGIT * len(steps), _DIGIT)
-        alike = []
+        alike, covers = [], []
         for label in self.flat:
             cost = self.cost(label)
             packed = sum(c << shift for c, shift in zip(cost, shifts))
             alike.append((self.weight(label), sum(c * step for c, step in zip(cost, steps)), packed))
+            covers.append(label.cover() if self.rules else 0)
         reverse: list[int] = []
         kinds, group_kinds = [], []
         groups: list[tuple[int, ...]] = []
@@ -245,24 +282,28 @@ class EdgeLabels:
             if kind % 2 == 0:
                 heaviest[kind // 2] = max((alike[i][0] for i in number.values()), default=0)
             for own_reverse in (False, True):
-                found = Counter(alike[i] for i in number.values() if not own_reverse or reverse[i] == i)
+                members = [i for i in number.values() if not own_reverse or reverse[i] == i]
+                found = Counter((*alike[i], covers[i]) for i in members)
                 group_kinds.append((len(groups), len(groups) + len(found)))
-                groups += [(*own, count) for own, count in sorted(found.items())]
+                groups += [(*own, count, cover) for (*own, cover), count in sorted(found.items())]
         exact = len(self.limits) - (self.mobility > 1)  # freedom to lend may be left over
         states = np.arange(self.resources)
         digits = [states // step % (limit + 1) for step, limit in zip(steps, self.limits)]
         packed_of = sum(digit << shift for digit, shift in zip(digits, shifts))
-        labels_of = [(*own, back, label.fold()) for own, back, label in zip(alike, reverse, self.flat)]
+        folds = [label.fold() for label in self.flat]
+        labels_of = [(*own, back, *more) for own, back, *more in zip(alike, reverse, folds, covers)]
         return Tables(
             kinds=_columns(kinds, 2),
-            labels=_columns(labels_of, 5),
+            labels=_columns(labels_of, 6),
             group_kinds=_columns(group_kinds, 2),
-            groups=_columns(groups, 4),
+            groups=_columns(groups, 5),
             heaviest=np.array(heaviest, np.int64),
             resources=np.array([packed_of, ~np.any(digits[:exact], axis=0)], np.int64),
             space=np.int64(self.space),
             target=np.int64(self.resources - 1),
             guard=np.int64(sum(0x80 << shift for shift in shifts)),
+            rules=np.int64(self.rules),
+            sliders=np.int64(dict(self.higher).get(SLIDER, 0)),
         )
 
 
@@ -280,10 +321,11 @@ def edge_labels_for(
     loops: int,
     vertices: int,
     pins: bool = False,
+    rules: int = 0,
 ) -> EdgeLabels:
     """Return the labels for all contracted graphs with the given numbers of loops and vertices."""
     most = loops + 1 if vertices == 2 else loops  # parallel paths between two of the vertices
     multiplicities = (loops + 1,) if vertices == 2 else tuple(range(1, most))
     kinds = range(LOOSE + (mobility > 1) if pins else 1)
     connections = tuple(mu | ends << KIND_SHIFT for ends in kinds for mu in multiplicities)
-    return EdgeLabels(space, mobility, binary_links, higher, connections, vertices == 2, pins)
+    return EdgeLabels(space, mobility, binary_links, higher, connections, vertices == 2, pins, rules)

@@ -6,7 +6,7 @@ A ring of links has a single loop and no contracted graph; rings are told apart 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import SpecError, TooLargeError
 from graphsynth.core.wording import shown, whole
 from graphsynth.synthesis.contracted import contracted_graphs
-from graphsynth.synthesis.edge_labels import EdgeLabels, edge_labels_for
+from graphsynth.synthesis.edge_labels import SLIDER, EdgeLabels, edge_labels_for, may_slide
 from graphsynth.synthesis.kernels.counting import FRAME_NONE, FRAME_PATH, FRAME_VERTEX
+from graphsynth.synthesis.kernels.layout import NO_SLIDING_LOOP
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
@@ -45,6 +46,7 @@ class Family:
     levels: Levels = ()  # wanted sizes of adjacency levels
     #: vertices that are multiple joints; signatures of problems do without it
     pins: int = field(default=0, repr=False)
+    rules: int = field(default=0, repr=False)  # of prismatic joints, which are among ``higher``
 
     @property
     def links(self) -> int:
@@ -65,7 +67,7 @@ class Family:
     def edge_labels(self) -> EdgeLabels:
         """The labels of the paths."""
         numbers = self.space, self.mobility, self.binary_links, self.higher, self.loops, self.vertices
-        return edge_labels_for(*numbers, self.pins > 0)
+        return edge_labels_for(*numbers, self.pins > 0, self.rules)
 
     @property
     def graphs(self) -> NDArray[np.uint8]:
@@ -189,6 +191,12 @@ def multiple_joint_families(links: int, mobility: int, pins: int, framed: bool) 
     ]
 
 
+def slider_families(links: int, mobility: int, sliders: int, rules: int, framed: bool) -> list[Family]:
+    """List the families of planar chains with so many prismatic joints (with every frame, if ``framed``)."""
+    plain = chain_families(links, mobility, 3, {}, framed)
+    return [replace(family, higher=((SLIDER, sliders),), rules=rules) for family in plain]
+
+
 def _sequences(content: dict[int, int]) -> Iterator[tuple[int, ...]]:
     """Yield every arrangement of a multiset, in lexicographic order."""
     if not any(content.values()):
@@ -202,7 +210,16 @@ def _sequences(content: dict[int, int]) -> Iterator[tuple[int, ...]]:
             content[value] += 1
 
 
-def rings(links: int, mobility: int, space: int, higher: Mapping[int, int], framed: bool) -> Iterator[MechanismGraph]:
+def _may_slide(sequence: tuple[int, ...], rules: int) -> bool:
+    """Tell whether a ring has the revolute joints that the rules of prismatic joints want."""
+    turns = len(sequence) - sequence.count(SLIDER)
+    closed = (1, *sequence, 1) if sequence[0] != SLIDER or sequence[-1] != SLIDER else (1, *sequence, SLIDER, 1)
+    return may_slide(closed, rules) and (turns >= 2 or not rules & NO_SLIDING_LOOP)
+
+
+def rings(
+    links: int, mobility: int, space: int, higher: Mapping[int, int], framed: bool, rules: int = 0
+) -> Iterator[MechanismGraph]:
     """Yield the chains (mechanisms, if ``framed``) that are one ring of links, each once.
 
     Joint i connects links i and i + 1 modulo N, so with the frame at link 0 the only symmetry left is the reflection.
@@ -212,9 +229,11 @@ def rings(links: int, mobility: int, space: int, higher: Mapping[int, int], fram
     >>> [graph.to_text() for graph in rings(4, 1, 3, {}, True)]
     ['Cl f0']
     """
+    sliders = higher.get(SLIDER, 0)
+    higher = {i: count for i, count in higher.items() if i not in (1, SLIDER)}
     lower = chain_joints(links, mobility, space, higher)
-    content = {1: lower or 0} | {i: count for i, count in higher.items() if i > 1}
-    if lower is None or sum(content.values()) != (links if links > 2 else 1):
+    content = {1: (lower or 0) - sliders, SLIDER: sliders} | higher
+    if lower is None or lower < sliders or sum(content.values()) != (links if links > 2 else 1):
         return
     from graphsynth.structure.graph import MechanismGraph
 
@@ -226,5 +245,7 @@ def rings(links: int, mobility: int, space: int, higher: Mapping[int, int], fram
     for sequence in _sequences(content):
         # no symmetry of the ring (only the reflection that keeps the frame, if framed) makes it smaller
         if all(sequence <= turned[i:] + turned[:i] for turned in (sequence, sequence[::-1]) for i in shifts):
-            joints = [(i, (i + 1) % links, f) for i, f in enumerate(sequence)]
+            if not _may_slide(sequence, rules):
+                continue
+            joints = [(i, (i + 1) % links, 2 if f == SLIDER else f) for i, f in enumerate(sequence)]
             yield MechanismGraph(links, joints, frame=0 if framed else None, space=space)

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from itertools import product
@@ -33,6 +33,7 @@ from graphsynth.structure.connectivity import bits, components_of
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.kernels import canon_packed
 from graphsynth.synthesis.chunks import cut
+from graphsynth.synthesis.edge_labels import SLIDER
 from graphsynth.synthesis.families import Levels, chain_families, chain_joints, rings
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ class OneByOne:
     levels: Levels = ()
     symmetry: int = 0
     weight: float = 1.0
+    rules: int = field(default=0, repr=False)  # of prismatic joints, which are among ``higher``
 
     def graphs(self) -> Iterator[MechanismGraph]:
         """Yield the graphs."""
@@ -74,6 +76,8 @@ class OneByOne:
     def texts(self) -> Iterator[tuple[bytes, int]]:
         """Yield them as (lines of the text form, number of lines), at once."""
         lines = [f"{graph.to_text()}\n" for graph in self.graphs()]
+        if SLIDER in dict(self.higher):
+            lines = [line.replace(" 2:", " P:") for line in lines]
         if lines:
             yield "".join(lines).encode("ascii"), len(lines)
 
@@ -90,7 +94,7 @@ class OneByOne:
 
     def _all(self) -> Iterator[MechanismGraph]:
         if self.kind == "rings":
-            yield from rings(self.links, self.mobility, self.space, dict(self.higher), self.framed)
+            yield from rings(self.links, self.mobility, self.space, dict(self.higher), self.framed, self.rules)
             return
         for chain in fractionated_chains(self.links, self.mobility, self.space, self.higher):
             for graph in chain.inversions() if self.framed else ():

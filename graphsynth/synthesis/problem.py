@@ -18,6 +18,7 @@ from graphsynth.core.ordered import in_order, processes as processes_of
 from graphsynth.core.wording import shown, whole
 from graphsynth.synthesis.chunks import Chunk, cut
 from graphsynth.synthesis.contracted import FOLDER_VARIABLE, SHIPPED_LOOPS, has_contracted_graphs
+from graphsynth.synthesis.edge_labels import CYLINDERS, SLIDER
 from graphsynth.synthesis.families import (
     MOST_LINKS,
     Family,
@@ -27,8 +28,10 @@ from graphsynth.synthesis.families import (
     chain_numbers,
     mechanism_families,
     multiple_joint_families,
+    slider_families,
 )
 from graphsynth.synthesis.fractionated import OneByOne
+from graphsynth.synthesis.kernels.layout import NO_SLIDING_LINK, NO_SLIDING_LOOP
 from graphsynth.synthesis.totals import Total, is_counted_together, totals_of
 
 if TYPE_CHECKING:
@@ -134,6 +137,31 @@ class EnumerationProblem:
         numbers = range(1, 2 * loops - 1) if wanted is None else [wanted]
         families = [family for pins in numbers for family in multiple_joint_families(links, mobility, pins, framed)]
         return cls(title, tuple(families))
+
+    @classmethod
+    def sliders(
+        cls, links: int, number: int, mobility: int, links_slide: bool, loops_slide: bool, cylinders: bool, framed: bool
+    ) -> EnumerationProblem:
+        """State the enumeration of planar chains with prismatic joints; see `enumerate_slider_chains`.
+
+        Raises `SpecError` for a value out of its bounds, `TooLargeError` for too many loops.
+        """
+        links, mobility, _, _ = chain_numbers(links, mobility, 3, None)
+        number = whole(number, "sliders", 1, 100)
+        allowed = {"sliding links": _truth(links_slide, "sliding_links")}
+        allowed["sliding loops"] = _truth(loops_slide, "sliding_loops")
+        rules = NO_SLIDING_LINK * (not links_slide) + NO_SLIDING_LOOP * (not loops_slide)
+        rules += CYLINDERS * _truth(cylinders, "cylinders")
+        title = f"W={mobility} N={links} sliders={number}" + "".join(f" {name}" for name, yes in allowed.items() if yes)
+        title += (" cylinders" if cylinders else "") + (" framed" if _truth(framed, "framed") else "")
+        joints = chain_joints(links, mobility, 3, {})
+        loops = -1 if joints is None else joints - links + 1
+        if joints is None or loops < 1 or number > joints:
+            reason = f"{title}: there are {joints} joints" if loops >= 1 else _reason(links, mobility, 3, {})
+            return cls(title, (), reason=reason)
+        check_loops(loops, links, mobility, 3, {}, framed=framed)
+        ring = OneByOne("rings", links, mobility, 3, ((SLIDER, number),), framed, rules=rules)
+        return cls(title, tuple(slider_families(links, mobility, number, rules, framed)), (ring,))
 
     @classmethod
     def mechanisms(cls, question: StructuralSpec | LinkAssortment, symmetry: int | None) -> EnumerationProblem:

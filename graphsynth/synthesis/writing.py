@@ -22,7 +22,9 @@ from graphsynth.core.journal import Journal, Work, digest_of
 from graphsynth.core.ordered import in_order
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.multiple_joints import MultipleJointChain
+from graphsynth.structure.slider_chains import SliderChain
 from graphsynth.synthesis.chunks import Chunk
+from graphsynth.synthesis.edge_labels import SLIDER
 from graphsynth.synthesis.problem import EnumerationProblem, WorkItem, counts, graphs, texts, whole_sum
 from graphsynth.synthesis.shards import shard_of
 from graphsynth.synthesis.totals import Total
@@ -50,10 +52,16 @@ def _work(
     return Work(form, problem.title, digest_of(problem.signature, form, cut), remedy=remedy, again=again)
 
 
-def _json_line(graph: MechanismGraph, multiple: int = 0) -> str:
-    if multiple:
-        chain = MultipleJointChain(graph, multiple)
-        named = {"key": chain.key, "links": chain.links, "frame": chain.frame, "joints": chain.joints}
+def _json_line(graph: MechanismGraph, item: WorkItem) -> str:
+    multiple = item.family.pins if isinstance(item, Chunk) else 0
+    higher = item.family.higher if isinstance(item, Chunk) else item.higher
+    if multiple or SLIDER in dict(higher):
+        chain = MultipleJointChain(graph, multiple) if multiple else SliderChain(graph)
+        named: dict[str, Any] = {"key": chain.key, "links": chain.links, "frame": chain.frame}
+        if isinstance(chain, MultipleJointChain):
+            named["joints"] = chain.joints
+        else:
+            named |= {"joints": [(a, b) for a, b, _ in graph.joints], "sliders": chain.sliders}
         return json.dumps(named) + "\n"
     record: dict[str, Any] = {"key": graph.key, "links": graph.links, "space": graph.space, "frame": graph.frame}
     record["joints"] = [list(joint) for joint in graph.joints]
@@ -63,8 +71,7 @@ def _json_line(graph: MechanismGraph, multiple: int = 0) -> str:
 
 
 def _json_lines(item: WorkItem) -> tuple[bytes, int]:
-    multiple = item.family.pins if isinstance(item, Chunk) else 0
-    lines = [_json_line(graph, multiple) for graph in item.graphs()]
+    lines = [_json_line(graph, item) for graph in item.graphs()]
     return "".join(lines).encode(), len(lines)
 
 
@@ -143,7 +150,7 @@ def estimated_size(
         return weight, weight * line
     chosen = chunks[:: max(1, len(chunks) // _SAMPLED)]
     made = [sum(lines for _, lines in chunk.texts()) for chunk in chosen]
-    some = [(next(graphs([chunk], None)), chunk.family.pins) for chunk, lines in zip(chosen, made) if lines]
+    some = [(next(graphs([chunk], None)), chunk) for chunk, lines in zip(chosen, made) if lines]
     size = sum(len(_json_line(*one)) if form == "jsonl" else len(one[0].to_text()) + 4 for one in some)
     number = weight * sum(made) / sum(chunk.weight for chunk in chosen)
     return number, number * size / max(len(some), 1)

@@ -157,3 +157,71 @@ def chains(links: int, space: int = 3) -> int:
         total += Fraction(clusters.coefficient(fixed, joints), order)
     assert total.denominator == 1
     return int(total)
+
+
+Terms = dict[Cycles, dict[int, Fraction]]
+"""A cycle index: for each partition, by numbers of joints."""
+
+
+def with_fractionated(links: int, mobility: int, space: int = 3) -> int:
+    """Count the chains of any mobility up to isomorphism, fractionated ones included.
+
+    These are the connected graphs without rigid sets that have no loose end.  All graphs are sets of connected ones; a
+    connected one that is no tree is a chain at whose links rooted trees hang, and has as many loops as the chain.  In
+    cycle indices trees are taken off by p_k -> p_k exp(-sum p_kj / j), which for p_k = x ** k is x ** k - x ** 2k.
+    """
+    joints, rest = divmod(space * (links - 1) - mobility, space - 1)
+    if rest:
+        return 0
+    clusters = Clusters(links, joints, space)
+    total = Fraction(0)
+    for cycles, by_joints in connected(clusters, links).items():
+        loops_alike = by_joints.get(sum(cycles) + joints - links, Fraction(0))
+        total += loops_alike * without_trees(cycles, links)
+    assert total.denominator == 1
+    return int(total)
+
+
+def without_trees(cycles: Cycles, links: int) -> int:
+    """Return the coefficient of x ** links in the product of x ** k - x ** 2k."""
+    ways = Counter({0: 1})
+    for k in cycles:
+        fresh: Counter[int] = Counter()
+        for size, count in ways.items():
+            fresh[size + k] += count
+            fresh[size + 2 * k] -= count
+        ways = fresh
+    return ways[links]
+
+
+def connected(clusters: Clusters, links: int) -> Terms:
+    """Return the cycle index of connected graphs without rigid sets: the logarithm, and Moebius inversion."""
+    every: list[Terms] = [{}]
+    for n in range(1, links + 1):
+        terms: Terms = {}
+        for cycles in partitions(n, n):
+            polynomial = clusters.split(tuple(sorted((length, (1,)) for length in cycles)))[0]
+            order = prod(cycles) * prod(factorial(count) for count in Counter(cycles).values())
+            numbers = ((i, clusters.coefficient(polynomial, i)) for i in range(clusters.most + 1))
+            terms[tuple(sorted(cycles))] = {i: Fraction(count, order) for i, count in numbers if count}
+        every.append(terms)
+    logarithm: list[Terms] = [{}]
+    for n in range(1, links + 1):  # n L_n = n G_n - sum of k L_k G_(n - k)
+        left: Terms = {cycles: dict(own) for cycles, own in every[n].items()}
+        for k in range(1, n):
+            for one, mine in logarithm[k].items():
+                for other, yours in every[n - k].items():
+                    own = left.setdefault(tuple(sorted(one + other)), {})
+                    for i, a in mine.items():
+                        for j, b in yours.items():
+                            if i + j <= clusters.most:
+                                own[i + j] = own.get(i + j, Fraction(0)) - a * b * Fraction(k, n)
+        logarithm.append(left)
+    found: Terms = {}
+    for power, sign in enumerate((1, -1, -1, 0, -1, 1, -1, 0, 0, 1, -1, 0, -1, 1), 1):  # the Moebius function
+        for n in range(1, links // power + 1 if sign else 0):
+            for cycles, mine in logarithm[n].items():
+                own = found.setdefault(tuple(power * length for length in cycles), {})
+                for i, a in mine.items():
+                    own[i * power] = own.get(i * power, Fraction(0)) + a * Fraction(sign, power)
+    return found

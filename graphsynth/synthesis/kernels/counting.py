@@ -13,6 +13,7 @@ import numpy as np
 from graphsynth.core.compilation import kernel
 from graphsynth.synthesis.kernels import layout as lay
 from graphsynth.synthesis.kernels.contracted import automorphisms
+from graphsynth.synthesis.kernels.covers import PLAIN
 from graphsynth.synthesis.kernels.layout import glue, inner
 from graphsynth.synthesis.kernels.variables import (
     build_variables,
@@ -68,24 +69,22 @@ def _store(key, words, number, layer, shift, value, work):
 
 @inner
 def count_states(count, sets, tables, work):
-    """Count the admissible choices of all variables by dynamic programming.
+    """Count the admissible choices of all variables; TOO_LARGE for too large numbers, NO_ROOM in the workspace.
 
-    A state is what each critical set still needs (a byte each, never below 0) and the resources left.  States in
-    which no set needs anything are finished by ``work.tables[WAYS]``.
-
-    Returns the number, TOO_LARGE when the arithmetic does not suffice, or NO_ROOM when the workspace is too small.
+    A state is what each set still needs (a byte each, never below 0) and the resources left.  States in which no set
+    needs anything are finished by ``work.tables[WAYS]``.
     """
     work.state[STEPS] = 0
     if sets == 0:
         return work.tables[lay.WAYS, 0, tables.target]
     needs = (sets + 7) // 8
     words = needs + 1
+    plain = work.state[PLAIN]
     if not lay_lanes(count, sets, needs, work):
         return np.int64(TOO_LARGE)
     lay_gains(count, tables, work)
-    # the first layer: one state, all needs and all resources
     capacity = work.states.shape[1]
-    key = np.zeros(words, np.uint64)
+    key = np.zeros(words, np.uint64)  # the first layer: one state, all needs and all resources
     for s in range(sets):
         key[s // 8] |= np.uint64(work.sets[lay.NEED, s]) << np.uint64(8 * (s % 8))
     key[needs] = np.uint64(tables.target)
@@ -93,8 +92,7 @@ def count_states(count, sets, tables, work):
     shift = np.int64(0)
     states = _store(key, words, np.int64(0), work.state[1], shift, np.int64(1), work)
     total = np.int64(0)
-    # from layer to layer by the choices of one variable
-    for j in range(count):
+    for j in range(count):  # from layer to layer by the choices of one variable
         coefs = 2 * j * needs
         rests = coefs + needs
         other = capacity - shift
@@ -118,7 +116,16 @@ def count_states(count, sets, tables, work):
                 # eight sets at a time: needs less gains, not below 0; later variables must be able to give the rest
                 alive = lay.TOP
                 open_ = np.uint64(0)
-                for i in range(needs):
+                for i in range(plain, needs):  # revolute joints that links and loops need
+                    raised = (work.keys[base + i] | lay.TOP) - work.covers[
+                        (j * lay.COVERS + work.entries[lay.COVER, g]) * needs + i
+                    ]
+                    keep = raised & lay.TOP
+                    need = raised & (keep - (keep >> np.uint64(7)))
+                    alive &= (work.lanes[rests + i] | lay.TOP) - need
+                    open_ |= need
+                    key[i] = need
+                for i in range(plain):
                     raised = (work.keys[base + i] | lay.TOP) - work.lanes[coefs + i] * gain
                     keep = raised & lay.TOP
                     need = raised & (keep - (keep >> np.uint64(7)))

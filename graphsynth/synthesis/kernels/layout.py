@@ -41,6 +41,9 @@ GROUPS, GROUPS_END = 0, 1
 WEIGHT, INDEX, PACKED = 0, 1, 2
 REVERSE, FOLD = 3, 4  # labels: the label read from the other end; largest number of equal paths
 GAIN, COPIES = 0, 3  # entries and groups: weight given up (instead of WEIGHT); number of labels alike
+COVER, LABEL_COVER = 4, 5  # of entries and groups, of labels: revolute joints, see ``graphsynth.synthesis.edge_labels``
+COVERS = 12  # numbers that a cover takes
+NO_SLIDING_LINK, NO_SLIDING_LOOP = 1, 2  # Tables.rules: bits
 # rows of Tables.resources
 DIGITS, FINAL = 0, 1
 # rows of Work.classes
@@ -48,7 +51,7 @@ U, V, KIND, HEAVIEST, VAR, FLIP, LABEL = range(7)
 # rows of Work.variables
 REP, SIZE, OWN, ROW, ENTRY, AT, USED = range(7)
 # rows of Work.sets, Work.rows, Work.tables, Work.states
-MASK, NEED, LEFT = range(3)
+MASK, NEED, LEFT, VERTEX, CYCLE = range(5)
 SET, COEF = range(2)
 WAYS, GAINS = range(2)
 # rows of Work.pairs
@@ -73,14 +76,16 @@ class Tables(NamedTuple):
     """
 
     kinds: NDArray[np.int64]  # (2, kinds) LABELS, LABELS_END
-    labels: NDArray[np.int64]  # (5, labels) WEIGHT D in the sparsity conditions, INDEX, PACKED, REVERSE, FOLD
+    labels: NDArray[np.int64]  # (6, labels) WEIGHT D in the sparsity conditions, INDEX, PACKED, REVERSE, FOLD, COVER
     group_kinds: NDArray[np.int64]  # (2, 2 * kinds) GROUPS, GROUPS_END of kind 2 t + own_reverse
-    groups: NDArray[np.int64]  # (4, groups) labels alike for counting: WEIGHT, INDEX, PACKED, COPIES
+    groups: NDArray[np.int64]  # (5, groups) labels alike for counting: WEIGHT, INDEX, PACKED, COPIES, COVER
     heaviest: NDArray[np.int64]  # (multiplicities,) largest weight of an unmarked label
     resources: NDArray[np.int64]  # (2, states) DIGITS packed; FINAL: 1 where nothing but slack is left
     space: np.int64
     target: np.int64  # resources to be used up, as an index
     guard: np.int64  # the top bit of every packed digit
+    rules: np.int64  # of prismatic joints
+    sliders: np.int64  # number of prismatic joints
 
 
 class Work(NamedTuple):
@@ -91,13 +96,14 @@ class Work(NamedTuple):
     class_of: NDArray[np.int64]  # (MAX_VERTICES, MAX_VERTICES) number of the class between two vertices
     classes: NDArray[np.int64]  # (7, MAX_CLASSES) ends U < V, KIND, HEAVIEST, VAR and FLIP, LABEL at a leaf
     subsets: NDArray[np.int16]  # (2, 2**MAX_VERTICES) needs of vertex sets
-    sets: NDArray[np.int64]  # (3, MAX_SETS) MASK of classes inside, NEED, what is LEFT of it
+    sets: NDArray[np.int64]  # (5, MAX_SETS) MASK of classes inside, NEED, what is LEFT; VERTEX or CYCLE to be covered
     variables: NDArray[np.int64]  # (7, MAX_CLASSES + 1) REP, SIZE, OWN reversal; first ROW and ENTRY; search stack
     rows: NDArray[np.int64]  # (2, MAX_SETS * MAX_CLASSES) SET and COEF of each entry
-    entries: NDArray[np.int64]  # (4, MAX_ENTRIES) choices of a variable: GAIN, INDEX, PACKED, COPIES
+    entries: NDArray[np.int64]  # (5, MAX_ENTRIES) choices of a variable: GAIN, INDEX, PACKED, COPIES, COVER
     tables: NDArray[np.int64]  # (2, MAX_CLASSES + 1, states) WAYS and GAINS of variables j, j+1, ...
     pairs: NDArray[np.int64]  # (4, MAX_PAIRS + 1) PAIR_AT per variable; ONE <= OTHER, TURNED or not
     lanes: NDArray[np.uint64]  # per variable: coefficients, then what later variables can contribute; a byte per set
+    covers: NDArray[np.uint64]  # per variable and cover: what it gives to vertices and cycles; a byte per set
     keys: NDArray[np.uint64]  # two layers of states of the dynamic program
     states: NDArray[np.int64]  # (3, key_words) SUM of a state; hash table: SLOT -> state, STAMP = its layer
     state: NDArray[np.int64]  # scalars that survive between calls of a stream
@@ -118,14 +124,15 @@ def make_work(resources: int, group: int = 20_000, key_words: int = 1 << 18) -> 
         class_of=ints(MAX_VERTICES, MAX_VERTICES),
         classes=ints(7, MAX_CLASSES),
         subsets=np.zeros((2, 1 << MAX_VERTICES), np.int16),
-        sets=ints(3, MAX_SETS),
+        sets=ints(5, MAX_SETS),
         variables=ints(7, MAX_CLASSES + 1),
         rows=ints(2, MAX_SETS * MAX_CLASSES),
-        entries=ints(4, MAX_ENTRIES),
+        entries=ints(5, MAX_ENTRIES),
         tables=ints(2, MAX_CLASSES + 1, resources),
         pairs=ints(4, MAX_PAIRS + 1),
         lanes=np.zeros(2 * MAX_CLASSES * (MAX_SETS // 8), np.uint64),
+        covers=np.zeros(MAX_CLASSES * COVERS * (MAX_SETS // 8), np.uint64),
         keys=np.zeros(2 * key_words, np.uint64),
         states=ints(3, key_words),
-        state=ints(20),
+        state=ints(22),
     )

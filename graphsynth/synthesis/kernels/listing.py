@@ -21,6 +21,7 @@ from graphsynth.synthesis.kernels.counting import (
     can_be_frame,
     frame_stabiliser,
 )
+from graphsynth.synthesis.kernels.covers import PLAIN
 from graphsynth.synthesis.kernels.layout import inner
 from graphsynth.synthesis.kernels.variables import (
     build_variables,
@@ -242,14 +243,23 @@ def _emit(k, symmetry, tables, work, rows, n):
 
 
 @inner
-def _step(depth, needs, gain, most, keys, lanes):
-    """Let the variable at ``depth`` give up ``gain``; return whether every critical set can still be served.
+def _step(depth, plain, needs, gain, cover, most, work):
+    """Let the variable at ``depth`` give up ``gain``; return whether every set can still be served.
+
+    ``cover``: what its label gives to vertices and cycles, whose needs come behind ``plain`` words of critical sets.
 
     What the sets need after the step goes to the next row of ``keys``, so nothing has to be taken back.
     """
+    keys, lanes = work.keys, work.lanes
     cap = np.uint64(min(most, lay.BYTE)) * lay.ONES | lay.TOP
     alive = lay.TOP
-    for i in range(needs):
+    for i in range(plain, needs):
+        raised = (keys[depth * needs + i] | lay.TOP) - work.covers[(depth * lay.COVERS + cover) * needs + i]
+        keep = raised & lay.TOP
+        need = raised & (keep - (keep >> np.uint64(7)))
+        alive &= (lanes[(2 * depth + 1) * needs + i] | lay.TOP) - need
+        keys[(depth + 1) * needs + i] = need
+    for i in range(plain):
         raised = (keys[depth * needs + i] | lay.TOP) - lanes[2 * depth * needs + i] * gain
         keep = raised & lay.TOP
         need = raised & (keep - (keep >> np.uint64(7)))
@@ -264,7 +274,7 @@ def _search(k, symmetry, tables, work, rows, n):
     """Run or go on with the search the state points to until it ends or the rows are full."""
     # taken out of the tuples once: inside the loops that would cost more than the search itself
     st, classes, variables, pairs = work.state, work.classes, work.variables, work.pairs
-    keys, lanes, ahead = work.keys, work.lanes, work.tables
+    ahead, plain = work.tables, st[PLAIN]
     labels, kinds, resources, guard = tables.labels, tables.kinds, tables.resources, tables.guard
     fold_class = st[WITNESS] - st[KEPT] if symmetry else np.int64(-1)
     needs, parts, last = st[WORDS], st[PARTS], st[COUNT] - 1
@@ -289,7 +299,8 @@ def _search(k, symmetry, tables, work, rows, n):
             usable = usable and _is_ordered(depth, label, labels, variables, pairs)
             if usable:
                 gain = np.uint64(classes[lay.HEAVIEST, rep] - labels[lay.WEIGHT, label])
-                usable = _step(depth, needs, gain, ahead[lay.GAINS, depth + 1, index], keys, lanes)
+                cover = labels[lay.LABEL_COVER, label]
+                usable = _step(depth, plain, needs, gain, cover, ahead[lay.GAINS, depth + 1, index], work)
             if usable and parts > 1 and depth + 1 == min(PREFIX, last + 1):
                 st[MET] += 1
                 usable = st[MET] % parts == st[PART]

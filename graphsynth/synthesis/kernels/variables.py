@@ -7,6 +7,7 @@ import numpy as np
 from graphsynth.core.intrinsics import popcount
 from graphsynth.synthesis.kernels import layout as lay
 from graphsynth.synthesis.kernels.contracted import critical_sets
+from graphsynth.synthesis.kernels.covers import LAID, PLAIN, cover_of, covered_sets
 from graphsynth.synthesis.kernels.layout import inner
 
 
@@ -24,7 +25,12 @@ def load_graph(k, mult, tables, work):
                 work.class_of[u, v] = m
                 work.class_of[v, u] = m
                 m += 1
-    return m, critical_sets(k, m, mult, work.classes, tables.space, work.subsets, work.sets)
+    sets = critical_sets(k, m, mult, work.classes, tables.space, work.subsets, work.sets)
+    work.state[PLAIN] = (sets + 7) // 8
+    work.state[LAID] = m
+    if tables.rules and sets >= 0:
+        sets = covered_sets(k, mult, sets, tables, work)
+    return m, sets
 
 
 @inner
@@ -151,6 +157,7 @@ def plain_entries(count, tables, work):
             work.entries[lay.INDEX, at] = tables.groups[lay.INDEX, g] * size
             work.entries[lay.PACKED, at] = packed
             work.entries[lay.COPIES, at] = tables.groups[lay.COPIES, g]
+            work.entries[lay.COVER, at] = tables.groups[lay.COVER, g]
             at += 1
     work.variables[lay.ENTRY, count] = at
     return True
@@ -243,4 +250,14 @@ def lay_lanes(count, sets, words, work):
                 return False
             work.sets[lay.LEFT, s] += work.rows[lay.COEF, q] * most
             work.lanes[base + s // 8] |= np.uint64(work.rows[lay.COEF, q]) << np.uint64(8 * (s % 8))
+        for s in range(8 * work.state[PLAIN], sets):
+            most = 0
+            for cover in range(lay.COVERS):
+                given = cover_of(j, cover, s, work)
+                place = (j * lay.COVERS + cover) * words + s // 8
+                if s % 8 == 0:
+                    work.covers[place] = np.uint64(0)
+                work.covers[place] |= np.uint64(given) << np.uint64(8 * (s % 8))
+                most = max(most, given)
+            work.sets[lay.LEFT, s] += most
     return True

@@ -1,0 +1,100 @@
+"""What prismatic joints may not take: a link needs a revolute joint, a loop two of them.
+
+Needs of vertices and of cycles of the contracted graph stand behind those of critical sets, a byte each, and start with
+a word of their own.  A label gives to the two ends of its class, and to the cycles through it, by its *cover*: 1 if a
+path has a revolute joint at the lower end, 2 at the higher end, and 4 times the fewest revolute joints of a path, 2 at
+most.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from graphsynth.synthesis.kernels import layout as lay
+from graphsynth.synthesis.kernels.layout import inner
+
+PLAIN, LAID = 19, 20  # in work.state: words of the needs of critical sets; classes of the graph
+
+
+@inner
+def covered_sets(k, mult, sets, tables, work):
+    """Add the vertices and cycles that prismatic joints could take; return the number of sets, -1 without room."""
+    count = 8 * work.state[PLAIN]
+    for s in range(sets, min(count, work.sets.shape[1])):  # the word is filled with sets that need nothing
+        work.sets[lay.MASK, s] = 0
+        work.sets[lay.NEED, s] = 0
+    if tables.rules & lay.NO_SLIDING_LINK:
+        for v in range(k):
+            joints = 0
+            for w in range(k):
+                if w != v:
+                    joints += mult[v, w] & lay.COPIES_MASK
+            if joints <= tables.sliders and mult[v, v] == 0:
+                count = _add(count, 1, v, np.int64(0), work)
+                if count < 0:
+                    return np.int64(-1)
+    if tables.rules & lay.NO_SLIDING_LOOP:
+        return _add_cycles(k, mult, count, tables, work)
+    return count
+
+
+@inner
+def _add(count, need, vertex, cycle, work):
+    if count < 0 or count >= work.sets.shape[1]:
+        return np.int64(-1)
+    work.sets[lay.MASK, count] = 0
+    work.sets[lay.NEED, count] = need
+    work.sets[lay.VERTEX, count] = vertex
+    work.sets[lay.CYCLE, count] = cycle
+    return count + 1
+
+
+@inner
+def _add_cycles(k, mult, count, tables, work):
+    """Add the cycles of one class more than there are prismatic joints at most: longer ones have two others anyway."""
+    path = np.empty(k + 1, np.int64)
+    following = np.empty(k + 1, np.int64)
+    for first in range(k):  # the lowest vertex of the cycle
+        path[0] = first
+        following[0] = first + 1
+        depth = 0
+        used = np.int64(1) << first
+        while depth >= 0:
+            at = path[depth]
+            w = following[depth]
+            while w < k and (used >> w & 1 or mult[at, w] == 0):
+                w += 1
+            if w == k or depth == tables.sliders:
+                used &= ~(np.int64(1) << at)
+                depth -= 1
+                continue
+            following[depth] = w + 1
+            depth += 1
+            path[depth] = w
+            following[depth] = first + 1
+            used |= np.int64(1) << w
+            if depth >= 2 and path[1] < w and mult[w, first]:
+                cycle = np.int64(1) << work.class_of[w, first]
+                for i in range(depth):
+                    cycle |= np.int64(1) << work.class_of[path[i], path[i + 1]]
+                count = _add(count, 2, np.int64(-1), cycle, work)
+    return count
+
+
+@inner
+def cover_of(j, cover, s, work):
+    """Return what variable j gives to a vertex or a cycle, set s, by a label with this cover."""
+    given = np.int64(0)
+    vertex, cycle = work.sets[lay.VERTEX, s], work.sets[lay.CYCLE, s]
+    for e in range(work.state[LAID]):
+        if work.classes[lay.VAR, e] != j:
+            continue
+        if vertex < 0:
+            given += (cycle >> e & 1) * (cover >> 2)
+            continue
+        turned = work.classes[lay.FLIP, e]
+        if work.classes[lay.U, e] == vertex:
+            given += (cover >> turned) & 1
+        elif work.classes[lay.V, e] == vertex:
+            given += (cover >> (1 - turned)) & 1
+    return given

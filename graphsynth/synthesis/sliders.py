@@ -1,0 +1,101 @@
+"""Chains with prismatic joints: the public functions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Executor
+
+from graphsynth.structure.slider_chains import SliderChain
+from graphsynth.synthesis.problem import EnumerationProblem, counted, graphs
+
+
+def enumerate_slider_chains(
+    links: int,
+    sliders: int,
+    mobility: int = 1,
+    *,
+    sliding_links: bool = False,
+    sliding_loops: bool = False,
+    cylinders: bool = False,
+    framed: bool = False,
+    executor: Executor | None = None,
+) -> Iterator[SliderChain]:
+    """Enumerate planar chains with revolute and prismatic joints: every one, each once (exact).
+
+    None has a rigid sub-chain by the structural formula, none is fractionated.
+
+    Parameters
+    ----------
+    links : int
+        Number of links N.
+    sliders : int
+        Number of prismatic joints, 1 or more.
+    mobility : int
+        Mobility W >= 1.
+    sliding_links : bool
+        Allow links all of whose joints are prismatic (the two blocks of an elliptic trammel have one of each, the
+        cross of an Oldham coupling has prismatic ones only).
+    sliding_loops : bool
+        Allow loops with fewer than two revolute joints, in which nothing turns.
+    cylinders : bool
+        Every prismatic joint is that of a cylinder: it joins two binary links, each with a revolute joint besides.
+    framed : bool
+        Choose a frame in all ways that differ: mechanisms instead of chains.
+    executor : concurrent.futures.Executor, optional
+        Who does the work; the result is the same for any.  Default: this process.
+
+    Yields
+    ------
+    SliderChain
+        In a fixed order; a frame is link 0.
+
+    Raises
+    ------
+    SpecError
+        For a value out of its bounds.
+    TooLargeError
+        For more loops than there are contracted graphs for, at once.
+
+    References
+    ----------
+    docs/explanation/sliders.md.
+
+    Examples
+    --------
+    >>> [chain.to_text() for chain in enumerate_slider_chains(4, 1, framed=True)]
+    ['Cl f0 P:0-1', 'Cl f0 P:1-2']
+    """
+    given = links, sliders, mobility, sliding_links, sliding_loops, cylinders, framed
+    problem = EnumerationProblem.sliders(*given)
+    return map(SliderChain, graphs(problem.work_items(listing=True), executor))
+
+
+def count_slider_chains(
+    links: int,
+    sliders: int,
+    mobility: int = 1,
+    *,
+    sliding_links: bool = False,
+    sliding_loops: bool = False,
+    cylinders: bool = False,
+    framed: bool = False,
+    executor: Executor | None = None,
+) -> int:
+    """Count what ``enumerate_slider_chains`` yields, without making the chains (exact).
+
+    Parameters
+    ----------
+    links, sliders, mobility, sliding_links, sliding_loops, cylinders, framed, executor
+        As for `enumerate_slider_chains`.
+
+    Returns
+    -------
+    int
+
+    Examples
+    --------
+    >>> [count_slider_chains(8, number, sliding_loops=True) for number in (1, 2, 3)]
+    [84, 307, 574]
+    """
+    given = links, sliders, mobility, sliding_links, sliding_loops, cylinders, framed
+    return counted(EnumerationProblem.sliders(*given), executor)
