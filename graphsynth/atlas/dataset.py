@@ -230,6 +230,7 @@ class Dataset(Shown):
         `SpecError` for a family that is not there or a number that is not below its chains; `FormatError` if the
         manifest is damaged.
         """
+        from graphsynth.atlas.dataset_parts import TOGETHER
         from graphsynth.structure.graph import MechanismGraph
 
         parquet = need("pyarrow.parquet", "parquet", "A data set")
@@ -240,10 +241,9 @@ class Dataset(Shown):
             raise SpecError(f"number = {number} must be one of the {family['rows']['chains']} chains, from 0")
         for own in family["parts"]:
             if number < own["rows"]["chains"]:
-                column = parquet.read_table(
-                    _place(self.folder, "chains", mobility, links, own["part"]), columns=["graph6"]
-                )
-                return MechanismGraph.from_graph6(column["graph6"][number].as_py())
+                file = parquet.ParquetFile(_place(self.folder, "chains", mobility, links, own["part"]))
+                column = file.read_row_group(number // TOGETHER, ["graph6"])["graph6"]
+                return MechanismGraph.from_graph6(column[number % TOGETHER].as_py())
             number -= own["rows"]["chains"]
         raise FormatError(f"the manifest of {self.folder} is damaged: build the data set anew")
 

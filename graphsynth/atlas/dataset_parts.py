@@ -19,6 +19,8 @@ from graphsynth.core.extras import need
 
 #: Bound on the labellings of a part; about a quarter of them are chains.
 PART = 400_000.0
+#: Chains that are compressed together: one of them is read in some milliseconds.
+TOGETHER = 8192
 #: Moving links of the largest groups whose assembly modes are counted: of larger ones there are hundred thousands.
 _COUNTED = 10
 
@@ -123,6 +125,7 @@ def _chains(
             "fractionated": whole["cuts"][order],
         },
         {"graph6": "DELTA_LENGTH_BYTE_ARRAY"},
+        together=TOGETHER,
     )
 
 
@@ -172,15 +175,14 @@ def _modes_of_groups(groups: list[Any]) -> list[int]:
     ]
 
 
-def _parquet(columns: dict[str, Any], encodings: dict[str, str]) -> bytes:
+def _parquet(columns: dict[str, Any], encodings: dict[str, str], together: int | None = None) -> bytes:
     parquet = need("pyarrow.parquet", "parquet", "A data set")
     table = _arrow().table(columns)
     plain = [name for name in columns if name not in encodings]
     levels = {name: 19 if name == "graph6" else 6 for name in columns}  # graphs are half of the bytes
     out = io.BytesIO()
-    parquet.write_table(
-        table, out, compression="zstd", compression_level=levels, use_dictionary=plain, column_encoding=encodings
-    )
+    looks = {"compression": "zstd", "compression_level": levels, "use_dictionary": plain, "column_encoding": encodings}
+    parquet.write_table(table, out, row_group_size=together, **looks)
     return out.getvalue()
 
 
