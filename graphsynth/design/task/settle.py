@@ -22,6 +22,8 @@ _STEPS, _GAIN, _NONE = 40, 1e-6, 1e-24
 _REACH, _LONGER, _SHORTER, _LEAST = 0.02, 2.0, 0.25, 1e-10
 #: A step is made longer, up to so many times twice, if the merit falls by so much more than promised.
 _DOUBLED, _SLOW = 10, 1.3
+#: The shortest part of a step beyond which the motion breaks off that is tried.
+_PART = 0.02
 #: Violations of bounds that count as none, beside a weight that is larger than their multipliers.
 _KEPT, _WEIGHT = 1e-8, 2.0
 
@@ -34,25 +36,36 @@ class Settled(NamedTuple):
 
 
 def settled(problem: TaskProblem, x: Array) -> Settled:
-    """Take a candidate (size,) to its least sum of squares within the bounds; as it is where that does not help."""
+    """Take a candidate (size,) to its least sum of squares within the bounds; as it is where that does not help.
+
+    Steps are those of Gauss and Newton, or know the rest of the Hessian where that foretold the last step better.
+    """
     now = problem.exactly(x, None)
     if now.times is None:
         return Settled(x, np.inf)
     damping, worse, weight, refused, best = _DAMPING, 2.0, 0.0, 0, Settled(x, np.inf)
+    S, curved = np.zeros((len(x), len(x))), False  # what Gauss and Newton leave out, and whether it counts
     if _kept(now):
         best = Settled(x, float(np.sqrt(_squares(now))))
     for _ in range(_STEPS):
         r, J = _stacked(now)
-        H, g = J.T @ J, J.T @ r
-        scale = np.maximum(np.diag(H), 1e-12 * np.diag(H).max()) + 1e-300
-        H += damping * np.diag(scale)
-        step, pull = least_squares(H, g, now.steep, -now.bounds)
+        G, g = J.T @ J, J.T @ r
+        scale = np.maximum(np.diag(G), 1e-12 * np.diag(G).max()) + 1e-300
+        for own in (G + S, G) if curved else (G,):
+            H = own + damping * np.diag(scale)
+            step, pull = least_squares(H, g, now.steep, -now.bounds)
+            if step is not None:
+                break
         if step is None:
             break
-        weight = max(weight, _WEIGHT * pull)
-        before, promised = _merit(now, weight), -float((2.0 * g + J.T @ (J @ step)) @ step)
+        weight = max(weight, _WEIGHT * pull.max(initial=0.0))
+        before, promised = _merit(now, weight), -float((2.0 * g + own @ step) @ step)
         step, later = _bent(problem, x, now, step, H, g, weight, before - _SLOW * promised)
         after = _merit(later, weight)
+        if later.times is not None:
+            missed = _squares(later) - _squares(now) - float((2.0 * g + G @ step) @ step)
+            curved = abs(missed - float(step @ S @ step)) < abs(missed)
+            S = _secant(S, now, later, step, pull)
         if not after < before:
             damping, worse, refused = damping * worse, 2.0 * worse, refused + 1
             if refused >= _REFUSED:
@@ -69,6 +82,24 @@ def settled(problem: TaskProblem, x: Array) -> Settled:
     return best
 
 
+def _secant(S: Array, now: Exact, later: Exact, step: Array, pull: Array) -> Array:
+    """Return the part of the Hessian that Gauss and Newton leave out, as the gradients after a step tell it.
+
+    Symmetric of rank one, sized as in [Dennis et al. 1981].
+    """
+    (_, J), (r, K) = _stacked(now), _stacked(later)
+    y = (K - J).T @ r
+    if len(pull) and pull.any():
+        y = y + (later.steep - now.steep).T @ pull
+    own = float(step @ S @ step)
+    S = S * min(1.0, abs(float(step @ y)) / max(abs(own), 1e-300))
+    off = y - S @ step
+    size = float(off @ step)
+    if abs(size) <= 1e-8 * float(np.linalg.norm(off) * np.linalg.norm(step)):
+        return S
+    return S + np.outer(off, off) / size
+
+
 def _bent(
     problem: TaskProblem, x: Array, now: Exact, step: Array, H: Array, g: Array, weight: float, far: float
 ) -> tuple[Array, Exact]:
@@ -76,19 +107,22 @@ def _bent(
 
     A merit below ``far`` says that they bend away from the model: the step is doubled, along its arc, while that helps.
     """
-    later = problem.exactly(x + step, now.times)
+    later, part = problem.exactly(x + step, now.times), 1.0
+    while later.times is None and part > _PART:  # beyond a dead centre: a shorter step tells how to bend
+        part, step = _SHORTER * part, _SHORTER * step
+        later = problem.exactly(x + step, now.times)
     if later.times is None:
         return step, later
     r, J = _stacked(now)
     bent, over = _stacked(later)[0] - r - J @ step, later.bounds - now.bounds - now.steep @ step
-    second, _ = least_squares(H, g + J.T @ bent, now.steep, -now.bounds - over)
+    second, _ = least_squares(H, part * g + J.T @ bent, now.steep, -now.bounds - over)
     if second is None:
         return step, later
     first, other = step, problem.exactly(x + second, now.times)
     if _merit(other, weight) < _merit(later, weight):
         step, later = second, other
     for k in 2.0 ** np.arange(1, _DOUBLED):
-        if not _merit(later, weight) < far:
+        if part == 1.0 and not _merit(later, weight) < far:
             break
         long = k * first + k * k * (second - first)
         other = problem.exactly(x + long, later.times)
@@ -127,24 +161,24 @@ def levelled(problem: TaskProblem, x: Array) -> Settled:
     return best
 
 
-def least_squares(H: Array, g: Array, A: Array, b: Array) -> tuple[Array | None, float]:
-    """Return the least d H d / 2 + g d with A d <= b, and the largest multiplier; None where nothing keeps A d <= b.
+def least_squares(H: Array, g: Array, A: Array, b: Array) -> tuple[Array | None, Array]:
+    """Return the least d H d / 2 + g d with A d <= b, and the multipliers; None where nothing keeps A d <= b.
 
     The problem of least distances of Lawson and Hanson, by non-negative least squares.
 
     >>> step, pull = least_squares(np.eye(2), np.array([-3.0, -1.0]), np.array([[1.0, 0.0]]), np.array([1.0]))
-    >>> step.round(12), round(pull, 12)
-    (array([1., 1.]), 2.0)
+    >>> step.round(12), pull.round(12)
+    (array([1., 1.]), array([2.]))
     """
     from scipy.optimize import nnls
 
     try:
         L = np.linalg.cholesky(H)
     except np.linalg.LinAlgError:
-        return None, 0.0
+        return None, np.zeros(len(A))
     free = np.asarray(-np.linalg.solve(H, g), np.float64)
     if not len(A) or (A @ free <= b).all():
-        return free, 0.0
+        return free, np.zeros(len(A))
     size = np.maximum(np.linalg.norm(A, axis=1), 1e-300)[:, None]
     A, b = A / size, b / size[:, 0]
     # with z = L' (d - free): least |z| where G z >= h
@@ -153,13 +187,13 @@ def least_squares(H: Array, g: Array, A: Array, b: Array) -> tuple[Array | None,
     try:
         u, _ = nnls(E, np.append(np.zeros(len(g)), 1.0))
     except RuntimeError:  # too many steps
-        return None, 0.0
+        return None, np.zeros(len(A))
     r = E @ u
     r[-1] -= 1.0
     if not -r[-1] > 1e-10:
-        return None, 0.0
+        return None, np.zeros(len(A))
     nearest = np.asarray(free + np.linalg.solve(L.T, -r[:-1] / r[-1]), np.float64)
-    return nearest, float((u / -r[-1] / size[:, 0]).max())
+    return nearest, np.asarray(u / -r[-1] / size[:, 0])
 
 
 def _lower(now: Exact, reach: Array) -> Array | None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from itertools import islice
+from itertools import islice, permutations
 from typing import Protocol
 
 import numpy as np
@@ -38,6 +38,8 @@ _PARTS, _PHASES, _COMPARED = (0.12, 0.2, 0.3, 0.45, 0.65, 0.9), 32, 14
 _HELD, _TRIED, _TOGETHER = 30.0, 2, 128
 #: One of so many random candidates has one joint far away, up to so many times: long links are nearly guides.
 _STRETCHED, _FAR = 3, 30.0
+#: One of so many has the driven link in a four-bar that nearly folds, with a coupler so much longer than the crank.
+_FOLDING, _LONGER = 6, (1e-3, 0.1)
 #: Matches of an index for every one that is wanted within a range; by how much the range may be too short; samples.
 _RANGES, _SLACK, _STEPS = 6, 0.03, 60
 #: Fewest points with even times over a turn that tell a curve of an index.
@@ -147,7 +149,10 @@ def planned(task: DesignTask, starts: Starts | None, seconds: float) -> Iterator
 
 
 def random_starts(model: Model, count: int, random: np.random.Generator) -> Unknowns:
-    """Return candidates near the sketch and far from it, driven links of many sizes, some with a joint far away."""
+    """Return candidates near the sketch and far from it, driven links of many sizes, some with a joint far away.
+
+    Some nearly fold: their couplers turn against the crank, almost as in Cardan's motion, which chance does not meet.
+    """
     design = model.plan.design
     wide = random.choice([0.0, 0.0, 1.0], (count, 1, 1))
     places = model.sketch + random.normal(0.0, 1.0, (count, *model.sketch.shape)) * (
@@ -167,7 +172,34 @@ def random_starts(model: Model, count: int, random: np.random.Generator) -> Unkn
         own = design.joints_of(model.carrier(name))
         points[:, k] = places[:, own].mean(axis=1) + random.normal(0.0, 1.0, (count, 2))
     free = np.zeros((count, model.stroke_at - model.own_at))
-    return model.kept(Unknowns(*model.tied(places, numbers), points, free, stroke))
+    u = model.kept(Unknowns(*model.tied(places, numbers), points, free, stroke))
+    loop = _four_bar(design)
+    if loop is not None:
+        some = slice(count - count // _FOLDING, count)
+        longer = np.exp(random.uniform(math.log(_LONGER[0]), math.log(_LONGER[1]), count // _FOLDING))
+        u.places[some, loop[2]] = _mirrored(u.places[some][:, loop], 1.0 + longer)
+    return u
+
+
+def _four_bar(design: Design) -> tuple[int, ...] | None:
+    """Return the four joints that turn of a four-bar with the driven link, in their order; None if there is none."""
+    joints = {frozenset(pair[:2]): k for k, pair in enumerate(design.graph.joints) if design.kinds[k] == "R"}
+    frame, driven = design.drivers[0]
+    for a, b in permutations({*range(design.graph.links)} - {frame, driven}, 2):
+        loop = [joints.get(frozenset(pair), -1) for pair in ((frame, driven), (driven, a), (a, b), (b, frame))]
+        if min(loop) >= 0:
+            return tuple(loop)
+    return None
+
+
+def _mirrored(loop: Array, longer: Array) -> Array:
+    """Return the joint of coupler and follower (sets, 2) where the four joints (sets, 4, 2) are nearly a kite.
+
+    It is the mirror image of the crank's pivot in the line of the two other joints, its coupler longer than the crank.
+    """
+    pivot, pin, _, far = np.moveaxis(loop @ [1.0, 1.0j], 1, 0)
+    along = (far - pin) / np.abs(far - pin)
+    return _pairs(pin + longer * along**2 * np.conj(pivot - pin))
 
 
 def placed_starts(

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 _BEYOND, _SPARE, _UNIT = 1.03, 0.003, 0.01
 #: What is asked beyond where bounds are kept exactly; the least sine of a transmission angle while they are not, and
 #: where they are: a mechanism beyond could not be assembled, so that no step would know how to come back.
-_HAIR, _LEAST, _VERGE = 1e-7, 0.02, 0.004
+_HAIR, _LEAST, _VERGE = 1e-7, 0.005, 0.002
 
 
 def sampled_wishes(model: Model, moved: Moved, u: Unknowns, strict: float, soft: bool = False) -> list[Rows]:

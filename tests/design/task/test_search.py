@@ -239,6 +239,27 @@ def test_errors_of_angles_are_those_of_a_fine_motion() -> None:
     assert np.abs(signature(sized, found) - signature(sized, other)).min() > 1.0
 
 
+@pytest.mark.long
+def test_some_candidates_nearly_fold_and_turn_against_their_cranks() -> None:
+    """Kites with a coupler a little longer than the crank turn fully if the frame is longer; their sides tell."""
+    task = DesignTask(targets=[PathTarget(points=POINTS)], links=[4])
+    random = np.random.default_rng(4)
+    for plan in plans(task, 4):
+        model = Model(task, plan, random)
+        u = random_starts(model, 600, random)
+        joints = {frozenset(joint[:2]): k for k, joint in enumerate(plan.design.graph.joints)}
+        driven, coupler = plan.design.drivers[0][1], plan.carriers[0]
+        (output,) = {1, 2, 3} - {driven, coupler}
+        z = u.places[500:] @ [1.0, 1.0j]
+        pairs = ((0, driven), (driven, coupler), (coupler, output), (0, output))
+        A, B, C, D = (z[:, joints[frozenset(pair)]] for pair in pairs)
+        crank, rod, follower, ground = abs(B - A), abs(C - B), abs(D - C), abs(D - A)
+        assert (rod >= (1.0 + 0.99e-3) * crank).all() and (rod <= 1.101 * crank).all()
+        assert (abs(follower - ground) <= rod - crank + 1e-12).all()
+        turns = model.move(u).complete[500:]
+        assert (ground > rod).sum() > 20 and turns[ground > 1.001 * rod].all()
+
+
 def test_a_candidate_may_begin_anywhere_on_its_turn() -> None:
     """Its motion from a later sample is the same motion, of every joint and point."""
     task = DesignTask(targets=[PathTarget(points=POINTS)])

@@ -43,7 +43,9 @@ def test_bounded_least_squares_are_those_of_all_sets_of_active_bounds() -> None:
             if (A @ d <= b + 1e-9).all():
                 least = min(least, 0.5 * d @ H @ d + g @ d)
         step, pull = least_squares(H, g, A, b)
-        assert step is not None and (A @ step <= b + 1e-9).all() and pull >= 0.0
+        assert step is not None and (A @ step <= b + 1e-9).all() and (pull >= 0.0).all()
+        assert H @ step + g + A.T @ pull == pytest.approx(np.zeros(3), abs=1e-9)
+        assert (pull * (A @ step - b)) == pytest.approx(np.zeros(4), abs=1e-9)
         assert 0.5 * step @ H @ step + g @ step == pytest.approx(least, abs=1e-9)
     assert least_squares(np.eye(1), np.zeros(1), np.array([[1.0], [-1.0]]), np.array([-1.0, -1.0]))[0] is None
 
@@ -135,3 +137,20 @@ def test_strokes_and_dead_centres_are_met_to_rounding() -> None:
     assert abs(angle(c, d, b + a) - angle(c, d, b - a)) == pytest.approx(math.radians(60.0), abs=1e-9)
     slow = math.pi + abs(angle(d, b + a, c) - angle(d, b - a, c))
     assert slow == pytest.approx(2.0 * math.pi * 1.4 / 2.4, abs=1e-9)
+
+
+class Bay:
+    """The square of the distance from (1, 40), within a parabola beyond whose shore there is no motion."""
+
+    def exactly(self, x: Any, before: Any) -> Exact:
+        u, v = x
+        over = 50.0 * u * u - v
+        seen = [(np.array([[u - 1.0, 1e-3 * (v - 40.0)]]), np.array([[[1.0, 0.0], [0.0, 1e-3]]]))]
+        return Exact(seen, np.array([over]), np.array([[100.0 * u, -1.0]]), [] if over < 1e-4 else None)
+
+
+def test_steps_bend_along_a_bound_beyond_which_there_is_no_motion() -> None:
+    """The nearest point of the shore is the real root of a cubic; without bending, steps come to u = 0.8."""
+    found = settled(Bay(), np.array([0.0, 1e-3]))  # type: ignore[arg-type]
+    (u,) = (z.real for z in np.roots([0.005, 0.0, 0.996, -1.0]) if abs(z.imag) < 1e-12)
+    assert found.x == pytest.approx([u, 50.0 * u * u], rel=1e-6)
