@@ -77,11 +77,12 @@ def broken_bounds(task: DesignTask, motion: Motion, places: Array, plan: Plan) -
 
 
 def _has_plates(task: DesignTask, mechanism: Mechanism) -> bool:
-    """Whether every given plate is a moving link of its own, from the distances of its joints."""
+    """Whether every given plate is a moving link of its own, from the distances of its joints and named points."""
     left = {*range(mechanism.graph.links)} - {mechanism.frame}
     for plate in task.plates:
         for link in left:
             own = [j.at_a if j.a == link else j.at_b for j in mechanism.joints if link in j.pair and j.kind == "R"]
+            own += [point.at for point in mechanism.points.values() if point.link == link]
             sides = ([math.dist(p, q), math.dist(q, r), math.dist(r, p)] for p, q, r in permutations(own, 3))
             if any(np.abs(np.log(np.array(own_sides) / plate)).max() <= _FIT for own_sides in sides):
                 left.remove(link)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, permutations, product
@@ -54,9 +55,6 @@ def fitting(task: DesignTask, design: Design) -> Iterator[Plan]:
         return
     if task.crank_start is not None and sum(design.kinds[k] == "R" for k in design.joints_of(design.drivers[0][1])) < 2:
         return  # a driven link without a second joint that turns has no direction
-    turning = [sum(design.kinds[k] == "R" for k in design.joints_of(link)) for link in range(design.graph.links)]
-    if sum(n >= 3 for link, n in enumerate(turning) if link != design.graph.frame) < len(task.plates):
-        return
     pins = None
     if task.drive == "cylinder":
         (own,) = design.driver_joints
@@ -66,11 +64,21 @@ def fitting(task: DesignTask, design: Design) -> Iterator[Plan]:
     for carriers in _carriers(task, design):
         if len(set().union(*(moved_by[link] for link in carriers))) < design.graph.links:
             continue  # some links would do nothing
+        if task.plates and _plates(task, design, carriers) < len(task.plates):
+            continue
         idling = tuple(_idling(task, design, carriers, moved_by))
         for taken in _given(task, design, carriers):
             given = tuple((k, (p[0], p[1])) for k, p in taken if len(p) == 2)
             regions = tuple((k, p) for k, p in taken if len(p) == 4)
             yield Plan(design, carriers, given, pins, regions, idling)
+
+
+def _plates(task: DesignTask, design: Design, carriers: tuple[int, ...]) -> int:
+    """Return the number of moving links with three places or more: joints that turn, named points."""
+    count = Counter(link for link, of_point in zip(carriers, task.names.values(), strict=True) if of_point)
+    for joint, kind in zip(design.graph.joints, design.kinds, strict=True):
+        count.update(joint[:2] if kind == "R" else ())
+    return sum(n >= 3 for link, n in count.items() if link != design.graph.frame)
 
 
 def needs(design: Design) -> list[set[int]]:

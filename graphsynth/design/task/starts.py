@@ -178,6 +178,7 @@ def random_starts(model: Model, count: int, random: np.random.Generator) -> Unkn
         some = slice(count - count // _FOLDING, count)
         longer = np.exp(random.uniform(math.log(_LONGER[0]), math.log(_LONGER[1]), count // _FOLDING))
         u.places[some, loop[2]] = _mirrored(u.places[some][:, loop], 1.0 + longer)
+        u = model.kept(u)
     return u
 
 

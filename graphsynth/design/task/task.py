@@ -46,7 +46,7 @@ def _plate(name: str, sides: Sequence[float]) -> tuple[float, float, float]:
     try:
         a, b, c = (positive(f"{name}[{k}]", side) for k, side in enumerate(sides))
     except (TypeError, ValueError):
-        raise GeometryError(f"{name} = {sides!r} must be three distances of its joints: 1-2, 2-3, 3-1") from None
+        raise GeometryError(f"{name} = {sides!r} must be three distances of its holes: 1-2, 2-3, 3-1") from None
     if 2.0 * max(a, b, c) > (a + b + c) * (1.0 + 1e-9):
         raise GeometryError(f"{name} = {sides!r}: no side of a triangle is longer than both others; correct them")
     return a, b, c
@@ -102,8 +102,9 @@ class DesignTask(Shown):
     bars : sequence of float
         Lengths of bars that are there and shall be used: each is a distance of two joints on a moving link.
     plates : sequence of (float, float, float)
-        Links with three joints that are there and shall be used: distances of the first joint from the second, of the
-        second from the third, of the third from the first.  Either side may be up.
+        Links with three holes that are there and shall be used: distances of the first from the second, of the second
+        from the third, of the third from the first.  Each hole takes a joint or the named point of a path or of poses;
+        either side may be up.
     length_ratio : float
         Longest over shortest of these distances; those of points from the joints of their link count as long ones.
     transmission : float or str
@@ -189,8 +190,10 @@ class DesignTask(Shown):
         self._shaped()
         put(self, "bars", tuple(positive(f"bars[{k}]", bar) for k, bar in enumerate(self.bars)))
         put(self, "plates", tuple(_plate(f"plates[{k}]", plate) for k, plate in enumerate(self.plates)))
-        if self.plates and max(self.links) < 6:
-            raise GeometryError("no link of four-bars but the frame has three joints; allow six links for plates")
+        if self.plates and max(self.links) < 6 and not any(self.names.values()):
+            raise GeometryError(
+                "no link of four-bars but the frame has three joints; allow six links for plates, or name a point on one"
+            )
         for name in ("misalignment", "joint_tilt"):
             if getattr(self, name) is not None:
                 positive(name, getattr(self, name))

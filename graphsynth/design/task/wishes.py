@@ -236,14 +236,15 @@ def direct_wishes(
 
 
 def plates_of(model: Model, u: Unknowns) -> Iterator[tuple[Array, Array]]:
-    """Yield how links with three joints differ from given ones, the nearest taken: (sets,), derivatives (sets, size).
+    """Yield how links differ from given ones, the nearest taken: (sets,), derivatives (sets, size).
 
-    Of each the logarithm of the first side, and the third joint as the first two see it, real and imaginary part.
+    Of each the logarithm of the first side, and the third place as the first two see it, real and imaginary part.
     """
     every = _triples(model)
     if not model.task.plates or not len(every):
         return
-    z, row, taken = u.places @ [1.0, 1.0j], np.arange(len(u.places)), np.zeros((len(u.places), len(every)))
+    z = np.concatenate([u.places, u.points], axis=1) @ [1.0, 1.0j]
+    row, taken = np.arange(len(z)), np.zeros((len(z), len(every)))
     first, second, third = (z[:, every[:, 1 + k]] for k in range(3))
     side = np.where(second == first, 1e-12, second - first)
     seen = (third - first) / side
@@ -258,8 +259,8 @@ def plates_of(model: Model, u: Unknowns) -> Iterator[tuple[Array, Array]]:
         at, unit = seen[row, k], 1.0 / side[row, k]
         off = at - q
         slopes = np.zeros((3, len(z), model.size))
-        for joint, by_side, by in zip(every[k, 1:].T, (-unit, unit, 0.0 * unit), ((at - 1.0) * unit, -at * unit, unit)):
-            column = np.array([model.column(int(own)) for own in joint])
+        for place, by_side, by in zip(every[k, 1:].T, (-unit, unit, 0.0 * unit), ((at - 1.0) * unit, -at * unit, unit)):
+            column = np.array([model.place_at(int(own)) for own in place])
             free = column >= 0
             for axis, turn in ((0, 1.0), (1, 1.0j)):
                 parts = (turn * by_side).real, (turn * by).real, (turn * by).imag
@@ -269,11 +270,12 @@ def plates_of(model: Model, u: Unknowns) -> Iterator[tuple[Array, Array]]:
 
 
 def _triples(model: Model) -> NDArray[np.intp]:
-    """Return moving links with three joints that turn, and these in every order: (n, 4)."""
-    design = model.plan.design
-    found = []
+    """Return moving links with three joints that turn or named points, and these places in every order: (n, 4)."""
+    design, found = model.plan.design, []
+    carriers = [model.carrier(name) for name, of_point in model.task.names.items() if of_point]
     for link in range(model.links):
         own = [k for k in design.joints_of(link) if design.kinds[k] == "R"]
+        own += [model.joints + k for k, carrier in enumerate(carriers) if carrier == link]
         found += [(link, *order) for order in permutations(own, 3) if link != design.graph.frame]
     return np.array(found, dtype=np.intp).reshape(-1, 4)
 

@@ -268,7 +268,7 @@ class DesignTable:
     transmission: Annotated[float, In("deg", least=0, below=90)] = 25.0 * DEGREE
     misalignment: Annotated[float | None, In("deg", above=0)] = None
     joint_tilt: Annotated[float, In("deg", above=0)] = 0.3 * DEGREE
-    plates: tuple[tuple[float, float, float], ...] = ()  # distances of three joints of a link: 1-2, 2-3, 3-1
+    plates: tuple[tuple[float, float, float], ...] = ()  # distances of three holes of a link: 1-2, 2-3, 3-1
     soft: SoftTable = field(default_factory=SoftTable)
     rank: RankTable = field(default_factory=RankTable)
     begin: tuple[str, ...] = ()  # files of mechanisms to begin with

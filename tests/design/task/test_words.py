@@ -156,17 +156,32 @@ def test_a_given_plate_is_used() -> None:
     assert min(np.abs(np.array(own) - [1.0, 2.0, 3.0]).max() for own in sides) < 3e-3
 
 
-def test_derivatives_of_what_plates_differ() -> None:
-    """By differences, where both plates lie on links of their own."""
+@pytest.mark.slow
+def test_a_plate_with_the_drawing_point_in_its_third_hole() -> None:
+    """A four-bar draws a straight line with a plate that is there: one hole is that of the point, whichever suits."""
+    holes = (2.0, 1.5, 1.2)
+    path = PathTarget.segment((0, 0), (1, 0), count=8, tolerance=0.02)
+    task = DesignTask(targets=[path], links=[4], plates=[holes], transmission="10 deg")
+    found = design(task, count=1, seconds=30.0)
+    assert found.accepted
+    mechanism = found[0].mechanism
+    point = next(iter(mechanism.points.values()))
+    own = [j.at_a if j.a == point.link else j.at_b for j in mechanism.joints if point.link in j.pair]
+    corners = [*own, point.at]
+    sides = sorted(math.dist(corners[k], corners[k - 1]) for k in range(3))
+    assert sides == pytest.approx(sorted(holes), rel=2e-3)
+
+
+@pytest.mark.parametrize("links, plan", [(6, 5), (4, 0)])
+def test_derivatives_of_what_plates_differ(links: int, plan: int) -> None:
+    """By differences, where plates lie on links of their own, and where a named point is the third place."""
     path = PathTarget.segment((0, 0), (4, 0), count=8)
-    task, random = (
-        DesignTask(targets=[path], links=[6], plates=[(2.0, 1.5, 1.0), (1.0, 2.0, 3.0)]),
-        np.random.default_rng(1),
-    )
-    model = Model(task, list(plans(task, 6))[5], random)
+    plates = [(2.0, 1.5, 1.0), (1.0, 2.0, 3.0)][: 1 + (links > 4)]
+    task, random = DesignTask(targets=[path], links=[links], plates=plates), np.random.default_rng(1)
+    model = Model(task, list(plans(task, links))[plan], random)
     X = model.write(random_starts(model, 5, random))
     values, slopes = zip(*plates_of(model, model.read(X)))
-    assert len(values) == 6 and not np.array_equal(values[0], values[3])
+    assert len(values) == 3 * len(plates) and len({value.tobytes() for value in values}) == len(values)
     for column in range(model.size):
         ends = []
         for step in (1e-6, -1e-6):
@@ -210,8 +225,7 @@ def test_a_wish_counts_by_its_weight_alone() -> None:
     "more, words",
     [
         ({"plates": [(1, 1, 3)], "links": [6]}, "no side of a triangle is longer"),
-        ({"plates": [(1, 1)], "links": [6]}, "three distances of its joints"),
-        ({"plates": [(1, 1, 1)], "links": [4]}, "allow six links for plates"),
+        ({"plates": [(1, 1)], "links": [6]}, "three distances of its holes"),
         ({"soft": {"crank": 1.0}}, "soft = 'crank'"),
         ({"soft": {"box": 0.0}}, "must be positive"),
     ],
@@ -219,3 +233,8 @@ def test_a_wish_counts_by_its_weight_alone() -> None:
 def test_plates_and_wishes_that_cannot_be(more: dict[str, Any], words: str) -> None:
     with pytest.raises(GeometryError, match=words):
         DesignTask(targets=[PathTarget.segment((0, 0), (4, 0))], **more)
+
+
+def test_a_four_bar_without_a_point_has_no_plates() -> None:
+    with pytest.raises(GeometryError, match="name a point on one"):
+        DesignTask(targets=[SwingTarget(least=1.0)], plates=[(1, 1, 1)], links=[4])
