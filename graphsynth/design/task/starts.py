@@ -175,9 +175,9 @@ def random_starts(model: Model, count: int, random: np.random.Generator) -> Unkn
     u = model.kept(Unknowns(*model.tied(places, numbers), points, free, stroke))
     loop = _four_bar(design)
     if loop is not None:
-        some = slice(count - count // _FOLDING, count)
+        last = slice(count - count // _FOLDING, count)
         longer = np.exp(random.uniform(math.log(_LONGER[0]), math.log(_LONGER[1]), count // _FOLDING))
-        u.places[some, loop[2]] = _mirrored(u.places[some][:, loop], 1.0 + longer)
+        u.places[last, loop[2]] = _mirrored(u.places[last][:, loop], 1.0 + longer)
         u = model.kept(u)
     return u
 

@@ -192,7 +192,7 @@ class DesignTask(Shown):
         put(self, "plates", tuple(_plate(f"plates[{k}]", plate) for k, plate in enumerate(self.plates)))
         if self.plates and max(self.links) < 6 and not any(self.names.values()):
             raise GeometryError(
-                "no link of four-bars but the frame has three joints; allow six links for plates, or name a point on one"
+                "no link of four-bars but the frame has three joints; allow six links for plates, or name a point"
             )
         for name in ("misalignment", "joint_tilt"):
             if getattr(self, name) is not None:

@@ -236,5 +236,5 @@ def test_plates_and_wishes_that_cannot_be(more: dict[str, Any], words: str) -> N
 
 
 def test_a_four_bar_without_a_point_has_no_plates() -> None:
-    with pytest.raises(GeometryError, match="name a point on one"):
+    with pytest.raises(GeometryError, match="or name a point"):
         DesignTask(targets=[SwingTarget(least=1.0)], plates=[(1, 1, 1)], links=[4])
