@@ -122,6 +122,15 @@ def test_reference_numbers():
     assert count_slider_chains(4, 2) == 1 and count_slider_chains(4, 2, sliding_links=True) == 2  # RPRP; and RRPP
 
 
+@pytest.mark.long
+def test_every_listed_chain_keeps_the_rules():
+    """Several classes meet at a vertex from eight links on: what a label gives must be told at the right end."""
+    for rules in RULES:
+        chains = list(enumerate_slider_chains(8, 3, **rules))
+        for chain in chains[:: 1 if rules["sliding_loops"] else 20]:
+            assert keeps_rules(nx.Graph(list(chain.joints)), chain.sliders, **rules), chain
+
+
 def test_one_slider_is_an_orbit_of_joints():
     orbits = sum(len(chain.joint_orbits) for chain in enumerate_chains(10))
     assert count_slider_chains(10, 1) == orbits
