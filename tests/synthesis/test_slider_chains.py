@@ -131,6 +131,14 @@ def test_every_listed_chain_keeps_the_rules():
             assert keeps_rules(nx.Graph(list(chain.joints)), chain.sliders, **rules), chain
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("number", [5, 6])
+def test_many_sliders_tell_the_ends_of_turned_classes(number):
+    """Automorphisms turn classes about: a symmetric labelling gives the other end what it gave this one."""
+    rules = RULES[1]
+    assert count_slider_chains(8, number, **rules) == len(classes(8, 1, number, False, **rules))
+
+
 def test_one_slider_is_an_orbit_of_joints():
     orbits = sum(len(chain.joint_orbits) for chain in enumerate_chains(10))
     assert count_slider_chains(10, 1) == orbits
