@@ -14,7 +14,7 @@ from graphsynth.synthesis.writing import count_with_checkpoint
 def run(options: argparse.Namespace) -> int:
     """Print the count; the number stands alone on the last line."""
     begin = time.perf_counter()
-    problem = problem_of(options, counted=options.shard is None)
+    problem = problem_of(options, counted=True)
     if problem.reason:
         console.note(f"nothing to count: {problem.reason}")
     size = sum(part.weight for part in problem.parts())
@@ -33,7 +33,8 @@ def run(options: argparse.Namespace) -> int:
     seconds = time.perf_counter() - begin
     shard = f"{options.shard[0]}/{options.shard[1]}" if options.shard else None
     if options.json:
-        document = {"question": problem.title, "shard": shard, "count": count, "seconds": round(seconds, 3)}
+        number = count if isinstance(count, int) else str(count)
+        document = {"question": problem.title, "shard": shard, "count": number, "seconds": round(seconds, 3)}
         console.put_json(document | ({"reason": problem.reason} if problem.reason else {}))
         return 0
     console.put(f"{problem.title}{f' shard {shard}' if shard else ''} ({seconds:.2f} s)")

@@ -21,6 +21,7 @@ from graphsynth.synthesis.families import Family
 from graphsynth.synthesis.fractionated import OneByOne, count_fractionated
 from graphsynth.synthesis.kernels.counting import COUNTING, LISTING, MAKING, weigh_block
 from graphsynth.synthesis.problem import WorkItem
+from graphsynth.synthesis.totals import Total
 
 Shard = tuple[int, int]
 Costs = NDArray[np.float64]
@@ -51,6 +52,15 @@ def shard_of(items: Sequence[WorkItem], shard: Shard | None, *, listing: bool = 
         elif low < high:
             found.append(item)
     return found
+
+
+def run_of(parts: Sequence[WorkItem | Total], shard: Shard) -> list[WorkItem | Total]:
+    """Return the parts of a count that are shard i of m: a run of whole ones, by their weights.
+
+    Raises `SpecError` for i out of 1..m.
+    """
+    first, last = _run(np.array([part.weight for part in parts]), *_checked(shard))
+    return list(parts[first:last])
 
 
 def share_of(items: Sequence[WorkItem], shard: Shard | None) -> range:

@@ -26,8 +26,8 @@ from graphsynth.structure.slider_chains import SliderChain
 from graphsynth.synthesis.chunks import Chunk
 from graphsynth.synthesis.edge_labels import SLIDER
 from graphsynth.synthesis.problem import EnumerationProblem, WorkItem, counts, graphs, texts, whole_sum
-from graphsynth.synthesis.shards import shard_of
-from graphsynth.synthesis.totals import Total
+from graphsynth.synthesis.shards import run_of, shard_of
+from graphsynth.synthesis.totals import Grown, Total
 
 _SAMPLED = 16  # items made to estimate the size of a listing
 
@@ -151,7 +151,7 @@ def estimated_size(
     chosen = chunks[:: max(1, len(chunks) // _SAMPLED)]
     made = [sum(lines for _, lines in chunk.texts()) for chunk in chosen]
     some = [(next(graphs([chunk], None)), chunk) for chunk, lines in zip(chosen, made) if lines]
-    size = sum(len(_json_line(*one)) if form == "jsonl" else len(one[0].to_text()) + 4 for one in some)
+    size = sum(len(_json_line(*one)) if form == "jsonl" else len(one[0].to_text()) + 1 for one in some)
     number = weight * sum(made) / sum(chunk.weight for chunk in chosen)
     return number, number * size / max(len(some), 1)
 
@@ -202,13 +202,18 @@ def count_with_checkpoint(
     checkpoint: Path | None = None,
     executor: Executor | None = None,
     watch: Callable[[Step], None] | None = None,
-) -> int:
+) -> int | Fraction:
     """Count a problem; with a checkpoint file the items already counted there are not counted again (exact).
+
+    The shards of chains that can only be counted together (nine loops) are fractions whose sum is the count.
 
     Raises `GraphsynthError` if the checkpoint belongs to another problem, or another process writes it. Raises
     `FormatError` if it is no checkpoint, or somebody changed it.
     """
-    items = shard_of(problem.work_items(listing=False), shard, listing=False) if shard else problem.parts()
+    items = problem.parts()
+    together = any(isinstance(item, Grown) for item in items)
+    if shard:
+        items = run_of(items, shard) if together else shard_of(problem.work_items(listing=False), shard, listing=False)
     total = sum(item.weight for item in items) or 1.0
     with Journal(checkpoint, _work(problem, items, "count", "name another file")) as journal:
         known = [Fraction(entry) for entry in journal.entries]
@@ -221,4 +226,4 @@ def count_with_checkpoint(
             journal.append(str(found))
             if watch:
                 watch(Step(int(count), done / total))
-    return whole_sum(count)
+    return count if shard and together else whole_sum(count)

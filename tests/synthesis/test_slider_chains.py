@@ -131,8 +131,7 @@ def test_every_listed_chain_keeps_the_rules():
             assert keeps_rules(nx.Graph(list(chain.joints)), chain.sliders, **rules), chain
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("number", [5, 6])
+@pytest.mark.parametrize("number", [pytest.param(5, marks=pytest.mark.slow), pytest.param(6, marks=pytest.mark.long)])
 def test_many_sliders_tell_the_ends_of_turned_classes(number):
     """Automorphisms turn classes about: a symmetric labelling gives the other end what it gave this one."""
     rules = RULES[1]

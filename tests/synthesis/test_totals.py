@@ -24,6 +24,7 @@ from graphsynth.synthesis.kernels.layout import MAX_VERTICES
 from graphsynth.synthesis.kernels.moving import sum_moved
 from graphsynth.synthesis.problem import EnumerationProblem, whole_sum
 from graphsynth.synthesis.rigid_blocks import identity_sum, identity_sums
+from graphsynth.synthesis.shards import run_of
 from graphsynth.synthesis.writing import count_with_checkpoint
 
 PUBLISHED = tomllib.loads((Path(__file__).parents[2] / "catalog/counts/published.toml").read_text(encoding="utf-8"))
@@ -144,6 +145,20 @@ def test_shares_of_parts_survive_an_interruption(every_size_together, tmp_path):
     text = (tmp_path / "counted.txt").read_text(encoding="utf-8")
     assert "/" in text.split("\n", 1)[1]  # fractions
     assert count_with_checkpoint(problem, checkpoint=tmp_path / "counted.txt") == 230
+
+
+def test_shards_of_twenty_links_are_runs_of_the_parts():
+    problem = EnumerationProblem.chains(20, 1, 3, None, False, None, counted=True)
+    parts = list(problem.parts())
+    for many in (1, 3, 50):
+        runs = [run_of(parts, (i, many)) for i in range(1, many + 1)]
+        assert [part for run in runs for part in run] == parts
+        heaviest = max(sum(part.weight for part in run) for run in runs)
+        assert heaviest <= sum(part.weight for part in parts) / many + max(part.weight for part in parts)
+    few = [k for k, part in enumerate(parts) if isinstance(part, totals.Identities) and part.points < 5]
+    found = [count_with_checkpoint(problem, shard=(k + 1, len(parts))) for k in few]
+    assert found == [parts[k].count() for k in few]
+    assert any(number.denominator > 1 for number in found)
 
 
 # --- graphs as a stream -----------------------------------------------------------------------------------------------
