@@ -153,6 +153,10 @@ def prove_that_it_binds(person, downloads):
     program = person.script("return document.getElementById('snippet').value")
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300, check=True)
     assert done.stdout.startswith("Proved: it binds")
+    assert "python prove.py" in person.script("return document.getElementById('pythonAbout').textContent")
+    (downloads / "prove.py").unlink(missing_ok=True)
+    person.script("document.querySelector('[data-do=savePython]').click()")
+    assert file(downloads, "prove.py").read_text("utf-8") == program
 
 
 def find_its_chain_and_relatives(person, downloads):

@@ -110,10 +110,16 @@
     if (done) saved(app, `mechanism.${type.slice(6)}`, new Blob(parts, { type }));
   };
 
-  Bench.do.python = app => {
-    document.getElementById("snippet").value = Bench.toPython(app.posed());
-    document.getElementById("python").showModal();
+  /** Show a program, how to run it, and under which name it is saved. */
+  Bench.showPython = (program, about, name) => {
+    const box = document.getElementById("snippet"), dialog = document.getElementById("python");
+    box.value = program;
+    dialog.dataset.name = name;
+    document.getElementById("pythonAbout").textContent = Bench.word(about, { name });
+    dialog.showModal();
   };
+  Bench.do.python = app => Bench.showPython(Bench.toPython(app.posed()), "python.about", "mechanism.py");
+  Bench.do.savePython = app => saved(app, document.getElementById("python").dataset.name, document.getElementById("snippet").value, "text/x-python");
   Bench.do.copyPython = async app => {
     const box = document.getElementById("snippet");
     box.select();

@@ -155,8 +155,7 @@
 
     /** The program that proves it with the library. */
     prove() {
-      document.getElementById("snippet").value = this.open().python();
-      document.getElementById("python").showModal();
+      Bench.showPython(this.open().python(), "python.prove", "prove.py");
     }
   };
 })();
