@@ -125,6 +125,7 @@ def assemble_it_otherwise(person, downloads):
     person.script("document.querySelector('[data-group=\"0\"]').click()")
     after = np.array(person.script("return Array.from(Bench.app.motion.engine.pose)"))
     assert np.abs(after - before)[3:6].max() < 1e-12 < 0.1 < np.abs(after - before).max()
+    assert person.script("return Bench.app.view.holds(Bench.box(Bench.app.posed()))")  # nothing has left the window
 
 
 def tilt_the_axis_until_it_binds(person, downloads):

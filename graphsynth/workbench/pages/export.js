@@ -117,6 +117,8 @@
     dialog.dataset.name = name;
     document.getElementById("pythonAbout").textContent = Bench.word(about, { name });
     dialog.showModal();
+    box.setSelectionRange(0, 0);
+    box.scrollTop = 0;
   };
   Bench.do.python = app => Bench.showPython(Bench.toPython(app.posed()), "python.about", "mechanism.py");
   Bench.do.savePython = app => saved(app, document.getElementById("python").dataset.name, document.getElementById("snippet").value, "text/x-python");

@@ -127,6 +127,8 @@
       this.show();
       this.app.say("said.mode", { n: all.length + 1 });
       this.app.changed("rest");
+      const player = document.getElementById("player").offsetHeight;
+      if (!this.app.view.holds(Bench.box(this.app.posed()), player)) Bench.do.fit(this.app);
     }
 
     toggle() { if (this.playing) this.pause(); else this.play(); }

@@ -16,9 +16,9 @@
   Bench.pathOver = (swept, links, k, at) =>
     Array.from(swept.inputs, (_, i) => Bench.carried(rowOf(swept.poses, links, i, k), at));
 
-  /** The box around a drawing and the paths of its traced points. */
+  /** The box around the drawing as it stands and the paths of its traced points. */
   Bench.boxWithPaths = app => {
-    const box = Bench.box(app.sheet), { motion, sheet } = app, swept = box && motion && motion.driven ? motion.sweep() : null;
+    const box = Bench.box(app.posed()), { motion, sheet } = app, swept = box && motion && motion.driven ? motion.sweep() : null;
     if (!swept) return box;
     const links = Object.keys(sheet.links).length;
     const places = Bench.tracedPoints(sheet).flatMap(([, k, at]) => Bench.pathOver(swept, links, k, at));

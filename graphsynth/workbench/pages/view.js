@@ -44,6 +44,12 @@
       this.camera.y = (box[1] + box[3]) / 2 - covered / (2 * this.camera.scale);
     }
 
+    /** Whether a box is seen whole, above what is covered at the bottom. */
+    holds(box, covered = 0) {
+      const [left, low] = this.px([box[0], box[1]]), [right, top] = this.px([box[2], box[3]]);
+      return left >= 0 && top >= 0 && right <= this.width && low <= this.height - covered;
+    }
+
     /** Zoom about a place in pixels. */
     zoom(factor, [x, y]) {
       const before = this.place([x, y]);

@@ -350,7 +350,7 @@ def joint_rows(drawn, rows, row_table):
     ``rows`` int64 (rows, 6): code, links a and b, twice -1, the joint; ``row_table`` (sets, rows, width).  A joint of
     mobility 1 has two rows, any other one.
     """
-    joints, count = drawn.joints, 0
+    joints, count, gears = drawn.joints, 0, 0
     for k in range(joints.shape[0] + drawn.drivers.shape[0]):
         driver = k - joints.shape[0]
         joint = k if driver < 0 else drawn.drivers[driver, 0]
@@ -364,6 +364,9 @@ def joint_rows(drawn, rows, row_table):
             for s in range(row_table.shape[0]):
                 row_table[s, count, :] = 0.0
                 joint_row(drawn, drawn.sizes[s], code, joint, driver, row_table[s, count])
+                if code == codes.GEAR:
+                    row_table[s, count, codes.SLOT] = gears
+            gears += code == codes.GEAR
             count += 1
 
 
