@@ -48,7 +48,7 @@ def points_of(poses: np.ndarray, link: int, at: Any) -> np.ndarray:
     return poses[..., link, :2] + np.stack([z.real, z.imag], axis=-1)
 
 
-@njit
+@njit(error_model="numpy")
 def equations_at(kinds: Any, pairs: Any, numbers: Any, frame: int, Lc: float, pose: Any, f: Any, J: Any) -> None:
     """Write violations of joints and their derivatives by places and turned lengths of the moving links, from scratch.
 
@@ -90,7 +90,7 @@ def equations_at(kinds: Any, pairs: Any, numbers: Any, frame: int, Lc: float, po
         row += count
 
 
-@njit
+@njit(error_model="numpy")
 def moved(pose: Any, frame: int, Lc: float, by: Any) -> None:
     for link in range(len(pose)):
         if link != frame:
@@ -100,7 +100,7 @@ def moved(pose: Any, frame: int, Lc: float, by: Any) -> None:
             pose[link, 2] += by[at + 2] / Lc
 
 
-@njit
+@njit(error_model="numpy")
 def slope_of(pose: Any, frame: int, Lc: float, tangent: Any, link: int, at: complex, target: complex) -> float:
     """Return how fast the point nears its target along the tangent, times their distance."""
     k, arm = 3 * (link - (link > frame)), at * np.exp(1j * pose[link, 2])
@@ -108,14 +108,14 @@ def slope_of(pose: Any, frame: int, Lc: float, tangent: Any, link: int, at: comp
     return float((speed * (target - pose[link, 0] - 1j * pose[link, 1] - arm).conjugate()).real)
 
 
-@njit
+@njit(error_model="numpy")
 def apart(a: Any, b: Any, Lc: float) -> float:
     """Largest difference of two poses, angles modulo a turn."""
     turn = np.abs(np.exp(1j * a[:, 2]) - np.exp(1j * b[:, 2])).max()
     return float(max(np.abs(a[:, :2] - b[:, :2]).max() / Lc, turn))
 
 
-@njit
+@njit(error_model="numpy")
 def walk(
     kinds: Any, pairs: Any, numbers: Any, frame: int, Lc: float, start: Any, end: Any, link: int, at: complex,
     target: complex, h: float, sign: float,
@@ -135,6 +135,8 @@ def walk(
         moved(pose, frame, Lc, sense * h * Lc * tangent)
         for _ in range(8):  # back to the joints, at right angles to the tangent
             equations_at(kinds, pairs, numbers, frame, Lc, pose, f, J)
+            if not np.abs(f).max() < Lc:
+                return close, first, rest  # the way has met a singular pose, and is lost
             held[:-1], right[:-1, 0] = J, -f
             held[-1] = tangent
             found = np.linalg.solve(held, right)
