@@ -1,6 +1,6 @@
 """A short film of the workbench for the README: ``python -m tests.workbench.film [FILE.gif]``, in a real Chromium.
 
-A crank-rocker is drawn, turned and pulled by its coupler; then a leg walks.
+A crank-rocker is drawn, turned and pulled by its coupler, and its axis is tilted; then a leg walks.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Film:
 
     def write(self, path: Path) -> None:
         """Write the film, all its pictures in the colours of the last ones."""
-        colours = self.frames[-1].quantize(COLOURS)
+        colours = self.frames[-1].quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
         frames = [frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in self.frames]
         frames[0].save(path, save_all=True, append_images=frames[1:], duration=self.times, loop=0, optimize=True)
 
@@ -62,7 +62,7 @@ def turn(film: Film, pictures: int) -> None:
 def draw(film: Film) -> None:
     """Draw a crank-rocker and trace a point of its coupler."""
     person = film.person
-    person.look_at(0, 40, 4)
+    person.look_at(0, 26, 3.2)
     film.take(STEP)
     person.tool("link")
     person.drag((-40, 0), (-40, 20))
@@ -100,6 +100,18 @@ def pull(film: Film) -> None:
     person.mouse("mouseReleased", *ways[0])
 
 
+def tilt(film: Film) -> None:
+    """Tilt the axis of the crank, more and more."""
+    person = film.person
+    person.script("document.querySelector('#binding input').click()")
+    person.until("return document.getElementById('jammed')")
+    for angle in (0.2, 1.0, 3.0):
+        person.script("Bench.app.jamming.set({ alpha: arguments[0] * Math.PI / 180 })", angle)
+        person.script("document.getElementById('binding').scrollIntoView()")
+        film.take(STEP)
+    person.script("document.querySelector('#binding input').click()")
+
+
 def main(path: Path) -> None:
     """Make the film."""
     with tempfile.TemporaryDirectory() as folder:
@@ -112,6 +124,7 @@ def main(path: Path) -> None:
             turn(film, 24)
             pull(film)
             film.take(STEP)
+            tilt(film)
             film.person.press("[data-do=templates]")
             film.take(STEP)
             film.person.press("[data-template=jansen]")

@@ -168,8 +168,10 @@
   };
 
   /** A driver coordinate as it is shown: degrees, or a length. */
-  Bench.shownInput = (motion, input) =>
-    (motion.turns ? `${Bench.shown((input * 180) / Math.PI, 4)}°` : `${Bench.shown(input, 4)} ${motion.app.sheet.unit}`);
+  Bench.shownInput = (motion, input) => {
+    const tidy = value => Bench.shown(Math.round(value * 1e9) / 1e9, 4); // nothing for a zero that is left by rounding
+    return motion.turns ? `${tidy((input * 180) / Math.PI)}°` : `${tidy(input)} ${motion.app.sheet.unit}`;
+  };
 
   /** Place, velocity and acceleration of a point that link `k` carries, from rows (x, y, angle) of the engine. */
   Bench.pointMotion = (pose, velocity, acceleration, k, at) => {
