@@ -19,7 +19,7 @@ from tests.workbench.conftest import started
 from tests.workbench.person import Person
 
 FILE = Path(__file__).parents[2] / "docs" / "pictures" / "readme-workbench.gif"
-SIZE, COLOURS = (960, 600), 32
+SIZE, COLOURS = (960, 600), 64
 #: How long a picture stands, in milliseconds: of a step of the work, of a motion.
 STEP, MOVING = 900, 120
 
@@ -43,8 +43,12 @@ class Film:
         self.times.append(time)
 
     def write(self, path: Path) -> None:
-        """Write the film, all its pictures in the colours of the last ones."""
-        colours = self.frames[-1].quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+        """Write the film, all its pictures in the colours of a few of them."""
+        some = self.frames[::15]
+        sheet = Image.new("RGB", (SIZE[0], SIZE[1] * len(some)))
+        for k, frame in enumerate(some):
+            sheet.paste(frame, (0, SIZE[1] * k))
+        colours = sheet.quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
         frames = [frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in self.frames]
         frames[0].save(path, save_all=True, append_images=frames[1:], duration=self.times, loop=0, optimize=True)
 
