@@ -52,5 +52,5 @@ def run(options: argparse.Namespace) -> int:
         print_summary(report, console.screen(), report["tables"])
         if files:
             console.put(f"See them move: {folder / 'report.html'}")
-            console.put(f"Make one: graphsynth parts {files[0]}")
+            console.put(f"Make one, with a unit of length of 1 mm: graphsynth parts {files[0]} --unit 1")
     return 0
