@@ -177,12 +177,11 @@ def _modes_of_groups(groups: list[Any]) -> list[int]:
 
 def _parquet(columns: dict[str, Any], encodings: dict[str, str], together: int | None = None) -> bytes:
     parquet = need("pyarrow.parquet", "parquet", "A data set")
-    table = _arrow().table(columns)
     plain = [name for name in columns if name not in encodings]
     levels = {name: 19 if name == "graph6" else 6 for name in columns}  # graphs are half of the bytes
     out = io.BytesIO()
     looks = {"compression": "zstd", "compression_level": levels, "use_dictionary": plain, "column_encoding": encodings}
-    parquet.write_table(table, out, row_group_size=together, **looks)
+    parquet.write_table(_arrow().table(columns), out, row_group_size=together, **looks)
     return out.getvalue()
 
 
