@@ -37,7 +37,7 @@ def line_of(chain):
     [
         (6, 1, True, 2), (7, 2, True, 2), (8, 3, True, 2), (9, 4, True, 2),
         pytest.param(8, 1, True, 4, marks=pytest.mark.long),
-        pytest.param(9, 2, True, 4, marks=pytest.mark.long),
+        pytest.param(9, 2, True, 4, marks=pytest.mark.slow),
         pytest.param(10, 1, False, 6, marks=pytest.mark.slow),
         pytest.param(10, 3, True, 4, marks=pytest.mark.slow),
         pytest.param(11, 2, False, 6, marks=pytest.mark.slow),

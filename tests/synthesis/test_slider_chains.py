@@ -92,7 +92,7 @@ RULES = [{name: bool(value) for name, value in rules.items()} for rules in RULES
     ("links", "mobility", "most", "framed"),
     [
         (4, 1, 4, True), (5, 2, 5, True), (6, 1, 5, True), (6, 3, 5, True),
-        pytest.param(7, 2, 6, True, marks=pytest.mark.long),
+        pytest.param(7, 2, 6, True, marks=pytest.mark.slow),
         pytest.param(8, 1, 5, True, marks=pytest.mark.slow),
         pytest.param(9, 2, 4, False, marks=pytest.mark.slow),
         pytest.param(10, 1, 4, False, marks=pytest.mark.slow),
