@@ -212,7 +212,7 @@ def sweep(tables, modes, state, start, goal, scale, watched, out, sizes, found):
     of the way that was made, code and step of what stopped it, and the number of reversals.
     """
     work, n, links = workspace(tables, state, start.shape[0]), out.poses.shape[0], state.X.shape[0]
-    before, probe = copied(state), copied(state)
+    before, probe, between = copied(state), copied(state), copied(state)
     code, at = evaluate(tables, modes, state, start, goal - start, sizes, work)
     s, reached, count = 0.0, 0, 0
     for i in range(n if code == codes.DONE else 0):
@@ -233,8 +233,21 @@ def sweep(tables, modes, state, start, goal, scale, watched, out, sizes, found):
         for k in range(state.M.shape[0]):
             out.margins[i, k] = state.M[k, 0]
         for k in range(watched.shape[0] if i > 0 and count < out.reversals.shape[0] else 0):
-            if count < out.reversals.shape[0] and speed(before, watched[k]) * speed(state, watched[k]) < 0.0:
-                where = reversal(tables, modes, before, probe, start, goal, (last, s), watched[k], sizes, work)
+            own, middle = watched[k], last
+            copy_first(before, between)
+            v, w = rate(before, own, 0), rate(state, own, 0)
+            # slower at first, then faster: between them it may reverse twice
+            if v * w > 0.0 and v * rate(before, own, 1) < 0.0 and w * rate(state, own, 1) > 0.0:
+                slow = reversal(tables, modes, before, probe, start, goal, (last, s), own, 1, sizes, work)
+                if slow == slow:
+                    _, failed, _ = follow(tables, modes, between, start, goal, (last, slow), sizes, work)
+                    middle = slow if failed == codes.DONE else last
+            for part in range(2):
+                low, high = (last, middle) if part == 0 else (middle, s)
+                first, second = (before, between) if part == 0 else (between, state)
+                if count == out.reversals.shape[0] or not rate(first, own, 0) * rate(second, own, 0) < 0.0:
+                    continue
+                where = reversal(tables, modes, first, probe, start, goal, (low, high), own, 0, sizes, work)
                 if where == where:
                     out.reversals[count, 0], out.reversals[count, 1] = k, where
                     count += 1
@@ -245,30 +258,30 @@ def sweep(tables, modes, state, start, goal, scale, watched, out, sizes, found):
 
 
 @kernel
-def speed(state, coordinate):
-    """Return the rate of a coordinate on the frame in sample 0."""
-    V, link = state.V, int(coordinate[0])
+def rate(state, coordinate, order):
+    """Return the speed (order 0) or the acceleration (1) of a coordinate on the frame in sample 0."""
+    V, link = (state.V if order == 0 else state.W), int(coordinate[0])
     if coordinate[1] == 0.0 and coordinate[2] == 0.0:
         return V[link, 2, 0]
     return coordinate[1] * V[link, 0, 0] + coordinate[2] * V[link, 1, 0]
 
 
 @kernel
-def reversal(tables, modes, before, probe, start, goal, span, coordinate, sizes, work):
-    """Find s where a coordinate reverses between two samples, by the rule of false position [Dowell, Jarratt 1971].
+def reversal(tables, modes, before, probe, start, goal, span, coordinate, order, sizes, work):
+    """Find s where a rate changes its sign between two samples, by the rule of false position [Dowell, Jarratt 1971].
 
     NaN where the branch does not reach, or the speed has a pole there.
     """
     low, high = span
     copy_first(before, probe)
-    f_low, f_high, where = speed(probe, coordinate), math.nan, high
+    f_low, f_high, where = rate(probe, coordinate, order), math.nan, high
     first = abs(f_low)
     for trial in range(60):
         copy_first(before, probe)
         _, code, _ = follow(tables, modes, probe, start, goal, (span[0], where), sizes, work)
         if code != codes.DONE:
             return math.nan
-        f = speed(probe, coordinate)
+        f = rate(probe, coordinate, order)
         if trial == 0:
             high, f_high, first = where, f, max(first, abs(f))
         elif f * f_high < 0.0:
