@@ -205,12 +205,10 @@ def copy_first(source, target):
 @kernel
 def sweep(tables, modes, state, start, goal, scale, watched, out, sizes, found):
     """Move the drivers from ``start``, the coordinates of sample 0, to ``goal`` over equally spaced samples.
-
     To ``out`` go poses (n, links, 3) with continuous angles, derivatives by u where ds/du is ``scale``, margins
     (n, steps), and reversals (most, 2): index in ``watched``, s.  ``watched`` (k, 3) names coordinates on the frame:
-    a link, and the direction in which it slides, zeros if it turns.  To ``found`` (5,) go the samples reached, the part
-    of the way that was made, code and step of what stopped it, and the number of reversals.
-    """
+    a link, and the direction in which it slides, or zeros.  To ``found`` (5,) go samples reached, the part of the way
+    made, code and step of what stopped it, number of reversals."""
     work, n, links = workspace(tables, state, start.shape[0]), out.poses.shape[0], state.X.shape[0]
     before, probe, between = copied(state), copied(state), copied(state)
     code, at = evaluate(tables, modes, state, start, goal - start, sizes, work)
@@ -235,8 +233,7 @@ def sweep(tables, modes, state, start, goal, scale, watched, out, sizes, found):
         for k in range(watched.shape[0] if i > 0 and count < out.reversals.shape[0] else 0):
             own, middle = watched[k], last
             copy_first(before, between)
-            v, w = rate(before, own, 0), rate(state, own, 0)
-            # slower at first, then faster: between them it may reverse twice
+            v, w = rate(before, own, 0), rate(state, own, 0)  # slower, then faster: it may reverse twice
             if v * w > 0.0 and v * rate(before, own, 1) < 0.0 and w * rate(state, own, 1) > 0.0:
                 slow = reversal(tables, modes, before, probe, start, goal, (last, s), own, 1, sizes, work)
                 if slow == slow:
