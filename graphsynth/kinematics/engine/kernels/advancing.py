@@ -205,14 +205,17 @@ def copy_first(source, target):
 @kernel
 def sweep(tables, modes, state, start, goal, scale, watched, out, sizes, found):
     """Move the drivers from ``start``, the coordinates of sample 0, to ``goal`` over equally spaced samples.
+
     To ``out`` go poses (n, links, 3) with continuous angles, derivatives by u where ds/du is ``scale``, margins
     (n, steps), and reversals (most, 2): index in ``watched``, s.  ``watched`` (k, 3) names coordinates on the frame:
     a link, and the direction in which it slides, or zeros.  To ``found`` (5,) go samples reached, the part of the way
-    made, code and step of what stopped it, number of reversals."""
+    made, code and step of what stopped it, number of reversals.
+    """
     work, n, links = workspace(tables, state, start.shape[0]), out.poses.shape[0], state.X.shape[0]
     before, probe, between = copied(state), copied(state), copied(state)
     code, at = evaluate(tables, modes, state, start, goal - start, sizes, work)
     s, reached, count = 0.0, 0, 0
+    # sample by sample, each from the one before
     for i in range(n if code == codes.DONE else 0):
         to, last = i / max(1.0, n - 1.0), s
         copy_first(state, before)
@@ -233,12 +236,14 @@ def sweep(tables, modes, state, start, goal, scale, watched, out, sizes, found):
         for k in range(watched.shape[0] if i > 0 and count < out.reversals.shape[0] else 0):
             own, middle = watched[k], last
             copy_first(before, between)
-            v, w = rate(before, own, 0), rate(state, own, 0)  # slower, then faster: it may reverse twice
+            # slower, then faster: it may reverse twice
+            v, w = rate(before, own, 0), rate(state, own, 0)
             if v * w > 0.0 and v * rate(before, own, 1) < 0.0 and w * rate(state, own, 1) > 0.0:
                 slow = reversal(tables, modes, before, probe, start, goal, (last, s), own, 1, sizes, work)
                 if slow == slow:
                     _, failed, _ = follow(tables, modes, between, start, goal, (last, slow), sizes, work)
                     middle = slow if failed == codes.DONE else last
+            # one reversal in each part where the speed changes its sign
             for part in range(2):
                 low, high = (last, middle) if part == 0 else (middle, s)
                 first, second = (before, between) if part == 0 else (between, state)
