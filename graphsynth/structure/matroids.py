@@ -22,7 +22,9 @@ def fill_ranks(links, link, pin, ranks):
     Link ``link[k]`` (incidences,) holds pin ``pin[k]``; pins are numbered from 0.
     """
     full = (1 << links) - 1
-    points = links + pin.max() + 1
+    points = links
+    for k in range(pin.shape[0]):
+        points = max(points, links + pin[k] + 1)
     parent = np.empty(points, np.int64)
     # what a set adds to the equations of loops, if nothing but its pins restrains it: its incidences in the cographic
     # matroid of links and pins, which is their number less the pieces into which the rest falls without them
@@ -128,6 +130,12 @@ def _fits(ranks, left, one, two, large, small):
 
 
 @kernel
+def _wait(stack, at, left, one, two):
+    """Put a question on the stack, before its first cut."""
+    stack[at, 0], stack[at, 1], stack[at, 2], stack[at, 3], stack[at, 4] = left, one, two, 0, 0
+
+
+@kernel
 def count_modes(links, ranks, keys, counts, stack):
     """Return the number of assembly modes; -1 where keys (a power of two) are too few, 0 if none or infinitely many.
 
@@ -145,9 +153,10 @@ def count_modes(links, ranks, keys, counts, stack):
     if found >= 0:
         return found
     top, known = 0, 0
-    stack[0] = left, one, two, 0, 0
+    _wait(stack, 0, left, one, two)
     while top >= 0:
-        left, one, two, cut, total = stack[top]
+        left, one, two = stack[top, 0], stack[top, 1], stack[top, 2]
+        cut, total = stack[top, 3], stack[top, 4]
         fixed = left & -left  # the link of the cut, large and small at once
         waits = False
         while not waits:
@@ -165,7 +174,7 @@ def count_modes(links, ranks, keys, counts, stack):
                     if found < 0:  # the smaller question first, then this cut again
                         stack[top, 3], stack[top, 4] = cut, total
                         top += 1
-                        stack[top] = question[0], question[1], question[2], 0, 0
+                        _wait(stack, top, question[0], question[1], question[2])
                         waits = True
                         break
                     product *= found
