@@ -63,7 +63,7 @@ def enumerate_slider_chains(
     Examples
     --------
     >>> [chain.to_text() for chain in enumerate_slider_chains(4, 1, framed=True)]
-    ['Cl f0 P:0-1', 'Cl f0 P:1-2']
+    ['Cl f0 P:0-3', 'Cl f0 P:2-3']
     """
     given = links, sliders, mobility, sliding_links, sliding_loops, cylinders, framed
     problem = EnumerationProblem.sliders(*given)
