@@ -74,7 +74,7 @@ class Dataset(Shown):
         try:
             self.manifest: dict[str, Any] = json.loads((self.folder / _MANIFEST).read_text(encoding="utf-8"))
             version = self.manifest["version"]
-            self._rows = {(own["mobility"], own["links"]): own for own in self.manifest["families"]}
+            self._rows = {(own["mobility"], own["links"]): own for own in map(_read, self.manifest["families"])}
         except FileNotFoundError:
             raise FormatError(
                 f"{self.folder} holds no data set (no {_MANIFEST}): build one by 'graphsynth catalog dataset'"
@@ -281,6 +281,19 @@ class Dataset(Shown):
             if (chains, str(labelled)) != (family["counted"], family["labelled"]):
                 wrong.append(f"{name}: {chains} chains, {labelled} with named links; counted {family['counted']}")
         return FilesCheck(tuple(wrong), files, rows)
+
+
+def _read(family: dict[str, Any]) -> dict[str, Any]:
+    """Look at what a manifest says of a family; what is damaged raises ValueError, KeyError or TypeError."""
+    counts = [family["mobility"], family["links"], family["counted"], *(family["rows"][table] for table in TABLES)]
+    int(family["labelled"])
+    for part in family["parts"]:
+        counts += [part["part"], *(part["rows"][table] for table in TABLES)]
+        if not set(part["sha256"]) <= set(TABLES):
+            raise ValueError(f"tables {', '.join(part['sha256'])}")
+    if wrong := [own for own in counts if not isinstance(own, int) or own < 0]:
+        raise ValueError(f"{wrong[0]!r} where a number is expected")
+    return family
 
 
 def _place(folder: Path, table: str, mobility: int, links: int, part: int) -> Path:

@@ -129,6 +129,26 @@ def test_a_folder_that_is_no_data_set_is_refused(tmp_path, text, words):
         Dataset(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("links", "../.."),
+        ("links", -8),
+        ("rows", {}),
+        ("labelled", "x"),
+        ("parts", [{}]),
+        ("parts", 3),
+        ("counted", None),
+    ],
+)
+def test_a_damaged_manifest_is_refused(tmp_path, data, name, value):
+    document = json.loads((data.folder / "manifest.json").read_text())
+    document["families"][0][name] = value
+    (tmp_path / "manifest.json").write_text(json.dumps(document))
+    with pytest.raises(FormatError, match="damaged"):
+        Dataset(tmp_path)
+
+
 def test_questions_in_sql(data):
     pytest.importorskip("duckdb")
     found = data.query("SELECT links, count(*) AS n FROM chains GROUP BY links ORDER BY links")
