@@ -6,6 +6,7 @@ A folder holds ``chains/mobility=1/links=14/part-00000.parquet`` and so on, ``me
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor
@@ -208,18 +209,15 @@ class Dataset(Shown):
 
         connection = duckdb.connect()
         for table in TABLES:
-            files = [str(path) for path, own in self._files(table) if own]
-            if files:
-                names = ", ".join("'" + name.replace("'", "''") + "'" for name in files)
+            if files := [_quoted(str(path)) for path in self._files(table)]:
                 chain = "file_row_number AS chain, " if table == "chains" else ""
                 connection.execute(
-                    f"CREATE VIEW {table} AS SELECT * EXCLUDE (filename{', file_row_number' if chain else ''}), {chain}"
+                    f"CREATE VIEW {table} AS SELECT * EXCLUDE (filename, file_row_number), {chain}"
                     "CAST(regexp_extract(filename, 'part-(\\d+)', 1) AS INTEGER) AS part FROM read_parquet("
-                    f"[{names}], hive_partitioning = true, filename = true"
-                    f"{', file_row_number = true' if chain else ''})"
+                    f"[{', '.join(files)}], hive_partitioning = true, filename = true, file_row_number = true)"
                 )
-        folder = str(self.folder.resolve()).replace("'", "''")
-        connection.execute(f"SET allowed_directories = ['{folder}', '{self.folder}']")
+        places = _quoted(str(self.folder.resolve())), _quoted(str(self.folder))
+        connection.execute(f"SET allowed_directories = [{', '.join(places)}]")
         connection.execute("SET enable_external_access = false")
         connection.execute("SET lock_configuration = true")
         return connection
@@ -247,19 +245,19 @@ class Dataset(Shown):
             number -= own["rows"]["chains"]
         raise FormatError(f"the manifest of {self.folder} is damaged: build the data set anew")
 
-    def _files(self, table: str) -> Iterator[tuple[Path, int]]:
-        """Yield the files of a table and their rows."""
+    def _files(self, table: str) -> Iterator[Path]:
+        """Yield the files of a table that hold rows."""
         for (mobility, links), family in self._rows.items():
             for own in family["parts"]:
-                if table in own["sha256"]:
-                    yield _place(self.folder, table, mobility, links, own["part"]), own["rows"][table]
+                if own["rows"][table]:
+                    yield _place(self.folder, table, mobility, links, own["part"])
 
     def verify(self) -> FilesCheck:
         """Compare files with their checksums, and numbers of chains with what was counted without listing.
 
         The sum of ``links! / automorphisms``, the chains with named links, is computed anew from the files.
         """
-        from math import factorial
+        from graphsynth.atlas.dataset_parts import labelled_of
 
         parquet = need("pyarrow.parquet", "parquet", "A data set")
         wrong, files, rows = [], 0, 0
@@ -274,13 +272,18 @@ class Dataset(Shown):
                     if sha256(data).hexdigest() != digest:
                         wrong.append(f"{path} {'is not as it was made' if data else 'is missing'}")
                     elif table == "chains":
-                        orders = parquet.read_table(path, columns=["automorphisms"])["automorphisms"].to_numpy()
-                        labelled += sum(factorial(links) // order for order in orders.tolist())
+                        orders = parquet.read_table(io.BytesIO(data), columns=["automorphisms"])["automorphisms"]
+                        labelled += labelled_of(links, orders.to_numpy())
                         chains += len(orders)
                     rows += own["rows"][table]
             if (chains, str(labelled)) != (family["counted"], family["labelled"]):
                 wrong.append(f"{name}: {chains} chains, {labelled} with named links; counted {family['counted']}")
         return FilesCheck(tuple(wrong), files, rows)
+
+
+def _quoted(text: str) -> str:
+    """Write text as SQL does."""
+    return "'" + text.replace("'", "''") + "'"
 
 
 def _read(family: dict[str, Any]) -> dict[str, Any]:
@@ -323,6 +326,7 @@ class _Family:
         from graphsynth.atlas.dataset_parts import jobs_of, make_part
         from graphsynth.atlas.making import expected_of, fingerprint, problem_of, tasks_of
         from graphsynth.core.ordered import in_order
+        from graphsynth.synthesis.shards import checked
 
         problem = problem_of(self.links, self.mobility, self.fractionated)
         tasks = tasks_of(self.links, self.mobility, self.fractionated)
@@ -331,8 +335,8 @@ class _Family:
         cut = f"{fingerprint(problem, tasks)}{'+' if self.mechanisms else '-'}"
         jobs = jobs_of(tasks, self.mechanisms)
         done = self._done(cut)
-        first, stop = (0, len(jobs)) if shard is None else _share(len(jobs), shard)
-        left = [job for job in jobs[first:stop] if job.number not in done]
+        i, m = (1, 1) if shard is None else checked(shard)
+        left = [job for job in jobs[(i - 1) * len(jobs) // m : i * len(jobs) // m] if job.number not in done]
         chains = sum(own["rows"]["chains"] for own in done.values())
         for part in in_order(executor, make_part, left):
             for table, data in part.tables.items():
@@ -385,10 +389,3 @@ class _Family:
         mine |= {"counted": counted, "rows": rows, "labelled": labelled, "parts": parts}
         others = [own for key, own in data._rows.items() if key != (self.mobility, self.links)]
         _write_manifest(self.folder, sorted([*others, mine], key=lambda own: (own["mobility"], own["links"])))
-
-
-def _share(count: int, shard: tuple[int, int]) -> tuple[int, int]:
-    i, m = shard
-    if not 1 <= i <= m:
-        raise SpecError(f"shard = {i}/{m} must be i of m with 1 <= i <= m")
-    return (i - 1) * count // m, i * count // m

@@ -95,8 +95,12 @@ def make_part(job: Job) -> Part:
         mechanisms = [np.concatenate(parts) for parts in zip(*driven)]
         count = len(mechanisms[0])
         tables["mechanisms"] = _mechanisms(mechanisms, rows, np.argsort(order))
-    labelled = sum(times * (factorial(links) // own) for own, times in Counter(whole["order"].tolist()).items())
-    return Part(job.number, tables, {"chains": start, "mechanisms": count}, labelled)
+    return Part(job.number, tables, {"chains": start, "mechanisms": count}, labelled_of(links, whole["order"]))
+
+
+def labelled_of(links: int, orders: NDArray[Any]) -> int:
+    """Count chains whose links have names: ``links!`` over the order of each automorphism group."""
+    return sum(times * (factorial(links) // order) for order, times in Counter(orders.tolist()).items())
 
 
 def _chains(

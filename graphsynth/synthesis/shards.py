@@ -39,7 +39,7 @@ def shard_of(items: Sequence[WorkItem], shard: Shard | None, *, listing: bool = 
     """
     if shard is None:
         return list(items)
-    i, m = _checked(shard)
+    i, m = checked(shard)
     atoms = _atoms(tuple(items), LISTING if listing else COUNTING)
     ends = np.cumsum([0, *map(len, atoms)])
     first, last = _run(np.concatenate([*atoms, np.zeros(0)]), i, m)
@@ -59,7 +59,7 @@ def run_of(parts: Sequence[WorkItem | Total], shard: Shard) -> list[WorkItem | T
 
     Raises `SpecError` for i out of 1..m.
     """
-    first, last = _run(np.array([part.weight for part in parts]), *_checked(shard))
+    first, last = _run(np.array([part.weight for part in parts]), *checked(shard))
     return list(parts[first:last])
 
 
@@ -71,10 +71,10 @@ def share_of(items: Sequence[WorkItem], shard: Shard | None) -> range:
     if shard is None or not items:
         return range(len(items))
     costs = np.array([costs.sum() for costs in _atoms(tuple(items), MAKING)])
-    return range(*_run(costs, *_checked(shard)))
+    return range(*_run(costs, *checked(shard)))
 
 
-def _checked(shard: Shard) -> Shard:
+def checked(shard: Shard) -> Shard:
     """Return i and m of shard i of m; SpecError for i out of 1..m."""
     try:
         i, m = (whole(number, "shard", 1, 10**6) for number in shard)
