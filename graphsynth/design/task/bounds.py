@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.design.task.mirror import is_mirrored
 from graphsynth.design.task.plans import Plan
 from graphsynth.design.task.task import DesignTask
 from graphsynth.kinematics.dimensional.verify import SLACK, side_lengths
@@ -65,7 +66,9 @@ def broken_bounds(task: DesignTask, motion: Motion, places: Array, plan: Plan) -
         broken["a given plate is not used"] = not _has_plates(task, mechanism)
     if task.crank is not None or task.crank_start is not None:
         broken |= _crank_bounds(task, motion.mechanism, places)
-    if task.symmetric:
+    if plan.mirror:
+        broken["it is not its own mirror image"] = not is_mirrored(motion, places, plan.design, plan.mirror)
+    elif task.symmetric:
         broken["its curve is not symmetric"] = not _symmetric(motion, task.symmetric_point)
     if task.linear and task.stroke is not None:
         law = mechanism.drivers[0].law

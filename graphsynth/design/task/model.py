@@ -7,7 +7,7 @@ frame.  Theory: docs/explanation/embodiment.md, "Many targets at once".
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,6 +148,9 @@ class Model:
         self.sketch = layout(design.graph).positions + random.normal(0.0, 0.12, (self.joints, 2))
         angles = random.uniform(0.0, math.pi, (1, len(design.numbers)))
         places, numbers = self.tied(self.sketch[None], angles) if given is None else (given.places, given.numbers)
+        if plan.mirror:
+            points = np.zeros((1, sum(task.names.values()), 2))
+            places = self.kept(Unknowns(places, numbers, points, points[:, :0, 0], np.ones(1))).places
         base = design.mechanism(places[0], numbers[0])
         driver = Driver(*design.drivers[0], Linear(float(self.sense)))
         self.base = Mechanism(base.graph, base.joints, (driver,), pose=base.pose)
@@ -155,6 +158,9 @@ class Model:
         self.regular = bool(rest.assembled[0])
         own = [s.group for s in rest.steps if s.group >= 0 and s.has_two_modes and rest.modes[0, s.group] != 0]
         signs = random.choice([-1, 1], len(own)) if given is None else rest.modes[0, own]
+        if plan.mirror:
+            links = {s.group: frozenset(s.links) for s in rest.steps if s.group in own}
+            signs = rest.modes[0, own] * _alike(plan.mirror, [links[group] for group in own], signs)
         self.modes = {group: int(sign) for group, sign in zip(own, signs)}
         self.forms = [form for form in group_forms(self.base, rest.steps) if form.bars]
         self.rods = _rods(plan)
@@ -300,6 +306,12 @@ class Model:
         sines = transmission_sines(forms, table, ends, frames, margins).min(axis=(1, 2))
         weight = 100.0 * self.task.soft.get("transmission", 1.0)
         return np.asarray(weight * np.maximum(least - np.nan_to_num(sines), 0.0))
+
+
+def _alike(mirror: tuple[int, ...], groups: list[frozenset[int]], signs: NDArray[Any]) -> NDArray[Any]:
+    """Return signs of groups of links in which a group and its image have the same one."""
+    seen = [groups.index(frozenset(mirror[link] for link in group)) for group in groups]
+    return np.array([signs[min(k, image)] for k, image in enumerate(seen)])
 
 
 def _rods(plan: Plan) -> list[Rod]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
 
+from graphsynth.design.task.mirror import Image, images, mirrors
 from graphsynth.design.task.places import Box, Place, Point
 from graphsynth.design.task.targets import LinkTarget, PathTarget
 from graphsynth.design.task.task import DesignTask
@@ -21,7 +22,8 @@ class Plan:
 
     ``carriers``: the link of every name of the task, in its order; ``given``, ``regions``: joints on the frame whose
     places are given or bounded, and these; ``pins``: of a cylinder its driven joint and the joints at its two ends;
-    ``idling``: named points and joints of their links (indices); where these coincide, other links do nothing.
+    ``idling``: named points and joints of their links (indices); where these coincide, other links do nothing;
+    ``mirror``: of a mechanism that is its own mirror image, the image of every link.
     """
 
     design: Design
@@ -30,6 +32,7 @@ class Plan:
     pins: tuple[int, int, int] | None = None
     regions: tuple[tuple[int, Box], ...] = ()
     idling: tuple[tuple[str, int], ...] = ()
+    mirror: Image = ()
 
     @property
     def text(self) -> str:
@@ -70,7 +73,23 @@ def fitting(task: DesignTask, design: Design) -> Iterator[Plan]:
         for taken in _given(task, design, carriers):
             given = tuple((k, (p[0], p[1])) for k, p in taken if len(p) == 2)
             regions = tuple((k, p) for k, p in taken if len(p) == 4)
-            yield Plan(design, carriers, given, pins, regions, idling)
+            plan = Plan(design, carriers, given, pins, regions, idling)
+            yield from _mirrored(task, plan) if task.mirrored else (plan,)
+
+
+def _mirrored(task: DesignTask, plan: Plan) -> Iterator[Plan]:
+    """Yield a plan with every mirror that leaves given pivots free of each other and has the named points on its axis.
+
+    Such a point is the joint of a link with its image; it is named as one of the link that comes first.
+    """
+    points = [link for link, of_point in zip(plan.carriers, task.names.values(), strict=True) if of_point]
+    pivots = [k for k, _ in (*plan.given, *plan.regions)]
+    pairs = {frozenset(joint[:2]) for joint in plan.design.graph.joints}
+    for mirror in mirrors(plan.design):
+        own = images(plan.design, mirror)
+        on_axis = all(link < mirror[link] and frozenset((link, mirror[link])) in pairs for link in points)
+        if on_axis and not any(own[k] in pivots for k in pivots if own[k] != k):
+            yield replace(plan, mirror=mirror)
 
 
 def _plates(task: DesignTask, design: Design, carriers: tuple[int, ...]) -> int:

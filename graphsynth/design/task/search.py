@@ -237,7 +237,7 @@ class _Run:
         self.outlines = any(isinstance(target, PathTarget) and target.outline for target in task.targets)
         self.turned = _TURNED[1] if self.outlines else 0.0  # in the last stage; open paths there at exact points
         self.near, self.even = (_OUTLINED, _OUTLINED) if self.outlines else (_NEAR, _EVEN)
-        self.grows = any(isinstance(target, PathTarget) for target in task.targets)
+        self.grows = not task.mirrored and any(isinstance(target, PathTarget) for target in task.targets)
         self.levels = any(not (isinstance(target, PathTarget) and target.mean) for target in task.targets)
         self.before, self.idle = 0, 0  # accepted before the last wave, waves without another one
 

@@ -23,6 +23,7 @@ from graphsynth.design.task.plans import Plan, fitting
 from graphsynth.design.task.problem import TaskProblem
 from graphsynth.design.task.targets import PathTarget
 from graphsynth.design.task.task import DesignTask
+from graphsynth.design.task.ties import axis_joint
 from graphsynth.kinematics.dimensional.design import Design
 from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted
 from graphsynth.kinematics.engine.batch import simulate_batch
@@ -136,6 +137,8 @@ def _driven(mechanism: Mechanism, end: float) -> Array | None:
 
 def planned(task: DesignTask, starts: Starts | None, seconds: float) -> Iterator[tuple[Plan, Mechanism]]:
     """Yield mechanisms to begin with, solutions of classical problems first, each with every plan it fits."""
+    if task.mirrored:
+        return  # others are not
     for mechanism in (*solutions(task, seconds), *(starts(task) if starts is not None else ())):
         if task.sense and task.sense * float(mechanism.drivers[0].law(np.zeros(1))[1][0]) < 0.0:
             continue
@@ -258,6 +261,7 @@ def placed_starts(
 def _begins_late(model: Model, aim: TimedAim) -> bool:
     """Whether a candidate may begin anywhere on its turn: then it is moved to where its inputs suit the target."""
     free = model.task.crank_start is None or model.task.crank_from == "x"  # a placement turns the crank, too
+    free = free and not model.plan.mirror  # which begins where it is its own mirror image
     return aim.inputs is not None and not aim.own_start and model.task.drive == "rotation" and free
 
 
@@ -368,7 +372,11 @@ def _screened(
 ) -> tuple[Array, Array, Complex]:
     """Errors over the size (sets,), times of all points (sets, n), and the placement (sets, 3) of the best."""
     own, wanted = moved.link(aim.link), aim.wanted
-    own = own._replace(frames=np.ascontiguousarray(own.frames))
+    own = own._replace(frames=np.array(own.frames))
+    if model.plan.mirror:  # the point is the joint on the axis
+        placed = own.frames.view(np.complex128)
+        placed[..., 0] += placed[..., 1] * (u.places[:, axis_joint(model.plan, aim.link)] @ [1.0, 1.0j])[:, None]
+        placed[..., 1] = 0.0
     assert wanted is not None
     n, sets = len(wanted.points), len(moved.frames)
     few = np.unique(np.linspace(0, n - 1, min(n, _COMPARED)).round().astype(int))

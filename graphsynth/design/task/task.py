@@ -97,8 +97,9 @@ class DesignTask(Shown):
     turning : {"either", "counter-clockwise", "clockwise"}
         How the driven link turns.
     symmetric : bool
-        The point draws a curve with an axis of symmetry: four links, the point and the crank pin and the pivot of the
-        follower equally far from the joint of coupler and follower (lambda-type linkages).
+        The point draws a curve with an axis of symmetry.  Of four links: the point and the crank pin and the pivot of
+        the follower are equally far from the joint of coupler and follower (lambda-type linkages).  Of more, eight if a
+        point is named: at the input 0 the mechanism is its own mirror image, a point that draws is a joint on the axis.
     bars : sequence of float
         Lengths of bars that are there and shall be used: each is a distance of two joints on a moving link.
     plates : sequence of (float, float, float)
@@ -233,13 +234,26 @@ class DesignTask(Shown):
         if self.crank_start is not None and self.crank_from == "frame" and not four:
             raise GeometryError("a direction from the frame's line needs four links that turn; use links = [4]")
         points = {target.point for target in self.targets if isinstance(target, PathTarget | PosesTarget)}
-        if self.symmetric and (not four or self.linear or len(points) != 1):
+        if self.mirrored:
+            least = 8 if points else 6
+            if self.drive != "rotation" or self.sliders or self.links[0] < least:
+                raise GeometryError(
+                    f"symmetric, links = {list(self.links)}, drive {self.drive!r}, sliders = {self.sliders}: a "
+                    "symmetric curve is that of one point of four links, links = [4], or of eight or more; from six a "
+                    "mechanism may be its own mirror image; all its joints turn and its drive turns fully"
+                )
+        elif self.symmetric and (not four or self.linear or len(points) != 1):
             raise GeometryError("a symmetric curve is that of one point of four links that turn; use links = [4]")
 
     @property
     def sense(self) -> int:
         """1 if the driven link turns counter-clockwise, -1 clockwise, 0 if either will do."""
         return _SENSES[self.turning]
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the whole mechanism is to be its own mirror image; of four links only the curve can be."""
+        return self.symmetric and self.links != (4,)
 
     @property
     def symmetric_point(self) -> str:

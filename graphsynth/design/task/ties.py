@@ -1,4 +1,4 @@
-"""Places that depend on other places: the crank begins in a given direction, a four-bar draws a symmetric curve.
+"""Places that depend on other places: the crank begins in a given direction, a curve or a mechanism is symmetric.
 
 A tie puts one place where it has to be, as a function of it and others.  Candidates keep it exactly, whatever the
 search does, and derivatives go through it: it is written for complex numbers in place of real ones, so that a tiny
@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.design.task.mirror import axis_joints, images, reflected
 from graphsynth.design.task.plans import Plan
 from graphsynth.design.task.task import DesignTask
 
@@ -55,7 +56,9 @@ def ties(task: DesignTask, plan: Plan) -> list[Tie]:
         pivot, pin = crank_joints(plan)
         more = [k for k in design.joints_of(design.graph.frame or 0) if k != pivot][: task.crank_from == "frame"]
         found.append(Tie((pin, pivot, *more), partial(_turned, task.crank_start)))
-    if task.symmetric:
+    if plan.mirror:
+        found += _mirrored(task, plan)
+    elif task.symmetric:
         names = [name for name, of_point in task.names.items() if of_point]
         point = len(design.kinds) + next(k for k, name in enumerate(names) if name == task.symmetric_point)
         pivot, pin = crank_joints(plan)
@@ -64,6 +67,28 @@ def ties(task: DesignTask, plan: Plan) -> list[Tie]:
         found.append(Tie((middle, pin, rocker), _between))
         found.append(Tie((point, middle, pin), _as_far))
     return found
+
+
+def _mirrored(task: DesignTask, plan: Plan) -> list[Tie]:
+    """Return the ties of a mechanism that is its own mirror image: of two joints one, given ones are not moved."""
+    design, own = plan.design, images(plan.design, plan.mirror)
+    pivot, pin, image = line = axis_joints(design, plan.mirror)
+    found, done = [Tie((image, pivot, pin), _as_far)], {*line}
+    given = [k for k, _ in (*plan.given, *plan.regions) if k not in done]
+    for k in (*given, *range(len(own))):
+        if k not in done:
+            found.append(Tie((own[k], k, *line), _image) if own[k] != k else Tie((k, *line), _on_axis))
+            done |= {k, own[k]}
+    carriers = [link for link, of_point in zip(plan.carriers, task.names.values(), strict=True) if of_point]
+    for place, link in enumerate(carriers, len(own)):
+        found.append(Tie((place, axis_joint(plan, link)), _there))
+    return found
+
+
+def axis_joint(plan: Plan, link: int) -> int:
+    """Return the joint of a link with its own mirror image, which moves on a symmetric curve; -1 if there is none."""
+    joints = enumerate(plan.design.graph.joints)
+    return next((k for k, pair in joints if {*pair[:2]} == {link, plan.mirror[link]}), -1)
 
 
 def crank_joints(plan: Plan) -> tuple[int, int]:
@@ -100,3 +125,18 @@ def _between(middle: Any, pin: Any, rocker: Any) -> Any:
 def _as_far(point: Any, middle: Any, pin: Any) -> Any:
     """Put a coupler point as far from the joint of coupler and rocker as the crank pin."""
     return middle + _size(pin - middle) * (point - middle) / _size(point - middle)
+
+
+def _image(_: Any, place: Any, *line: Any) -> Any:
+    """Put a joint where another one is seen in the mirror."""
+    return reflected(place, *line)
+
+
+def _on_axis(place: Any, *line: Any) -> Any:
+    """Put a joint on the axis of the mirror."""
+    return 0.5 * (place + reflected(place, *line))
+
+
+def _there(_: Any, place: Any) -> Any:
+    """Put a point at a joint."""
+    return place

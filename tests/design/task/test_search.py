@@ -63,6 +63,15 @@ TASKS = {
         ),
         4,
     ),
+    "its own mirror image, a given pivot": (
+        DesignTask(
+            targets=[PathTarget(points=POINTS, inputs=even(4, 1.5))],
+            links=[8],
+            symmetric=True,
+            pivots=[(0, 0)],
+        ),
+        8,
+    ),
     "direction of the crank, a given pivot": (
         DesignTask(
             targets=[PathTarget(points=POINTS, inputs=even(4, 1.5))],

@@ -134,7 +134,7 @@ def test_words_that_do_not_fit_are_refused() -> None:
         ({"crank_start": (1.0, 0.5)}, "second limit"),
         ({"crank_start": (1.0, 2.0, 3.0)}, "one angle, or two"),
         ({"crank_start": 1.0, "crank_from": "frame", "links": [4, 6]}, "four links"),
-        ({"symmetric": True}, "links = .4."),
+        ({"symmetric": True}, "links = .4, 6."),
     ):
         with pytest.raises(GeometryError, match=words):
             DesignTask(targets=[path], **more)
