@@ -118,7 +118,7 @@ const said = (action) => { try { return action(); } catch (error) { return [erro
 async function main() {
   const table = (name) => JSON.parse(fs.readFileSync(`${modules}/${name}.json`));
   const open = (name) => Kernels.open(name, fs.readFileSync(`${modules}/${name}.wasm`), table(name));
-  const binding = await open("binding"), chains = await open("chains");
+  const binding = await open("binding"), labels = await open("labels");
   const add = "intervals.kernels.loops.add", found = {};
   const low = new Float64Array(1), high = new Float64Array(1), given = [1];
   binding.call(add, given, Float64Array.of(1), { data: [2], shape: [1] }, [2], low, high);
@@ -128,7 +128,7 @@ async function main() {
   found.shape = said(() => binding.call(add, 1, [1], [2], [2], low, high));
   found.flat = said(() => binding.call(add, { data: [1, 2], shape: [2, 1] }, [1], [2], [2], low, high));
   found.short = said(() => binding.call(add, { data: [1], shape: [2] }, [1], [2], [2], low, high));
-  found.raised = said(() => chains.call("structure.kernels.canon_packed", -1, [], []));
+  found.raised = said(() => labels.call("structure.kernels.canon_packed", -1, [], []));
   const kept = binding.array("f8", [2, 3]);
   kept.data.set([1, 2, 3, 4, 5, 6]);
   const before = kept.data, bytes = binding.memory.buffer.byteLength;
@@ -136,9 +136,9 @@ async function main() {
   found.moved = [before.length, [...kept.data], binding.memory.buffer.byteLength > bytes];
   const size = binding.memory.buffer.byteLength;
   for (let k = 0; k < 1000; k++) binding.free(binding.array("f8", [100, 1000]), binding.array("i2", 7));
-  for (let k = 0; k < 1000; k++) chains.call("structure.kernels.canon_packed", 2, [0, 1, 1], [0, 0]);
+  for (let k = 0; k < 1000; k++) labels.call("structure.kernels.canon_packed", 2, [0, 1, 1], [0, 0]);
   found.kept = binding.memory.buffer.byteLength - size;
-  found.chains = chains.memory.buffer.byteLength;
+  found.labels = labels.memory.buffer.byteLength;
   found.places = [kept.place % 16, binding.array("u1", 3).place % 16];
   new Function("Kernels", fs.readFileSync(process.argv[4], "utf8"))(Kernels);
   const motion = await Kernels.load("motion");
@@ -169,5 +169,5 @@ def test_the_loader_takes_what_fits_says_what_does_not_and_loses_no_memory(tmp_p
     assert found["raised"] == ["Error", "ValueError", str(native.value)]
     assert found["moved"] == [0, [1, 2, 3, 4, 5, 6], True]  # the old view is empty, the new one holds all
     assert found["kept"] <= 1 << 20  # one array, not a thousand
-    assert found["chains"] < 4_000_000 and found["places"] == [0, 0]
+    assert found["labels"] < 4_000_000 and found["places"] == [0, 0]
     assert found["registered"] == [True, 5] and found["absent"] == "the script of module nothing was not read"

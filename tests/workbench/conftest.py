@@ -23,7 +23,7 @@ def scripts():
     if not node:
         pytest.skip("no Node on this machine")
     words = "".join(f"Bench.words({json.dumps(k)}, {json.dumps(table)});" for k, table in languages().items())
-    base = "".join(page_file(f"{name}.js") for name in PURE) + words + script("chains")
+    base = "".join(page_file(f"{name}.js") for name in PURE) + words + script("labels")
 
     def run(body, *arguments, modules=()):
         asked = f"(async (...args) => {{ {body} }})(...{json.dumps(arguments)})"

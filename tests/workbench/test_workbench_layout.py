@@ -131,9 +131,9 @@ def test_a_frame_and_drivers_that_are_asked_for_are_taken(scripts):
         assert [(own.base, own.link) for own in mechanism.drivers] == [(frame, link)]
 
 
-RELATIVES = """const app = { chains: await Kernels.load("chains") };
+RELATIVES = """const app = { labels: await Kernels.load("labels") };
 const keys = all => all.map(({ links, joints }) =>
-  Bench.chainKey(app.chains, { pose: Array(links), joints: joints.map(([a, b]) => ({ kind: "R", a, b })) })).sort();
+  Bench.chainKey(app.labels, { pose: Array(links), joints: joints.map(([a, b]) => ({ kind: "R", a, b })) })).sort();
 return args[0].map(([links, joints]) => {
   const { smaller, larger } = Bench.relatives(app, { links, joints });
   return [keys(smaller), keys(larger)];

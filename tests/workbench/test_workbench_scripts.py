@@ -365,6 +365,6 @@ def test_the_key_of_the_chain_is_that_of_the_library(scripts):
     joints = [[{"kind": ("R", "gear")[m - 1], "a": b, "b": a} for a, b, m in graph.joints] for graph in graphs]
     given = [{"pose": [[0, 0, 0]] * graph.links, "joints": own} for graph, own in zip(graphs, joints)]
     found = scripts(
-        "const chains = await Kernels.load('chains'); return args[0].map(data => Bench.chainKey(chains, data))", given
+        "const labels = await Kernels.load('labels'); return args[0].map(data => Bench.chainKey(labels, data))", given
     )
     assert found == [graph.key for graph in graphs]

@@ -193,13 +193,17 @@ def _write_pages(folder: Path, data: list[str]) -> list[Path]:
     """Write the page itself; return the files that it loads at once."""
     from jinja2 import Environment, StrictUndefined
 
+    from graphsynth.workbench.modules import script
+    from graphsynth.workbench.writing import page_file
+
     source = files("graphsynth.atlas.site").joinpath("pages")
     texts = {path.name: path.read_text("utf-8") for path in source.iterdir() if path.is_file()}
     page = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, keep_trailing_newline=True)
+    own = [texts[f"{name}.js"] for name in texts["order.txt"].split()]
     loaded = {
         "style.css": texts["style.css"],
         "theme.js": texts["theme.js"],
-        "atlas.js": "".join(texts[f"{name}.js"] for name in texts["order.txt"].split()),
+        "atlas.js": "".join([page_file("kernels.js"), script("labels"), *own]),
         "index.html": page.from_string(texts["index.html"]).render(data=data),
     }
     for name, text in loaded.items():

@@ -2,7 +2,7 @@
 "use strict";
 
 (function () {
-  const { make } = Bench, $ = id => document.getElementById(id), NEED = ["chains-data", "sketch.wasm"], PAGE = 60;
+  const { make } = Bench, $ = id => document.getElementById(id), NEED = ["chains-data", "chains.wasm", "sketch.wasm"], PAGE = 60;
   /** Above so many links a list would be long; chains are counted all the same. */
   const LISTED = 12;
 

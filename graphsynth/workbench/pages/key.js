@@ -15,13 +15,13 @@
     return Uint8Array.from([links, 3 + (coloured ? 16 : 0), ...stream]);
   }
 
-  /** Key of the chain of a mechanism in the form of files, with the kernels of the module "chains". */
-  Bench.chainKey = (chains, data) => {
+  /** Key of the chain of a mechanism in the form of files, with the kernel of the module "labels". */
+  Bench.chainKey = (labels, data) => {
     const links = data.pose.length, loose = joint => (joint.kind === "R" || joint.kind === "P" ? 1 : 2);
     const joints = data.joints.map(joint => [Math.min(joint.a, joint.b), Math.max(joint.a, joint.b), loose(joint)]);
     joints.sort((p, q) => p[0] - q[0] || p[1] - q[1]);
     const packed = Uint8Array.from(joints.flat());
-    const [order] = chains.call("structure.kernels.canon_packed", links, packed, new BigInt64Array(links));
+    const [order] = labels.call("structure.kernels.canon_packed", links, packed, new BigInt64Array(links));
     const place = new Array(links);
     Array.from(order.data, Number).forEach((link, position) => { place[link] = position; });
     const moved = joints.map(([a, b, mobility]) => [Math.min(place[a], place[b]), Math.max(place[a], place[b]), mobility]);
@@ -30,7 +30,7 @@
   };
 
   const keyOf = Bench.keyOf = (app, { links, joints }) =>
-    Bench.chainKey(app.chains, { pose: Array(links).fill(0), joints: joints.map(([a, b]) => ({ kind: "R", a, b })) });
+    Bench.chainKey(app.labels, { pose: Array(links).fill(0), joints: joints.map(([a, b]) => ({ kind: "R", a, b })) });
 
   /** The chain of a mechanism in the form of files: links and joints that make one, all of mobility 1; null for others. */
   Bench.chainOf = ({ pose, joints }) => {

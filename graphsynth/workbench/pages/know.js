@@ -84,8 +84,8 @@
   Bench.showKnown = (app, place) => {
     const { motion } = app, engine = motion && motion.current();
     app.faulty = [];
-    place.closest("section").hidden = !app.chains && !motion;
-    const data = Bench.written(app.sheet), keyed = () => (app.chains ? Bench.chainKey(app.chains, data) : null);
+    place.closest("section").hidden = !app.labels && !motion;
+    const data = Bench.written(app.sheet), keyed = () => (app.labels ? Bench.chainKey(app.labels, data) : null);
     if (!motion && Object.keys(app.sheet.links).length > 1) { place.replaceChildren(Bench.rows(chain(keyed()))); return; }
     if (!engine) { place.replaceChildren(make("p", { class: "soft" }, Bench.word("know.nothing"))); return; }
     const key = keyed(), rows = [[Bench.word("know.mobility"), String(engine.mobility)], ...chain(key)], parts = [];

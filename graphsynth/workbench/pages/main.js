@@ -185,7 +185,7 @@
     Bench.charts(app, $("charts"));
     app.work = Work.start(Mathematics);
     try {
-      app.chains = await Kernels.load("chains");
+      app.labels = await Kernels.load("labels");
       if (typeof Engine !== "undefined") {
         app.motion = new Bench.Motion(app, await Kernels.load("motion"));
         Bench.player(app);

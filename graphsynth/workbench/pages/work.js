@@ -82,7 +82,7 @@ const Work = (() => {
       get busy() { return waiting.size > 0; },
       run(name, args, tell = () => {}) {
         if (!open()) return run(name, args, told => { tell(told); return new Promise(go => setTimeout(() => go(true))); });
-        const named = ([kind, name]) => (kind === "kernels" ? name : kind);
+        const named = ([kind, name]) => (kind === "kernels" ? `kernels ${name}` : kind);
         const fresh = [...Kernels.scripts(), ...Chains.scripts(), ...Curves.scripts()].filter(one => !handed.has(named(one)));
         if (fresh.length) worker.postMessage({ scripts: fresh });
         for (const one of fresh) handed.add(named(one));

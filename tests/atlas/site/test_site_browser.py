@@ -198,7 +198,7 @@ def test_a_chain_moves_with_the_frame_and_driver_that_are_chosen(page, key):
     try:
         moving(window)
         told = """const s = Bench.app.sheet, ids = Object.keys(s.links), d = Bench.written(s);
-                  return [Bench.chainKey(Bench.app.chains, d), Bench.app.motion.sweep().full, d.graph]"""
+                  return [Bench.chainKey(Bench.app.labels, d), Bench.app.motion.sweep().full, d.graph]"""
         found, full, graph = window.execute_script(told)
         assert found == key and full
         assert " f1" in graph

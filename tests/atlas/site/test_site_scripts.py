@@ -92,37 +92,25 @@ def hard_graphs():
         nx.complete_bipartite_graph(32, 32), nx.star_graph(63), nx.empty_graph(64), nx.hypercube_graph(6),
         nx.complete_multipartite_graph(*[4] * 16), nx.disjoint_union_all([nx.petersen_graph()] * 6), nx.Graph(same),
         nx.kneser_graph(8, 2), nx.random_regular_graph(3, 64, 1),
+        nx.disjoint_union_all([nx.random_regular_graph(4, 9, 126 + k) for k in range(7)]),
     ]  # fmt: skip
 
 
-def test_a_hard_graph_gets_its_key_or_a_sentence_in_time(page):
+def test_a_hard_graph_gets_its_key_in_time(page):
     lots = random.Random(3)
     window = page()
     for graph in map(nx.convert_node_labels_to_integers, hard_graphs()):
         to = list(graph)
         lots.shuffle(to)
         again = nx.relabel_nodes(graph, dict(enumerate(to)))
-        found = window.execute_script(
+        *found, took = window.execute_script(
             """const [n, ...all] = arguments, begin = performance.now();
-               let keys = ["", ""];
-               try { keys = all.map(joints => Atlas.label(Atlas.graph(n, joints)).key); }
-               catch (fault) { if (!(fault instanceof Atlas.Fault)) throw fault; }
-               return [...keys, performance.now() - begin];""",
+               return [...all.map(joints => Atlas.label(Atlas.graph(n, joints)).key), performance.now() - begin];""",
             len(graph),
             *([sorted(edge) for edge in one.edges] for one in (graph, again)),
         )
-        assert found[0] == found[1]  # the same key in two numberings
-        assert found[2] < 10_000
-        if len(graph) <= 32:
-            assert found[0] == MechanismGraph(len(graph), [tuple(sorted(edge)) for edge in graph.edges]).key
-    # time is up at once: a sentence
-    words = window.execute_script(
-        """const now = performance.now.bind(performance); let calls = 0;
-           performance.now = () => now() + 1e6 * calls++;
-           try { Atlas.label(Atlas.fromGraph6("G?r@`_")); return ""; } catch (fault) { return fault.message; }
-           finally { performance.now = now; }"""
-    )
-    assert "too symmetric" in words
+        assert found == 2 * [MechanismGraph(len(graph), [tuple(sorted(edge)) for edge in graph.edges]).key]
+        assert took < 10_000
 
 
 def mechanisms(chain):

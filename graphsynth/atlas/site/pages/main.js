@@ -36,7 +36,7 @@
     first = false;
   }
 
-  addEventListener("DOMContentLoaded", function () {
+  addEventListener("DOMContentLoaded", async function () {
     const theme = document.getElementById("theme"), root = document.documentElement;
     theme.value = root.dataset.theme || "auto";
     theme.addEventListener("change", () => {
@@ -49,6 +49,10 @@
     });
     history.scrollRestoration = "manual";
     Atlas.startGlossary();
+    try { await Atlas.ready(); } catch (error) {
+      document.getElementById("page").textContent = `This page needs WebAssembly. ${error.message}`;
+      return;
+    }
     addEventListener("hashchange", route);
     route();
   });
