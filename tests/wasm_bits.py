@@ -117,6 +117,8 @@ def page_computations() -> Recorded:
             watched = np.array([[links - 1.0, 0.0, 0.0]])
             advancing.sweep(tables, modes, state, q + 0.4, q + 2.0, 1.0, watched, out, length, found)
             advancing.instant_centres(state.X, state.V, np.zeros((links, links, 2)))
+            for x, y in ((0.0, 0.0), (0.3, -0.2)):
+                advancing.point_motion(*out[:3], links - 1, x, y, np.zeros((9, 6)))
             dragging.closed_pose(rows, table[0], 0, pose + 1e-3 * (np.arange(links) > 0)[:, None], length[0])
             way, near = np.zeros(3 * links - 3), pose.copy()
             for target in ([2.0, 1.0], [1.0, 2.0]):

@@ -122,6 +122,19 @@ def test_turns_of_all_chains_are_those_of_the_library(tmp_path: Path) -> None:
     check_turns(tmp_path, turns)
 
 
+def test_points_move_as_those_of_the_library(tmp_path: Path) -> None:
+    linkage = Mechanism.four_bar(4.0, 1.2, 3.5, 3.0)
+    (pose,) = simulate(linkage, [0.7], events=False).poses
+    mechanism = Mechanism(linkage.graph, linkage.joints, linkage.drivers, pose=tuple(map(tuple, pose.tolist())))
+    inputs, at = [0.7, 1.9, 4.0], (1.8, -1.4)
+    calls = [[name, *args] for q in inputs for name, *args in (("advance", q), ("pointMotion", 2, at))]
+    (result,) = in_page(tmp_path, [(mechanism, calls)])
+    path = simulate(mechanism, inputs, events=False).point(2, at)
+    found = array([done["result"][0] for done in result["done"][1::2]], 3, 6)
+    for own, known in zip(np.split(found, 3, axis=1), (path.position, path.velocity, path.acceleration), strict=True):
+        assert np.abs(own - known).max() < 1e-9 * np.abs(known).max()
+
+
 def test_ranges_between_limits_are_those_of_the_library(tmp_path: Path) -> None:
     rocker = Mechanism.four_bar(4.0, 3.0, 2.0, 2.5)  # nothing turns fully
     posed = simulate(rocker, [0.7], events=False)

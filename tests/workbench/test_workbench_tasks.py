@@ -127,8 +127,8 @@ def test_trace_a_point_of_the_coupler(at_four_bar):
     (name,) = [n for n in found.points if n != "D"]
     path = found.simulate().point(name).position
     places = person.script(
-        """const m = Bench.app.motion, s = m.sweep(), [id, k, at] = Bench.tracedPoints(Bench.app.sheet)[0];
-           return Bench.pathOver(s, Object.keys(Bench.app.sheet.links).length, k, at)"""
+        """const [id, k, at] = Bench.tracedPoints(Bench.app.sheet)[0];
+           return Bench.pathOver(Bench.app.motion, k, at)"""
     )
     assert np.abs(np.array(places) - path).max() < 1e-7 * 80
 

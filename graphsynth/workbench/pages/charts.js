@@ -14,19 +14,17 @@
       const values = angles.map(own => (own[k].angle * 180) / Math.PI);
       found.push([`transmission ${k}`, Bench.word("chart.transmission", { k: group + 1 }), values, "°"]);
     });
-    const part = (all, i) => all.subarray(3 * i * n, 3 * (i + 1) * n);
     const chosen = app.selection.filter(id => sheet.points[id]);
     const ids = [...new Set([...chosen, ...Bench.tracedPoints(sheet).map(([id]) => id)])].slice(0, 4);
     for (const id of ids) {
       const link = Bench.linksAt(sheet, id).find(own => own !== Bench.GROUND);
       if (!link) continue;
       const point = sheet.points[id], k = Bench.linkNumber(sheet, link);
-      const moves = rows.map(i => Bench.pointMotion(part(swept.poses, i), part(swept.velocities, i), part(swept.accelerations, i), k, [point.x, point.y]));
-      const p = point.name;
-      found.push([`x ${id}`, Bench.word("chart.x", { p }), moves.map(own => own.place[0]), sheet.unit]);
-      found.push([`y ${id}`, Bench.word("chart.y", { p }), moves.map(own => own.place[1]), sheet.unit]);
-      found.push([`v ${id}`, Bench.word("chart.v", { p }), moves.map(own => Math.hypot(...own.velocity)), ""]);
-      found.push([`a ${id}`, Bench.word("chart.a", { p }), moves.map(own => Math.hypot(...own.acceleration)), ""]);
+      const moves = motion.engine.pointMotion(k, [point.x, point.y], swept), p = point.name;
+      found.push([`x ${id}`, Bench.word("chart.x", { p }), moves.map(own => own[0]), sheet.unit]);
+      found.push([`y ${id}`, Bench.word("chart.y", { p }), moves.map(own => own[1]), sheet.unit]);
+      found.push([`v ${id}`, Bench.word("chart.v", { p }), moves.map(own => Math.hypot(own[2], own[3])), ""]);
+      found.push([`a ${id}`, Bench.word("chart.a", { p }), moves.map(own => Math.hypot(own[4], own[5])), ""]);
     }
     const judged = app.jamming && app.jamming.whole();
     if (judged) found.push(["binding", Bench.word("chart.binding"), Array.from(judged.factors), ""]);

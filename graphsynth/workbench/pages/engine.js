@@ -14,6 +14,7 @@
      engine.drag(link, point, target)   -> {left, end}, end: "reached", "nearest", "singular", "open"
      engine.sweep(n, driver = 0)        -> {inputs, poses, velocities, accelerations, margins, events, full, turns}, turns: after how many it closes
      engine.instantCentres()            -> Float64Array links x links x 2
+     engine.pointMotion(link, at, swept) -> n x [x, y, vx, vy, ax, ay] of a point of a link over a sweep, or as it stands
      engine.transmission(margins)       -> [{group, angle}]
      engine.drivers()                   -> joints that could drive it
      engine.place(pose)                 -> whether the joints close there; the branch is the nearest one
@@ -344,6 +345,14 @@ const Engine = (() => {
       const centres = { data: new Float64Array(2 * this.links ** 2), shape: [this.links, this.links, 2] };
       this.call("advancing.instant_centres", this.state.X, this.state.V, centres);
       return centres.data;
+    }
+
+    pointMotion(link, [x, y], swept = null) {
+      const { poses, velocities, accelerations } = swept || { ...this, poses: this.pose };
+      const n = poses.length / (3 * this.links), out = { data: new Float64Array(6 * n), shape: [n, 6] };
+      const given = [poses, velocities, accelerations].map((data) => ({ data, shape: [n, this.links, 3] }));
+      this.call("advancing.point_motion", ...given, link, x, y, out);
+      return Array.from({ length: n }, (_, i) => out.data.subarray(6 * i, 6 * i + 6));
     }
 
     /* Transmission angles of dyads: their sine is the root of the margin. */

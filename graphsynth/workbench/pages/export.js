@@ -61,8 +61,8 @@
     canvas.toBlob(blob => saved(app, "mechanism.png", blob), "image/png");
   };
   Bench.do.dxf = app => {
-    const { motion } = app, swept = motion && motion.driven ? motion.sweep() : null, links = Object.keys(app.sheet.links).length;
-    const paths = swept ? Bench.tracedPoints(app.sheet).map(([, k, at]) => ({ points: Bench.pathOver(swept, links, k, at).filter(p => p.every(Number.isFinite)), closed: swept.full })) : [];
+    const { motion } = app, swept = motion && motion.driven ? motion.sweep() : null;
+    const paths = swept ? Bench.tracedPoints(app.sheet).map(([, k, at]) => ({ points: Bench.pathOver(motion, k, at).filter(p => p.every(Number.isFinite)), closed: swept.full })) : [];
     saved(app, "mechanism.dxf", Bench.toDxf(app.posed(), paths), "image/vnd.dxf");
   };
 

@@ -172,12 +172,4 @@
     const tidy = value => Bench.shown(Math.round(value * 1e9) / 1e9, 4); // nothing for a zero that is left by rounding
     return motion.turns ? `${tidy((input * 180) / Math.PI)}°` : `${tidy(input)} ${motion.app.sheet.unit}`;
   };
-
-  /** Place, velocity and acceleration of a point that link `k` carries, from rows (x, y, angle) of the engine. */
-  Bench.pointMotion = (pose, velocity, acceleration, k, at) => {
-    const row = part => [part[3 * k], part[3 * k + 1], part[3 * k + 2]];
-    const place = Bench.carried(row(pose), at), [x, y] = row(pose), rx = place[0] - x, ry = place[1] - y;
-    const [vx, vy, w] = row(velocity), [ax, ay, e] = row(acceleration);
-    return { place, velocity: [vx - w * ry, vy + w * rx], acceleration: [ax - e * ry - w * w * rx, ay + e * rx - w * w * ry] };
-  };
 })();

@@ -3,6 +3,8 @@
 
 (function () {
   const svg = Bench.svg;
+  /** Where a row of `pointMotion` has what arrows show. */
+  const FIRST = { velocity: 2, acceleration: 4 };
 
   /** Points whose paths are shown: [id, number of the link, place]. */
   Bench.tracedPoints = sheet => Object.entries(sheet.points).filter(([, point]) => point.trace).map(([id, point]) => {
@@ -10,18 +12,14 @@
     return [id, Bench.linkNumber(sheet, link), [point.x, point.y]];
   });
 
-  const rowOf = (poses, links, i, k) => Array.from(poses.subarray(3 * (i * links + k), 3 * (i * links + k) + 3));
-
-  /** Places of a point over a sweep. */
-  Bench.pathOver = (swept, links, k, at) =>
-    Array.from(swept.inputs, (_, i) => Bench.carried(rowOf(swept.poses, links, i, k), at));
+  /** Places of a point over the sweep. */
+  Bench.pathOver = (motion, k, at) => motion.engine.pointMotion(k, at, motion.sweep()).map(([x, y]) => [x, y]);
 
   /** The box around the drawing as it stands and the paths of its traced points. */
   Bench.boxWithPaths = app => {
     const box = Bench.box(app.posed()), { motion, sheet } = app, swept = box && motion && motion.driven ? motion.sweep() : null;
     if (!swept) return box;
-    const links = Object.keys(sheet.links).length;
-    const places = Bench.tracedPoints(sheet).flatMap(([, k, at]) => Bench.pathOver(swept, links, k, at));
+    const places = Bench.tracedPoints(sheet).flatMap(([, k, at]) => Bench.pathOver(motion, k, at));
     for (const [x, y] of places.filter(place => place.every(Number.isFinite))) {
       [box[0], box[1], box[2], box[3]] = [Math.min(box[0], x), Math.min(box[1], y), Math.max(box[2], x), Math.max(box[3], y)];
     }
@@ -33,12 +31,11 @@
     const { view, sheet } = app, layer = view.layers.curves, parts = [];
     const swept = motion && app.options.curves && motion.driven ? motion.sweep() : null;
     if (swept) {
-      const links = Object.keys(sheet.links).length;
       Bench.tracedPoints(sheet).forEach(([id, k, at], n) => {
-        const path = Bench.pathOver(swept, links, k, at).map(place => view.px(place));
+        const path = Bench.pathOver(motion, k, at).map(place => view.px(place));
         parts.push(svg("path", { class: `curve c${n % 4}`, "data-curve": id, d: Bench.pathOf(path.filter(p => p.every(Number.isFinite)), swept.full && swept.turns < Infinity) }));
         for (const event of swept.events) {
-          const pose = rowOf(swept.poses, links, motion.nearest(event.input), k), [cx, cy] = view.px(Bench.carried(pose, at));
+          const [cx, cy] = path[motion.nearest(event.input)];
           if (Number.isFinite(cx)) parts.push(svg("circle", { class: `mark ${event.kind.replace(" ", "-")}`, cx, cy, r: 5 }, svg("title", {}, motion.told(event))));
         }
       });
@@ -57,17 +54,17 @@
 
   /** Arrows of all joints and traced points: the longest over the sweep is a sixth of the view. */
   function arrows(app, motion, parts) {
-    const { view, sheet } = app, { engine } = motion, { pose, velocities, accelerations } = engine;
+    const { view, sheet } = app, { engine } = motion;
     for (const kind of ["velocity", "acceleration"]) {
       if (!app.options[kind]) continue;
       const found = Object.entries(sheet.points).map(([id, point]) => {
         const link = Bench.linksAt(sheet, id).find(own => own !== Bench.GROUND);
-        return link ? Bench.pointMotion(pose, velocities, accelerations, Bench.linkNumber(sheet, link), [point.x, point.y]) : null;
+        return link ? engine.pointMotion(Bench.linkNumber(sheet, link), [point.x, point.y])[0] : null;
       }).filter(Boolean);
       const longest = motion.longest(kind), room = Math.min(view.width, view.height) / 5;
       for (const own of found) {
-        const by = own[kind].map((value, c) => ((c ? -value : value) / (longest || 1)) * room);
-        parts.push(...arrow(view.px(own.place), by, kind));
+        const by = [own[FIRST[kind]], -own[FIRST[kind] + 1]].map(value => (value / (longest || 1)) * room);
+        parts.push(...arrow(view.px([own[0], own[1]]), by, kind));
       }
     }
   }
@@ -108,16 +105,14 @@
     const swept = this.sweep();
     if (!swept) return 1;
     if (!swept.longest) {
-      const { sheet } = this.app, links = Object.keys(sheet.links).length;
+      const { sheet } = this.app;
       swept.longest = { velocity: 0, acceleration: 0 };
-      for (let i = 0; i < swept.inputs.length; i += 4) {
-        const part = all => all.subarray(3 * i * links, 3 * (i + 1) * links);
-        for (const [id, point] of Object.entries(sheet.points)) {
-          const link = Bench.linksAt(sheet, id).find(own => own !== Bench.GROUND);
-          if (!link) continue;
-          const own = Bench.pointMotion(part(swept.poses), part(swept.velocities), part(swept.accelerations), Bench.linkNumber(sheet, link), [point.x, point.y]);
-          for (const name of ["velocity", "acceleration"]) {
-            const length = Math.hypot(...own[name]);
+      for (const [id, point] of Object.entries(sheet.points)) {
+        const link = Bench.linksAt(sheet, id).find(own => own !== Bench.GROUND);
+        if (!link) continue;
+        for (const own of this.engine.pointMotion(Bench.linkNumber(sheet, link), [point.x, point.y], swept)) {
+          for (const [name, k] of Object.entries(FIRST)) {
+            const length = Math.hypot(own[k], own[k + 1]);
             if (Number.isFinite(length)) swept.longest[name] = Math.max(swept.longest[name], length);
           }
         }

@@ -403,3 +403,15 @@ def instant_centres(X, V, centres):
             centres[a, b, 0], centres[a, b, 1] = -uy / turn, ux / turn
             if turn == 0.0:
                 centres[a, b, 0], centres[a, b, 1] = math.nan, math.nan
+
+
+@kernel
+def point_motion(poses, velocities, accelerations, link, x, y, out):
+    """Write place, velocity and acceleration of the point (x, y) of a link to ``out`` (n, 6), from (n, links, 3)."""
+    for i in range(poses.shape[0]):
+        c, s, w, e = cos(poses[i, link, 2]), sin(poses[i, link, 2]), velocities[i, link, 2], accelerations[i, link, 2]
+        rx, ry = c * x - s * y, s * x + c * y
+        out[i, 0], out[i, 1] = poses[i, link, 0] + rx, poses[i, link, 1] + ry
+        out[i, 2], out[i, 3] = velocities[i, link, 0] - w * ry, velocities[i, link, 1] + w * rx
+        out[i, 4] = accelerations[i, link, 0] - e * ry - w * w * rx
+        out[i, 5] = accelerations[i, link, 1] + e * rx - w * w * ry
