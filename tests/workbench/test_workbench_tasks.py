@@ -279,6 +279,14 @@ def test_what_is_over_constrained_is_named(person):
     assert mechanism(person).graph.mobility == 0
 
 
+def test_chains_are_listed_after_other_work_was_done(person):
+    """What the worker is handed later is not taken for what it has."""
+    person.script("location.hash = '#k=1BgMw8g'")
+    person.until("return Object.keys(Bench.app.sheet.links).length === 6", seconds=60)
+    person.press("[data-do=chains]")
+    person.until("return document.querySelectorAll('#chainList button').length === 2", seconds=60)
+
+
 def test_click_a_chart_and_the_mechanism_moves(at_four_bar):
     person = at_four_bar
     person.script("document.querySelector('.chart').scrollIntoView()")
