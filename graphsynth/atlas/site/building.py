@@ -23,6 +23,8 @@ from graphsynth.atlas.site.named import named_script
 from graphsynth.atlas.stored import stored_mechanisms
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.core.wholefolders import PageFolder, put
+from graphsynth.workbench.modules import script
+from graphsynth.workbench.writing import fragment, page_file, write_files
 
 if TYPE_CHECKING:
     from graphsynth.atlas.catalogue import Catalogue
@@ -111,8 +113,6 @@ def _write(
     watch: Watch | None,
 ) -> tuple[int, int, int, int, int]:
     """Write all files; return what a report holds after its page."""
-    from graphsynth.workbench.writing import write_files
-
     data, bench = folder / "data", folder / "workbench"
     data.mkdir()
     bench.mkdir()
@@ -157,7 +157,6 @@ def _stored(catalogue: Catalogue, keys: dict[int, str]) -> dict[int, tuple[int, 
     """
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
-    from graphsynth.workbench.writing import fragment
 
     found: dict[int, tuple[int, list[int], str]] = {}
     for own in stored_mechanisms(catalogue.connection):
@@ -192,9 +191,6 @@ def _traced(mechanism: Mechanism) -> Mechanism:
 def _write_pages(folder: Path, data: list[str]) -> list[Path]:
     """Write the page itself; return the files that it loads at once."""
     from jinja2 import Environment, StrictUndefined
-
-    from graphsynth.workbench.modules import script
-    from graphsynth.workbench.writing import page_file
 
     source = files("graphsynth.atlas.site").joinpath("pages")
     texts = {path.name: path.read_text("utf-8") for path in source.iterdir() if path.is_file()}
