@@ -134,11 +134,7 @@ const Curves = (() => {
       if (engine.fault || engine.open || !engine.ready) return null;
       const swept = engine.sweep(SAMPLES);
       if (!swept || swept.turns !== 1) return null;
-      const n = engine.links, [x, y] = places[places.length - 1];
-      return Array.from({ length: SAMPLES - 1 }, (_, i) => {
-        const at = 3 * (i * n + own.link), c = Math.cos(swept.poses[at + 2]), s = Math.sin(swept.poses[at + 2]);
-        return [swept.poses[at] + c * x - s * y, swept.poses[at + 1] + s * x + c * y];
-      });
+      return engine.pointMotion(own.link, places[places.length - 1], swept).slice(0, SAMPLES - 1).map(([x, y]) => [x, y]);
     } finally { engine.close(); }
   }
 
