@@ -23,6 +23,7 @@ _shown.WORK.update(
         "embody": "graphsynth.kinematics.dimensional.api:embody",
         "draw graph": "graphsynth.drawing.methods:draw_graph",
         "draw multiple joints": "graphsynth.drawing.methods:draw_multiple_joints",
+        "draw gear train": "graphsynth.drawing.methods:draw_gear_train",
         "draw sliders": "graphsynth.drawing.methods:draw_sliders",
         "graph picture": "graphsynth.drawing.methods:graph_picture",
         "open mechanism": "graphsynth.workbench.opening:open_workbench",

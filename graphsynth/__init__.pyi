@@ -51,6 +51,7 @@ from .mechanism.joints import Cam as Cam, Gear as Gear, PinSlot as PinSlot, Pris
 from .mechanism.laws import Driver as Driver
 from .mechanism.model import Mechanism as Mechanism
 from .pipeline.runner import run as run
+from .structure.gear_trains import PlanetaryGearTrain as PlanetaryGearTrain
 from .structure.graph import Joint as Joint, MechanismGraph as MechanismGraph
 from .structure.modes import count_assembly_modes as count_assembly_modes, coupler_curve_degree as coupler_curve_degree
 from .structure.multiple_joints import MultipleJointChain as MultipleJointChain
@@ -67,6 +68,10 @@ from .synthesis.api import (
     enumerate_chains as enumerate_chains,
     enumerate_mechanisms as enumerate_mechanisms,
     sample_mechanisms as sample_mechanisms,
+)
+from .synthesis.gear_trains import (
+    count_planetary_gear_trains as count_planetary_gear_trains,
+    enumerate_planetary_gear_trains as enumerate_planetary_gear_trains,
 )
 from .synthesis.multiple_joints import (
     count_multiple_joint_chains as count_multiple_joint_chains,

@@ -49,6 +49,8 @@ _WORK = (
     _option("--cylinders", "of sliders: each is that of a cylinder, two binary links"),
     _option("--sliding-links", "of sliders: allow links with prismatic joints only"),
     _option("--sliding-loops", "of sliders: allow loops with fewer than two revolute joints"),
+    _option("--gear-trains", "planetary gear trains of one freedom"),
+    _option("--rotation-graphs", "of gear trains: one of each rotation graph"),
     _option("--symmetry P", "require an automorphism of prime order P", int),
     _SHARD,
     _WORKERS,

@@ -23,7 +23,7 @@ PICTURES = (".svg", ".png", ".pdf", ".tikz", ".tex", ".dxf")
 
 def run(options: argparse.Namespace) -> int:
     """Describe one graph, and draw it if asked."""
-    if re.search(r"^1m[0-9]| m[0-9]{1,3}$|^1p\.| P:", options.graph):
+    if re.search(r"^1m[0-9]| m[0-9]{1,3}$|^1[gp]\.| [GP]:", options.graph):
         return _with_special_joints(options)
     graph = read_graph(options.graph, options.line)
     if options.output:
@@ -49,24 +49,33 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _with_special_joints(options: argparse.Namespace) -> int:
-    """Describe and draw a chain with multiple or prismatic joints."""
+    """Describe and draw a chain with multiple or prismatic joints, or a planetary gear train."""
+    from graphsynth.structure.gear_trains import PlanetaryGearTrain
     from graphsynth.structure.multiple_joints import MultipleJointChain
     from graphsynth.structure.slider_chains import SliderChain
 
     text = options.graph
-    kind = SliderChain if text.startswith("1p.") or " P:" in text else MultipleJointChain
+    kinds: dict[str, type[PlanetaryGearTrain | SliderChain]] = {"g": PlanetaryGearTrain, "p": SliderChain}
+    letter = next((letter for letter in kinds if text.startswith(f"1{letter}.") or f" {letter.upper()}:" in text), "m")
+    kind = kinds.get(letter, MultipleJointChain)
     chain = kind.from_text(text) if " " in text else kind.from_key(text)
+    geared = isinstance(chain, PlanetaryGearTrain)
     if options.output:
         check_place(options.output, PICTURES)
-        chain.draw(options.output, driver=options.driver)
-    facts = {
+        chain.draw(options.output, **({"title": chain.key} if geared else {"driver": options.driver}))
+    joints = chain.axes if isinstance(chain, PlanetaryGearTrain) else chain.joints
+    facts: dict[str, Any] = {
         "key": chain.key,
         "text": chain.to_text(),
         "links": chain.links,
-        "joints": " ".join("-".join(map(str, joint)) for joint in chain.joints),
+        "axes" if geared else "joints": " ".join("-".join(map(str, joint)) for joint in joints),
         "mobility": chain.mobility,
         "automorphisms": chain.automorphism_order,
     }
+    if isinstance(chain, PlanetaryGearTrain):
+        facts["gear pairs"] = ", ".join(f"{a}-{b} on {carrier}" for a, b, carrier in chain.gears)
+        ways = chain.arrangements(coaxial=True)
+        facts["input, output, fixed"] = " ".join("-".join(map(str, way)) for way in ways) or "none on one axis"
     if options.json:
         console.put_json(facts)
     else:

@@ -19,6 +19,7 @@ from graphsynth.drawing.sketch import Sketch
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.model import Mechanism
+    from graphsynth.structure.gear_trains import PlanetaryGearTrain
     from graphsynth.structure.graph import MechanismGraph
     from graphsynth.structure.multiple_joints import MultipleJointChain
     from graphsynth.structure.slider_chains import SliderChain
@@ -89,6 +90,14 @@ def draw_sliders(chain: SliderChain, path: str | Path | None, **options: Any) ->
     from graphsynth.drawing.graphs import slider_sketch
 
     return _drawing(*slider_sketch(chain, **options), path)
+
+
+def draw_gear_train(train: PlanetaryGearTrain, path: str | Path | None, **options: Any) -> Drawing:
+    """Work of `PlanetaryGearTrain.draw`."""
+    from graphsynth.drawing.graphs import levels_sketch
+
+    graph = train.coloured
+    return _drawing(levels_sketch(graph if graph.frame is not None else graph.with_frame(0), **options), None, path)
 
 
 def graph_picture(graph: MechanismGraph) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import FormatError
 from graphsynth.core.shown import work
-from graphsynth.structure.canonical import KEY_VERSION
+from graphsynth.structure.coloured_chains import OTHER, ColouredChain
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.text import integer
 
@@ -22,11 +22,9 @@ if TYPE_CHECKING:
 
     import graphsynth as gs
 
-_SLIDES = 2  # where joints of mobility 2 are written: no chain of this kind has one
 
-
-@dataclass(frozen=True)
-class SliderChain:
+@dataclass(frozen=True, repr=False)
+class SliderChain(ColouredChain):
     """A planar kinematic chain, or a mechanism, with revolute and prismatic joints.
 
     Immutable and hashable; isomorphic chains have the same :attr:`key`.
@@ -49,11 +47,8 @@ class SliderChain:
     (1, ((0, 3),), 'Cl P:0-3')
     """
 
-    coloured: MechanismGraph
-
-    def __post_init__(self) -> None:
-        if self.coloured.space != 3:
-            raise FormatError(f"prismatic joints are planar here: space = {self.coloured.space} must be 3", "space")
+    letter = "P"
+    what = "a chain with prismatic joints"
 
     @classmethod
     def from_graph(cls, graph: MechanismGraph, sliders: Iterable[tuple[int, int]]) -> SliderChain:
@@ -62,7 +57,7 @@ class SliderChain:
         sliding = {tuple(sorted(integer(link, "sliders", 0, last, "number of a link") for link in s)) for s in sliders}
         if unknown := sliding - {(a, b) for a, b, mobility in graph.joints if mobility == 1}:
             raise FormatError(f"{min(unknown)} is no joint of mobility 1 of the graph", "sliders")
-        joints = [(a, b, _SLIDES if (a, b) in sliding else f) for a, b, f in graph.joints]
+        joints = [(a, b, OTHER if (a, b) in sliding else f) for a, b, f in graph.joints]
         if any(f > 1 for _, _, f in graph.joints):
             raise FormatError("all joints have mobility 1 beside prismatic ones", "graph")
         return cls(MechanismGraph(graph.links, joints, frame=graph.frame, space=graph.space))
@@ -70,7 +65,7 @@ class SliderChain:
     @cached_property
     def sliders(self) -> tuple[tuple[int, int], ...]:
         """The joints that slide, sorted."""
-        return tuple((a, b) for a, b, mobility in self.coloured.joints if mobility == _SLIDES)
+        return tuple((a, b) for a, b, mobility in self.coloured.joints if mobility == OTHER)
 
     @cached_property
     def graph(self) -> MechanismGraph:
@@ -85,54 +80,9 @@ class SliderChain:
         return tuple((a, b) for a, b, _ in self.coloured.joints)
 
     @property
-    def links(self) -> int:
-        """Number of links N, the frame included."""
-        return self.coloured.links
-
-    @property
-    def frame(self) -> int | None:
-        """The fixed link; a chain has none."""
-        return self.coloured.frame
-
-    @property
     def mobility(self) -> int:
         """Mobility by the structural formula (exact count)."""
         return self.graph.mobility
-
-    @property
-    def automorphism_order(self) -> int:
-        """Order of the automorphism group (exact)."""
-        return self.coloured.automorphism_order
-
-    def canonical(self) -> SliderChain:
-        """Return the canonical representative of the isomorphism class."""
-        return SliderChain(self.coloured.canonical())
-
-    @property
-    def key(self) -> str:
-        """Canonical key: the version, ``p.``, and the graph with its prismatic joints.
-
-        Equal for two chains exactly when they are isomorphic, the frame included.
-        """
-        return f"{KEY_VERSION}p.{self.coloured.key[1:]}"
-
-    @classmethod
-    def from_key(cls, key: str) -> SliderChain:
-        """Read a canonical key; anything else is a :class:`FormatError`."""
-        if not key.startswith(f"{KEY_VERSION}p."):
-            raise FormatError(f"a key of a chain with prismatic joints begins with {KEY_VERSION}p.", "key")
-        return cls(MechanismGraph.from_key(KEY_VERSION + key[3:]))
-
-    def to_text(self) -> str:
-        """Return the one-line form: that of the graph, with the prismatic joints as ``P:a-b,...``."""
-        return self.coloured.to_text().replace(f" {_SLIDES}:", " P:")
-
-    @classmethod
-    def from_text(cls, text: str) -> SliderChain:
-        """Read the one-line form; anything else is a :class:`FormatError`."""
-        if f" {_SLIDES}:" in text:
-            raise FormatError("a chain with prismatic joints has no joints of mobility 2", "text")
-        return cls(MechanismGraph.from_text(text.replace(" P:", f" {_SLIDES}:")))
 
     def embody(self, goals: Any = None, seed: int = 0, **options: Any) -> Any:
         """Find dimensions with which it moves as wanted, an `Embodiment`: `embody` with its prismatic joints given."""
@@ -146,6 +96,3 @@ class SliderChain:
 
     def _repr_svg_(self) -> str:
         return self.draw(None, width=300.0, height=260.0).svg
-
-    def __repr__(self) -> str:
-        return f"SliderChain.from_text({self.to_text()!r})"

@@ -9,6 +9,10 @@ from .api import (
     enumerate_mechanisms as enumerate_mechanisms,
     sample_mechanisms as sample_mechanisms,
 )
+from .gear_trains import (
+    count_planetary_gear_trains as count_planetary_gear_trains,
+    enumerate_planetary_gear_trains as enumerate_planetary_gear_trains,
+)
 from .multiple_joints import (
     count_multiple_joint_chains as count_multiple_joint_chains,
     enumerate_multiple_joint_chains as enumerate_multiple_joint_chains,

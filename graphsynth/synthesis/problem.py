@@ -31,6 +31,7 @@ from graphsynth.synthesis.families import (
     slider_families,
 )
 from graphsynth.synthesis.fractionated import OneByOne
+from graphsynth.synthesis.geared_trees import MOST_LINKS as MOST_GEARED, GearedTrees, geared_trees
 from graphsynth.synthesis.kernels.layout import NO_SLIDING_LINK, NO_SLIDING_LOOP
 from graphsynth.synthesis.totals import Total, is_counted_together, totals_of
 
@@ -47,7 +48,7 @@ _COUNTED_LOOPS = 6  # counts of so many loops take a moment
 # 1-DOF planar chains with 2, 3, ..., 8 loops (published and recomputed): where there is nothing smaller to count
 _KNOWN = (2, 16, 230, 6856, 318162, 19819281, 1535380884)
 
-WorkItem = Chunk | OneByOne
+WorkItem = Chunk | OneByOne | GearedTrees
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class EnumerationProblem:
 
     title: str  # one line for people
     families: tuple[Family, ...]  # what the search kernels generate
-    one_by_one: tuple[OneByOne, ...] = ()  # what is made one by one; listed first
+    one_by_one: tuple[OneByOne | GearedTrees, ...] = ()  # what is made one by one; listed first
     symmetry: int = 0  # 0, or the prime order of a required automorphism
     #: why there is nothing, where the structural formula says so already
     reason: str = field(default="", repr=False, compare=False)
@@ -162,6 +163,21 @@ class EnumerationProblem:
         check_loops(loops, links, mobility, 3, {}, framed=framed)
         ring = OneByOne("rings", links, mobility, 3, ((SLIDER, number),), framed, rules=rules)
         return cls(title, tuple(slider_families(links, mobility, number, rules, framed)), (ring,))
+
+    @classmethod
+    def gear_trains(cls, links: int, rotation: bool) -> EnumerationProblem:
+        """State the enumeration of planetary gear trains of one freedom, or of their rotation graphs.
+
+        Raises `SpecError` for a value out of its bounds, `TooLargeError` for too many links.
+        """
+        links = whole(links, "links", 3)
+        title = f"planetary gear trains W=1 N={links}" + (" rotation graphs" if _truth(rotation, "rotation") else "")
+        if links > MOST_GEARED:
+            raise TooLargeError(
+                f"planetary gear trains of {links} links are more than the bound of {MOST_GEARED} links, of which there "
+                f"are 904156: ask for {MOST_GEARED} links at most"
+            )
+        return cls(title, (), geared_trees(links, bool(rotation)))
 
     @classmethod
     def mechanisms(cls, question: StructuralSpec | LinkAssortment, symmetry: int | None) -> EnumerationProblem:

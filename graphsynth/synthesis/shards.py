@@ -19,6 +19,7 @@ from graphsynth.core.wording import shown, whole
 from graphsynth.synthesis.chunks import Chunk, estimates, workspace
 from graphsynth.synthesis.families import Family
 from graphsynth.synthesis.fractionated import OneByOne, count_fractionated
+from graphsynth.synthesis.geared_trees import GearedTrees
 from graphsynth.synthesis.kernels.counting import COUNTING, LISTING, MAKING, weigh_block
 from graphsynth.synthesis.problem import WorkItem
 from graphsynth.synthesis.totals import Total
@@ -121,6 +122,9 @@ def _atoms(items: tuple[WorkItem, ...], purpose: int) -> list[Costs]:
     for item in items:
         if isinstance(item, OneByOne):
             atoms.append(np.array([_made(item, purpose)]))
+            continue
+        if isinstance(item, GearedTrees):
+            atoms.append(np.array([_MADE * (item.stop - item.start)]))
             continue
         if item.symmetry:  # few labellings are searched; nobody knows how many
             atoms.append(np.ceil([item.weight]))

@@ -20,11 +20,13 @@ from typing import Any, BinaryIO
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.core.journal import Journal, Work, digest_of
 from graphsynth.core.ordered import in_order
+from graphsynth.structure.gear_trains import PlanetaryGearTrain
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.multiple_joints import MultipleJointChain
 from graphsynth.structure.slider_chains import SliderChain
 from graphsynth.synthesis.chunks import Chunk
 from graphsynth.synthesis.edge_labels import SLIDER
+from graphsynth.synthesis.geared_trees import GearedTrees
 from graphsynth.synthesis.problem import EnumerationProblem, WorkItem, counts, graphs, texts, whole_sum
 from graphsynth.synthesis.shards import run_of, shard_of
 from graphsynth.synthesis.totals import Grown, Total
@@ -53,6 +55,9 @@ def _work(
 
 
 def _json_line(graph: MechanismGraph, item: WorkItem) -> str:
+    if isinstance(item, GearedTrees):
+        train = PlanetaryGearTrain(graph)
+        return json.dumps({"key": train.key, "links": train.links, "axes": train.axes, "gears": train.gears}) + "\n"
     multiple = item.family.pins if isinstance(item, Chunk) else 0
     higher = item.family.higher if isinstance(item, Chunk) else item.higher
     if multiple or SLIDER in dict(higher):
