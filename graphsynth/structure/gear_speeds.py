@@ -104,7 +104,9 @@ def ratio(train: PlanetaryGearTrain, arrangement: Arrangement, teeth: Teeth | No
 
     driven, driving, fixed = arrangement
     if len({driven, driving, fixed}) < 3:
-        raise GraphError(f"input, output and fixed link must be three different links, not {driven}, {driving}, {fixed}")
+        raise GraphError(
+            f"input, output and fixed link must be three different links, not {driven}, {driving}, {fixed}"
+        )
     out = speeds(train, {fixed: 0, driven: 1}, teeth)[driving]
     if out == 0:
         raise GraphError(f"link {driving} stands still when link {driven} turns and link {fixed} is fixed")

@@ -37,7 +37,9 @@ def moves_freely(links, pairs, rng):
         row[a], row[b] = rng.randrange(1, PRIME), rng.randrange(1, PRIME)
         row[carrier] = -row[a] - row[b]
         rows.append(row)
-    for fixed, turned in combinations(range(links), 2):  # w = 0 here and w = 1 there has one solution, different from both
+    for fixed, turned in combinations(
+        range(links), 2
+    ):  # w = 0 here and w = 1 there has one solution, different from both
         place = [link for link in range(links) if link not in (fixed, turned)]
         square = [[row[link] for link in place] for row in rows]
         if determinant(square) == 0:
@@ -82,7 +84,9 @@ def brute_force(links):
             train.add_edges_from(graph.edges, kind=1)
             train.add_edges_from([pair[:2] for pair in chosen], kind=2)
             alike = found.setdefault(nx.weisfeiler_lehman_graph_hash(train, edge_attr="kind"), [])
-            if not any(nx.is_isomorphic(train, other, edge_match=categorical_edge_match("kind", 0)) for other, _ in alike):
+            if not any(
+                nx.is_isomorphic(train, other, edge_match=categorical_edge_match("kind", 0)) for other, _ in alike
+            ):
                 alike.append((train, chosen))
     return [entry for alike in found.values() for entry in alike]
 
@@ -117,7 +121,9 @@ def test_own_numbers(row):
     test_published_numbers(row)
 
 
-@pytest.mark.parametrize("links", [3, 4, 5, pytest.param(6, marks=pytest.mark.long), pytest.param(7, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "links", [3, 4, 5, pytest.param(6, marks=pytest.mark.long), pytest.param(7, marks=pytest.mark.slow)]
+)
 def test_brute_force_finds_the_same_trains(links):
     trains = brute_force(links)
     keys = {
