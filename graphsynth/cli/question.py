@@ -82,13 +82,8 @@ def problem_of(options: argparse.Namespace, *, counted: bool = False) -> Enumera
         links = options.truss if options.assur is None else options.assur + 1
         return EnumerationProblem.trusses(links, int(space), options.assur is not None)
     if options.gear_trains or options.rotation_graphs:
-        if (
-            set(given) != {"N"}
-            or not given["N"].isdecimal()
-            or options.frame
-            or options.symmetry
-            or not options.gear_trains
-        ):
+        more = options.frame or options.symmetry or options.spec or options.set or options.fractionated
+        if more or not options.gear_trains or set(given) != {"N"} or not given["N"].isdecimal():
             raise SpecError("--gear-trains takes --links N and --rotation-graphs, and nothing else of a question")
         return EnumerationProblem.gear_trains(int(given["N"]), options.rotation_graphs)
     slides = options.cylinders or options.sliding_links or options.sliding_loops

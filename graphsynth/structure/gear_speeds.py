@@ -1,10 +1,9 @@
 """Angular velocities, ratios and efficiency of planetary gear trains, exact, with numbers of teeth or symbols.
 
-Every gear pair gives one equation of Willis, (w_a - w_c) z_a + (w_b - w_c) z_b = 0, c being its carrier and the teeth of
-an internal gear counted negative.  Losses are those of the teeth: of the power that a gear gives to a mesh, in the frame
-of the carrier, the other gear gets the share eta.  Sources: F. Buchsbaum and F. Freudenstein, *Synthesis of kinematic
-structure of geared kinematic chains*, J. Mechanisms 5 (1970) 357-392; E. Pennestri and F. Freudenstein, *The mechanical
-efficiency of epicyclic gear trains*, ASME J. Mech. Des. 115 (1993) 645-651.
+Every gear pair gives one equation of Willis, (w_a - w_c) z_a + (w_b - w_c) z_b = 0, c being its carrier; teeth of an
+internal gear count negative.  Losses are those of the teeth: of the power that a gear gives to a mesh, in the frame of
+the carrier, the other gear gets the share eta.  Sources: [Buchsbaum & Freudenstein 1970], and for the efficiency
+[Pennestri & Freudenstein 1993].
 """
 
 from __future__ import annotations
@@ -12,16 +11,32 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from graphsynth.core.errors import GraphError, SpecError
 from graphsynth.core.wording import shown
 
 if TYPE_CHECKING:
-    from graphsynth.structure.gear_trains import Arrangement, GearPair, PlanetaryGearTrain
+    import graphsynth as gs
 
 Teeth = Mapping[tuple[int, int], tuple[Any, Any]]
 """Numbers of teeth of the gear pairs, ``{(a, b): (z_a, z_b)}``; those of internal gears are negative."""
+
+
+class GearPair(NamedTuple):
+    """Links a < b that are in mesh, and the link that carries the axes of both."""
+
+    a: int
+    b: int
+    carrier: int
+
+
+class Arrangement(NamedTuple):
+    """Which link is driven, which one drives, and which one is fixed."""
+
+    input: int
+    output: int
+    fixed: int
 
 
 @dataclass(frozen=True)
@@ -44,7 +59,7 @@ class TrainEfficiency:
     powers: dict[tuple[int, int], Any]
 
 
-def speeds(train: PlanetaryGearTrain, given: Mapping[int, Any], teeth: Teeth | None = None) -> dict[int, Any]:
+def speeds(train: gs.PlanetaryGearTrain, given: Mapping[int, Any], teeth: Teeth | None = None) -> dict[int, Any]:
     """Solve the equations of Willis for the angular velocities of all links (exact).
 
     Parameters
@@ -95,7 +110,7 @@ def speeds(train: PlanetaryGearTrain, given: Mapping[int, Any], teeth: Teeth | N
     return {link: sympy.factor(own[link]) for link in range(train.links)}
 
 
-def ratio(train: PlanetaryGearTrain, arrangement: Arrangement, teeth: Teeth | None = None) -> Any:
+def ratio(train: gs.PlanetaryGearTrain, arrangement: Arrangement, teeth: Teeth | None = None) -> Any:
     """Return the transmission ratio, angular velocity of the input over that of the output (exact).
 
     Raises `GraphError` where the output stands still or is not determined, else as `speeds`.
@@ -104,16 +119,14 @@ def ratio(train: PlanetaryGearTrain, arrangement: Arrangement, teeth: Teeth | No
 
     driven, driving, fixed = arrangement
     if len({driven, driving, fixed}) < 3:
-        raise GraphError(
-            f"input, output and fixed link must be three different links, not {driven}, {driving}, {fixed}"
-        )
+        raise GraphError(f"input, output and fixed link must be different links, not {driven}, {driving}, {fixed}")
     out = speeds(train, {fixed: 0, driven: 1}, teeth)[driving]
     if out == 0:
         raise GraphError(f"link {driving} stands still when link {driven} turns and link {fixed} is fixed")
     return sympy.factor(1 / out)
 
 
-def efficiency(train: PlanetaryGearTrain, arrangement: Arrangement, teeth: Teeth, mesh: Any) -> TrainEfficiency:
+def efficiency(train: gs.PlanetaryGearTrain, arrangement: Arrangement, teeth: Teeth, mesh: Any) -> TrainEfficiency:
     """Return the efficiency of a train of mobility 1 with losses in its teeth (exact for the model).
 
     Bearings, churning and inertia are left out; the efficiency of a mesh is that of the same gears with a carrier at
@@ -170,13 +183,13 @@ def _directions(signs: dict[tuple[int, int], int]) -> Iterable[dict[tuple[int, i
 
 
 def _balance(
-    train: PlanetaryGearTrain,
+    train: gs.PlanetaryGearTrain,
     arrangement: Arrangement,
     teeth: dict[tuple[int, int], tuple[Any, Any]],
     w: dict[int, Any],
     shares: dict[tuple[int, int], Any],
 ) -> TrainEfficiency:
-    """Solve the equilibrium of all links; torques of a mesh are as its teeth and share say, the carrier takes the rest."""
+    """Solve the equilibrium of all links; teeth and shares divide a torque in a mesh, the carrier takes the rest."""
     import sympy
 
     meshes = {pair: sympy.Dummy("m") for pair in teeth}
@@ -214,7 +227,7 @@ def _solved(rows: Sequence[Any], unknowns: Sequence[Any], what: str) -> tuple[An
     raise GraphError(what)
 
 
-def _teeth(train: PlanetaryGearTrain, teeth: Teeth | None) -> dict[tuple[int, int], tuple[Any, Any]]:
+def _teeth(train: gs.PlanetaryGearTrain, teeth: Teeth | None) -> dict[tuple[int, int], tuple[Any, Any]]:
     """Return the teeth of each gear pair, in its order."""
     import sympy
 

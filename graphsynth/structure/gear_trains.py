@@ -11,12 +11,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, permutations
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import FormatError, GraphError
 from graphsynth.core.shown import work
 from graphsynth.structure.coloured_chains import OTHER, ColouredChain
 from graphsynth.structure.connectivity import bits
+from graphsynth.structure.gear_speeds import Arrangement, GearPair, Teeth, TrainEfficiency, efficiency, ratio, speeds
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.text import LINKS_MAX, integer
 
@@ -24,23 +25,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import graphsynth as gs
-    from graphsynth.structure.gear_speeds import Teeth, TrainEfficiency
-
-
-class GearPair(NamedTuple):
-    """Links a < b that are in mesh, and the link that carries the axes of both."""
-
-    a: int
-    b: int
-    carrier: int
-
-
-class Arrangement(NamedTuple):
-    """Which link is driven, which one drives, and which one is fixed."""
-
-    input: int
-    output: int
-    fixed: int
 
 
 @dataclass(frozen=True, repr=False)
@@ -143,7 +127,7 @@ class PlanetaryGearTrain(ColouredChain):
         """Return the train with the same gear pairs and carriers on as many axes as can be (exact).
 
         Trains have the same equations of angular velocities, up to the names of links, exactly when the keys of these
-        are equal.
+        are equal.  Raises `GraphError` if gear pairs and carriers do not connect all links.
         """
         import networkx
 
@@ -182,22 +166,16 @@ class PlanetaryGearTrain(ColouredChain):
 
     def speeds(self, given: Mapping[int, Any], *, teeth: Teeth | None = None) -> dict[int, Any]:
         """Return the angular velocity of every link; see `graphsynth.structure.gear_speeds.speeds`."""
-        from graphsynth.structure.gear_speeds import speeds
-
         return speeds(self, given, teeth)
 
     def ratio(self, input: int, output: int, fixed: int | None = None, *, teeth: Teeth | None = None) -> Any:
         """Return the ratio of the angular velocities of input and output; see `graphsynth.structure.gear_speeds`."""
-        from graphsynth.structure.gear_speeds import ratio
-
         return ratio(self, Arrangement(input, output, self._fixed(fixed)), teeth)
 
     def efficiency(
         self, input: int, output: int, fixed: int | None = None, *, teeth: Teeth, mesh: Any = "0.98"
     ) -> TrainEfficiency:
         """Return the efficiency with losses in the teeth; see `graphsynth.structure.gear_speeds.efficiency`."""
-        from graphsynth.structure.gear_speeds import efficiency
-
         return efficiency(self, Arrangement(input, output, self._fixed(fixed)), teeth, mesh)
 
     def _fixed(self, fixed: int | None) -> int:

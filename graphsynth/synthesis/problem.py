@@ -174,8 +174,8 @@ class EnumerationProblem:
         title = f"planetary gear trains W=1 N={links}" + (" rotation graphs" if _truth(rotation, "rotation") else "")
         if links > MOST_GEARED:
             raise TooLargeError(
-                f"planetary gear trains of {links} links are more than the bound of {MOST_GEARED} links, of which there "
-                f"are 904156: ask for {MOST_GEARED} links at most"
+                f"planetary gear trains of {links} links are more than the bound of {MOST_GEARED}, of which there are "
+                f"904156: ask for {MOST_GEARED} links at most"
             )
         return cls(title, (), geared_trees(links, bool(rotation)))
 

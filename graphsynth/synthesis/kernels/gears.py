@@ -125,16 +125,18 @@ def choose_gears(n, trees, start, stop, gears, finest, perms, out):
         order = automorphisms(n, trees[h], perms)
         if order < 0:
             return -1
+        # where each automorphism takes each pair, as a bit
         images = np.empty((order, m), np.uint8)
         for g in range(order):
             for p in range(m):
                 images[g, p] = m - 1 - number[perms[g, pairs[_A, p]], perms[g, pairs[_B, p]]]
+        # how many more pairs each set of links may have
         for u in range(1 << n):
             room[u] = max(0, np.int64(popcount(np.uint64(u))) - 2)
         depth, p, mask = 0, -1, np.int64(0)
         while depth >= 0:
             p += 1
-            if p > m - gears + depth:  # too few are left
+            if p > m - gears + depth:  # too few are left: take the last one back
                 depth -= 1
                 if depth >= 0:
                     p = chosen[depth]
