@@ -93,6 +93,8 @@ def speeds(train: gs.PlanetaryGearTrain, given: Mapping[int, Any], teeth: Teeth 
     import sympy
 
     counted = _teeth(train, teeth)
+    if not isinstance(given, Mapping):
+        raise SpecError(f"given = {shown(given)} must be a mapping such as {{0: 1, 1: 0}}")
     own = {link: _exact(value, f"given[{link}]") for link, value in given.items()}
     if unknown := set(own) - set(range(train.links)):
         raise GraphError(f"the train has no link {min(unknown)}: its links are 0 to {train.links - 1}")
@@ -118,6 +120,8 @@ def ratio(train: gs.PlanetaryGearTrain, arrangement: Arrangement, teeth: Teeth |
     import sympy
 
     driven, driving, fixed = arrangement
+    if unknown := [link for link in arrangement if link not in range(train.links)]:
+        raise GraphError(f"the train has no link {shown(unknown[0])}: its links are 0 to {train.links - 1}")
     if len({driven, driving, fixed}) < 3:
         raise GraphError(f"input, output and fixed link must be different links, not {driven}, {driving}, {fixed}")
     out = speeds(train, {fixed: 0, driven: 1}, teeth)[driving]

@@ -119,7 +119,7 @@ def test_own_numbers(row):
 
 
 @pytest.mark.parametrize(
-    "links", [3, 4, 5, pytest.param(6, marks=pytest.mark.long), pytest.param(7, marks=pytest.mark.slow)]
+    "links", [3, 4, *(pytest.param(links, marks=pytest.mark.slow) for links in (5, 6, 7))]
 )
 def test_brute_force_finds_the_same_trains(links):
     trains = brute_force(links)
@@ -132,7 +132,7 @@ def test_brute_force_finds_the_same_trains(links):
     assert rotation_classes(trains) == count_planetary_gear_trains(links, rotation=True)
 
 
-@pytest.mark.parametrize("links", [5, 6, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("links", [5, *(pytest.param(links, marks=pytest.mark.slow) for links in (6, 8))])
 def test_orbits_add_up_to_all_choices_without_locked_links(links):
     """No subset rule and no symmetry on the one side; orbit and stabiliser on the other."""
     rng = random.Random(links)
@@ -272,6 +272,8 @@ def test_bad_trains_and_teeth_get_one_sentence():
         (lambda: PlanetaryGearTrain.from_text("C~ 2:0-3"), "no joints of mobility 2"),
         (lambda: PlanetaryGearTrain.from_key("1p.BBP8AEg"), "begins with 1g."),
         (lambda: SIMPLE.ratio(0, 2), "no link is fixed"),
+        (lambda: SIMPLE.ratio(0, 9, 1), "no link 9"),
+        (lambda: SIMPLE.speeds(3), "must be a mapping"),
         (lambda: SIMPLE.ratio(0, 0, 1), "must be different links"),
         (lambda: SIMPLE.ratio(0, 2, 1, teeth={(0, 3): (20, 20)}), "are missing"),
         (lambda: SIMPLE.ratio(0, 2, 1, teeth={(0, 1): (20, 20)}), "no gear pair"),
