@@ -118,9 +118,7 @@ def test_own_numbers(row):
     test_published_numbers(row)
 
 
-@pytest.mark.parametrize(
-    "links", [3, 4, *(pytest.param(links, marks=pytest.mark.slow) for links in (5, 6, 7))]
-)
+@pytest.mark.parametrize("links", [3, 4, *(pytest.param(links, marks=pytest.mark.slow) for links in (5, 6, 7))])
 def test_brute_force_finds_the_same_trains(links):
     trains = brute_force(links)
     keys = {
