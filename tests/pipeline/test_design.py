@@ -115,7 +115,7 @@ products = ["tables"]
     options = ["--out", str(tmp_path / "report"), "--workers", "1", "--seconds", "20", "--json"]
     assert main(["design", str(tmp_path / "own.toml"), *options]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["accepted"] == 1 and told["answers"][0]["error path"] < 0.01
+    assert told["accepted"] == 1 and told["answers"][0]["error of the path"] < 0.01
     mechanism = gs.Mechanism.from_toml(Path(told["answers"][0]["file"]).read_text("utf-8"))
     assert mechanism.graph.key == told["answers"][0]["key"]
     assert mechanism.input_range == (0.0, 2.0 * math.pi)

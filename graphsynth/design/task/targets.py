@@ -452,9 +452,8 @@ class SwingTarget(LinkTarget):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0.0 <= self.least <= self.most or self.most <= 0.0:
-            raise GeometryError(
-                f"least = {self.least:.6g} and most = {self.most:.6g} must be 0 <= least <= most; correct them"
-            )
+            told = (f"{x:.6g}" + ("" if self.slides else f" ({math.degrees(x):.6g}°)") for x in (self.least, self.most))
+            raise GeometryError("least = {} and most = {} must be 0 <= least <= most; correct them".format(*told))
         if self.time_ratio is not None and not 1.0 <= finite("time_ratio", self.time_ratio) <= 20.0:
             raise GeometryError(f"time_ratio = {self.time_ratio} must lie in 1 to 20: slow over quick")
 

@@ -167,13 +167,15 @@ class DesignTask(Shown):
         put(self, "span", span)
         if self.stroke is not None:
             put(self, "stroke", limits("stroke", self.stroke))
+            if not self.linear:
+                raise GeometryError(f"stroke = {self.stroke} is that of a cylinder or slide; drive is {self.drive!r}")
         put(self, "links", tuple(sorted({whole("links", n, 4, 10) for n in self.links})))
         if not self.links or any(n % 2 for n in self.links):
             raise GeometryError(f"links = {self.links} must be even numbers, 4 to 10: others have not one freedom")
         whole("sliders", self.sliders, 0, 3)
         put(self, "pivots", tuple(place(f"pivots[{k}]", p) for k, p in enumerate(self.pivots)))
         if len(set(self.pivots)) < len(self.pivots):
-            raise GeometryError("pivots repeat; give each once")
+            raise GeometryError(f"pivots = {self.pivots} repeat; give each once")
         if self.drive_pivot is not None:
             put(self, "drive_pivot", place("drive_pivot", self.drive_pivot))
             if self.drive == "slide":
@@ -235,15 +237,15 @@ class DesignTask(Shown):
             raise GeometryError("a direction from the frame's line needs four links that turn; use links = [4]")
         points = {target.point for target in self.targets if isinstance(target, PathTarget | PosesTarget)}
         if self.mirrored:
-            least = 8 if points else 6
-            if self.drive != "rotation" or self.sliders or self.links[0] < least:
-                raise GeometryError(
-                    f"symmetric, links = {list(self.links)}, drive {self.drive!r}, sliders = {self.sliders}: a "
-                    "symmetric curve is that of one point of four links, links = [4], or of eight or more; from six a "
-                    "mechanism may be its own mirror image; all its joints turn and its drive turns fully"
-                )
-        elif self.symmetric and (not four or self.linear or len(points) != 1):
-            raise GeometryError("a symmetric curve is that of one point of four links that turn; use links = [4]")
+            fits = self.drive == "rotation" and not self.sliders and self.links[0] >= (8 if points else 6)
+        else:
+            fits = four and not self.linear and len(points) == 1
+        if self.symmetric and not fits:
+            raise GeometryError(
+                f"symmetric, links = {list(self.links)}, drive {self.drive!r}, sliders = {self.sliders}: a symmetric "
+                "curve is that of one point of four links, links = [4], or of eight or more; from six a mechanism may "
+                "be its own mirror image, if its drive turns fully; leave out sliders and linear drives"
+            )
 
     @property
     def sense(self) -> int:

@@ -94,7 +94,7 @@ def records(context: Context, designs: Designs) -> tuple[Record, ...]:
         proof = "its motion is certified" if answer.certified else "its motion is estimated"
         margins = (
             *(
-                Quantity.of_si(f"error {name}", error, "deg" if angular else "")
+                Quantity.of_si(f"error of the {name}", error, "deg" if angular else "")
                 for name, error, angular in zip(_titles(designs), answer.errors, _angular(designs))
             ),
             exact("links", answer.links),
@@ -115,7 +115,7 @@ def records(context: Context, designs: Designs) -> tuple[Record, ...]:
 def tables(context: Context, designs: Designs) -> tuple[Table, ...]:
     """Return the ranked answers, what is proved of them, and why others were rejected."""
     errors = (
-        f"error {name} [°] | .2g" if angular else f"error {name} | .2g"
+        f"error of the {name} [°] | .2g" if angular else f"error of the {name} | .2g"
         for name, angular in zip(_titles(designs), _angular(designs))
     )
     columns = ("place", "links", "sliders", *errors, "transmission [°] | .1f", "size | .4g", "does the task")

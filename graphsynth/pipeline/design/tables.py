@@ -92,7 +92,8 @@ class PosesTable:
 
     def __post_init__(self) -> None:
         require(
-            len(self.points) == len(self.angles), f"has {len(self.points)} points and {len(self.angles)} angles_deg"
+            len(self.points) == len(self.angles),
+            f"has {len(self.points)} points and {len(self.angles)} angles_deg; give one angle for each point",
         )
 
     def target(self, turn: float) -> Target:

@@ -40,8 +40,8 @@ def test_neighbours_are_those_of_brute_force(large: CurveIndex) -> None:
     shares = []
     for curve, closed in hidden(large, 40):
         wanted = WantedCurve(curve, closed)
-        every = large._nearest(wanted, len(large), None)[:10]
-        shares.append(np.isin(every, large._nearest(wanted, 1000, None)).mean())
+        every = large._nearest(wanted, len(large), None, math.inf)[:10]
+        shares.append(np.isin(every, large._nearest(wanted, 1000, None, math.inf)).mean())
     assert np.mean(shares) > 0.95
 
 

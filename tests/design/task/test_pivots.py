@@ -59,7 +59,7 @@ def test_the_foot_of_a_cylinder_is_a_pivot_of_the_drive() -> None:
     [
         ({"drive_pivot": (1, 2, 3)}, "drive_pivot has three numbers; give two"),
         ({"drive_pivot": (1, 2, 0, 3)}, "x0 < x1"),
-        ({"pivots": [(0, 0), (0, 0)]}, "pivots repeat"),
+        ({"pivots": [(0, 0), (0, 0)]}, "pivots = .* repeat"),
         ({"drive": "slide", "sliders": 1, "drive_pivot": (0, 0)}, "a slide on the frame has no pivot"),
         ({"pivots": [(0, "a")]}, "pivots"),
     ],
