@@ -53,7 +53,7 @@ from .mechanism.model import Mechanism as Mechanism
 from .pipeline.runner import run as run
 from .structure.gear_trains import PlanetaryGearTrain as PlanetaryGearTrain
 from .structure.graph import Joint as Joint, MechanismGraph as MechanismGraph
-from .structure.modes import count_assembly_modes as count_assembly_modes, coupler_curve_degree as coupler_curve_degree
+from .structure.modes import count_assembly_modes as count_assembly_modes, coupler_curve_degree as coupler_curve_degree, coupler_curve_genus as coupler_curve_genus
 from .structure.multiple_joints import MultipleJointChain as MultipleJointChain
 from .structure.slider_chains import SliderChain as SliderChain
 from .structure.system.assortment import LinkAssortment as LinkAssortment

@@ -177,12 +177,14 @@ def _is_revolute(graph: MechanismGraph) -> bool:
 
 
 def _curves(graph: MechanismGraph) -> str:
-    """Say of which degree the curves of each moving link are."""
-    from graphsynth.structure.modes import coupler_curve_degree
+    """Say of which degree and genus the curves of each moving link are."""
+    from graphsynth.structure.modes import coupler_curve_degree, coupler_curve_genus
 
-    degrees = {link: coupler_curve_degree(graph, link) for link in range(graph.links) if link != graph.frame}
-    of_degree = {own: [link for link in degrees if degrees[link] == own] for own in sorted(set(degrees.values()))}
-    return "; ".join(f"degree {own}: links {', '.join(map(str, links))}" for own, links in of_degree.items())
+    links: dict[tuple[int, int], list[str]] = {}
+    for link in (own for own in range(graph.links) if own != graph.frame):
+        links.setdefault((coupler_curve_degree(graph, link), coupler_curve_genus(graph, link)), []).append(str(link))
+    kinds = sorted(links.items())
+    return "; ".join(f"degree {degree}, genus {genus}: links {', '.join(own)}" for (degree, genus), own in kinds)
 
 
 def _groups(graph: MechanismGraph, driver: int | None) -> list[str]:

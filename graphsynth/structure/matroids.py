@@ -136,19 +136,23 @@ def _wait(stack, at, left, one, two):
 
 
 @kernel
-def count_modes(links, ranks, keys, counts, stack):
+def count_modes(links, ranks, left, one, two, keys, counts, stack):
     """Return the number of assembly modes; -1 where keys (a power of two) are too few, 0 if none or infinitely many.
 
-    ``stack`` (links + 1, 5): questions that wait for smaller ones, with the next cut and the sum so far.
+    ``left, one, two``: the question, all links and (0, 0) for a structure.  ``stack`` (links + 1, 5): questions that
+    wait for smaller ones, with the next cut and the sum so far.
     """
     full = (1 << links) - 1
-    for k in range(links):
-        if ranks[1 << k] != 1:
+    rest = left
+    while rest:
+        low = rest & -rest
+        rest ^= low
+        if ranks[one | low] == ranks[one] or ranks[two | low] == ranks[two]:
             return np.int64(0)
-    if 2 * ranks[full] != links + 1:
+    if ranks[left | one] - ranks[one] + ranks[left | two] - ranks[two] != popcount(np.uint64(left)) + 1:
         return np.int64(0)
     keys[:] = 0
-    left, one, two = _reduced(ranks, full, full, 0, 0)
+    left, one, two = _reduced(ranks, full, left, one, two)
     at, found = _known(keys, counts, left, one, two)
     if found >= 0:
         return found

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from graphsynth.structure.assur import AssurGroup
     from graphsynth.structure.graph import Joint
 
-__all__ = ["count_assembly_modes", "coupler_curve_degree"]
+__all__ = ["count_assembly_modes", "coupler_curve_degree", "coupler_curve_genus"]
 
 
 def count_assembly_modes(graph: MechanismGraph, drivers: Iterable[int | tuple[int, int]] = ()) -> int:
@@ -92,6 +92,51 @@ def coupler_curve_degree(mechanism: MechanismGraph, link: int) -> int:
     >>> coupler_curve_degree(four_bar, 2), coupler_curve_degree(four_bar, 1)
     (6, 2)
     """
+    return _drawn(mechanism, link)[0]
+
+
+def coupler_curve_genus(mechanism: MechanismGraph, link: int) -> int:
+    """Return the genus of the curves that points of a link draw (exact).
+
+    It is that of the motion of all links which the curve depends on.
+
+    Parameters
+    ----------
+    mechanism : MechanismGraph
+        With a frame, of mobility 1 in the plane; joints are revolute.
+    link : int
+        A moving link.
+
+    Returns
+    -------
+    int
+        Genus of the complex curve of a point in general position, for dimensions in general position: 0 if it has a
+        rational parametrisation; such a mechanism has at most one circuit more than its genus.
+
+    Raises
+    ------
+    GraphError
+        As for `coupler_curve_degree`.
+
+    Notes
+    -----
+    Dimensions at which dead centres meet, as in a kite, make it smaller.
+
+    Examples
+    --------
+    >>> from graphsynth import MechanismGraph
+    >>> four_bar = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    >>> coupler_curve_genus(four_bar, 2), coupler_curve_genus(four_bar, 1)
+    (1, 0)
+    """
+    moving = _drawn(mechanism, link)[1]
+    at = {own: k for k, own in enumerate(sorted(moving))}
+    joints = tuple((at[joint.a], at[joint.b]) for joint in mechanism.joints if {joint.a, joint.b} <= moving)
+    return _genus(joints, len(at))
+
+
+def _drawn(mechanism: MechanismGraph, link: int) -> tuple[int, set[int]]:
+    """Return the degree of the curves of a link's points, and the links with which they move, the frame among them."""
     _check(mechanism)
     if mechanism.frame is None or mechanism.mobility != 1:
         raise GraphError(f"curves need a frame and mobility 1, not {mechanism.mobility}; choose a mechanism")
@@ -100,12 +145,13 @@ def coupler_curve_degree(mechanism: MechanismGraph, link: int) -> int:
     # a bar from the frame to the point: a circle meets a curve of degree 2 d in 2 d points beside the circular ones
     n, frame = mechanism.links, mechanism.frame
     barred = MechanismGraph(n + 1, [*mechanism.joints, (frame, n), (link, n)], frame=frame)
-    found, needed = 1, {n}
+    found, needed, moving = 1, {n}, {frame}
     for group in reversed(decompose(barred, ()).groups):  # those that place the bar
         if needed & set(group.links):
             needed.update(end for joint in group.outer for end in (joint.a, joint.b))
+            moving.update(group.links)
             found *= _modes_of(group)
-    return found
+    return found, moving - {n}
 
 
 def _check(graph: MechanismGraph) -> None:
@@ -135,21 +181,48 @@ def _counted(where: tuple[int, ...], joints: Iterable[Joint]) -> int:
 @lru_cache(maxsize=1000)
 def _table(pairs: tuple[tuple[int, int], ...], bodies: int) -> int:
     """Count the modes of bodies with a pin for each pair."""
+    return _Spaces(pairs, bodies).count((1 << bodies) - 1, 0, 0) if bodies > 1 else 1
+
+
+@lru_cache(maxsize=1000)
+def _genus(pairs: tuple[tuple[int, int], ...], bodies: int) -> int:
+    """Return the genus of the motion of bodies with a pin for each pair, mobility 1."""
     import numpy as np
 
-    from graphsynth.structure.matroids import MOST
+    spaces = _Spaces(pairs, bodies)
+    ranks, full = spaces.ranks.astype(int), (1 << bodies) - 1
+    large = np.arange(1, full)  # at an end of the curve some links become large beside the others
+    both = ranks[large] + ranks[full ^ large]
+    fits = ranks[large] + ranks[full] - ranks[full ^ large] == np.array([int(k).bit_count() for k in large]) + 1
+    ends = [(k, full ^ k, int(more) - int(ranks[full]) - 1) for k, more in zip(large[fits].tolist(), both[fits])]
+    return 1 + sum(spaces.count(a, 0, b) * spaces.count(b, a, 0) * more for a, b, more in ends if more) // 2
 
-    if bodies > MOST:
-        raise GraphError(f"{bodies} bodies must be assembled at once; at most {MOST} are counted: drive other joints")
-    if bodies == 1:
-        return 1
-    fill_ranks, count_modes = named("graphsynth.structure.matroids", "fill_ranks", "count_modes")
-    links = np.array(pairs, dtype=np.int64).reshape(-1)
-    ranks = np.empty(1 << bodies, dtype=np.int8)
-    fill_ranks(bodies, links, np.repeat(np.arange(len(pairs)), 2), ranks)
-    size, found = 1 << 12, -1
-    while found < 0:  # more room where it was too little
-        keys, counts = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
-        found = int(count_modes(bodies, ranks, keys, counts, np.empty((bodies + 1, 5), dtype=np.int64)))
-        size *= 16
-    return found
+
+class _Spaces:
+    """The two linear spaces of bodies with a pin for each pair, by their matroid."""
+
+    def __init__(self, pairs: tuple[tuple[int, int], ...], bodies: int) -> None:
+        import numpy as np
+
+        from graphsynth.structure.matroids import MOST
+
+        if bodies > MOST:
+            raise GraphError(
+                f"{bodies} bodies must be assembled at once; at most {MOST} are counted: drive other joints"
+            )
+        fill_ranks, self._count = named("graphsynth.structure.matroids", "fill_ranks", "count_modes")
+        links = np.array(pairs, dtype=np.int64).reshape(-1)
+        self.bodies, self.ranks = bodies, np.empty(1 << bodies, dtype=np.int8)
+        fill_ranks(bodies, links, np.repeat(np.arange(len(pairs)), 2), self.ranks)
+
+    def count(self, left: int, one: int, two: int) -> int:
+        """Count the common points of two minors: links that are left, and those that are contracted in each."""
+        import numpy as np
+
+        size, found = 1 << 12, -1
+        while found < 0:  # more room where it was too little
+            keys, counts = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
+            stack = np.empty((self.bodies + 1, 5), dtype=np.int64)
+            found = int(self._count(self.bodies, self.ranks, left, one, two, keys, counts, stack))
+            size *= 16
+        return found

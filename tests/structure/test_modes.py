@@ -12,6 +12,7 @@ from graphsynth import (
     MechanismGraph,
     count_assembly_modes,
     coupler_curve_degree,
+    coupler_curve_genus,
     enumerate_baranov_trusses,
     enumerate_chains,
 )
@@ -25,7 +26,7 @@ def number_of(bodies, body, pin):
     ranks = np.empty(1 << bodies, dtype=np.int8)
     fill_ranks(bodies, np.array(body), np.array(pin), ranks)
     keys, counts = (np.empty(1 << 16, dtype=np.int64) for _ in range(2))
-    return count_modes(bodies, ranks, keys, counts, np.empty((bodies + 1, 5), dtype=np.int64))
+    return count_modes(bodies, ranks, (1 << bodies) - 1, 0, 0, keys, counts, np.empty((bodies + 1, 5), dtype=np.int64))
 
 
 PRISM = [(0, 1), (1, 2), (0, 2), (3, 4), (4, 5), (3, 5), (0, 3), (1, 4), (2, 5)]
@@ -118,12 +119,9 @@ def test_trusses_beside_the_recursion_over_bars(links):
         assert count_assembly_modes(truss) << doubled == laman(named_anew(bars), named_anew(bars))
 
 
-def followed(pairs, bodies, seed):
-    """Solutions with random dimensions, complex and unlike their conjugates, by paths from products of linear forms."""
-    rng = np.random.default_rng(seed)
-    draw = lambda *shape: rng.normal(size=shape) + 1j * rng.normal(size=shape)  # noqa: E731
-    columns = len(pairs) - bodies + 1
-    spaces, tree = [], {0: []}  # ways to each body: pins, and the bodies before and behind
+def loops(pairs, bodies, draw):
+    """Equations of closed loops for unit vectors and for their inverses, with random complex dimensions, unlike."""
+    tree = {0: []}  # ways to each body: pins, and the bodies before and behind
     for _ in range(bodies):
         for k, (a, b) in enumerate(pairs):
             if (a in tree) != (b in tree):
@@ -133,14 +131,25 @@ def followed(pairs, bodies, seed):
     chords = [k for k in range(len(pairs)) if k not in used]
     for _ in range(2):
         pin = {(k, body): draw(1)[0] for k, pair in enumerate(pairs) for body in pair}
-        rows = np.zeros((columns, bodies), dtype=complex)
+        rows = np.zeros((len(chords), bodies), dtype=complex)
         for row, k in zip(rows, chords):
             a, b = pairs[k]
             for sign, path in ((1.0, [*tree[a], (k, a, b)]), (-1.0, tree[b])):
                 for j, here, there in path:  # the origin of each body is where: out at one pin, in at the other
                     row[here] += sign * pin[j, here]
                     row[there] -= sign * pin[j, there]
-        spaces.append(np.linalg.svd(rows)[2][columns:].conj().T)
+        yield rows
+
+
+def complex_numbers(seed):
+    rng = np.random.default_rng(seed)
+    return lambda *shape: rng.normal(size=shape) + 1j * rng.normal(size=shape)
+
+
+def followed(pairs, bodies, seed):
+    """Solutions with random dimensions, complex and unlike their conjugates, by paths from products of linear forms."""
+    draw, columns = complex_numbers(seed), len(pairs) - bodies + 1
+    spaces = [np.linalg.svd(rows)[2][columns:].conj().T for rows in loops(pairs, bodies, draw)]
     r = bodies - columns
     patches, gamma = draw(2, r), draw(1)[0]
     forms = draw(2, bodies - 1, r)
@@ -176,7 +185,8 @@ def followed(pairs, bodies, seed):
                 z, tau, step = trial, tau + step, 1.5 * step
             else:
                 step *= 0.4
-        ends.append((abs((spaces[0] @ z[:r])[0] * (spaces[1] @ z[r:])[0]), z))
+        unit_vectors = spaces[0] @ z[:r]
+        ends.append((abs(unit_vectors[0] * (spaces[1] @ z[r:])[0]), unit_vectors))
     return ends
 
 
@@ -186,9 +196,10 @@ def test_trusses_beside_paths_of_random_dimensions(links):
     for number, truss in enumerate(itertools.islice(enumerate_baranov_trusses(links), 0, None, 9 if links == 9 else 1)):
         ends = followed([(joint.a, joint.b) for joint in truss.joints], links, number)
         assert len(ends) == math.comb(links - 1, (links - 1) // 2)
-        finite = [z for size, z in ends if size > 1e-4]
-        apart = min((np.abs(a - b).max() for a, b in itertools.combinations(finite, 2)), default=1.0)
-        assert apart > 1e-5  # all different
+        finite = [unit_vectors for size, unit_vectors in ends if size > 1e-4]
+        for here, there in itertools.combinations(range(links), 2):  # no mode has the direction of another anywhere
+            turned = np.array([unit_vectors[here] / unit_vectors[there] for unit_vectors in finite])
+            assert np.abs(np.subtract.outer(turned, turned) + np.eye(len(turned))).min() > 1e-6 * np.abs(turned).min()
         assert len(finite) == count_assembly_modes(truss)
 
 
@@ -255,6 +266,123 @@ def test_degrees_of_coupler_curves_are_those_published():
             mechanism = chain.with_frame(frame)
             degrees |= {coupler_curve_degree(mechanism, link) for link in range(6) if link != mechanism.frame}
     assert degrees == {2, 6, 14, 16, 18}  # circles and sextics of what is a four-bar already
+
+
+def solved(value, jacobian, z):
+    """Newton's method for rows of starts: the different ends, where it comes to one."""
+    for _ in range(60):
+        with np.errstate(all="ignore"):  # many starts end nowhere
+            step = np.linalg.solve(jacobian(z), value(z)[..., None])[..., 0]
+            step *= np.minimum(1.0, 0.5 * np.abs(z).max(1) / np.abs(step).max(1))[:, None]
+            z = z - step
+            fine = np.isfinite(z).all(1) & (np.abs(z).max(1) < 1e6)
+        z, step = z[fine], step[fine]
+    z = z[np.abs(step).max(1) < 1e-10 * np.abs(z).max(1)]
+    return different(z)
+
+
+def different(z):
+    ends = z[:0]
+    while len(z):
+        ends = np.concatenate([ends, z[:1]])
+        z = z[np.abs(z - z[0]).max(1) > 1e-6 * np.abs(z[0]).max()]
+    return ends
+
+
+def dead_centres(graph, driver, seed):
+    """Count the dead centres of a driven link with random complex dimensions, from random starts."""
+    n, draw = graph.links, complex_numbers(seed)
+    one, two = loops([(joint.a, joint.b) for joint in graph.joints], n, draw)
+    others = [k for k in range(n) if k not in (graph.frame, driver)]
+    moving = [driver, *others]
+    norm = draw(n - 2)
+
+    def parts(z):  # unit vectors of moving links, the driver's first, and a motion of the others where it stands
+        x, v = z[:, : n - 1], z[:, n - 1 :]
+        first = one[:, graph.frame] + x @ one[:, moving].T
+        second = two[:, graph.frame] + (1.0 / x) @ two[:, moving].T
+        return x, v, np.concatenate([first, second], axis=1)
+
+    def value(z):
+        x, v, closed = parts(z)
+        still = np.concatenate([v @ one[:, others].T, (v / x[:, 1:] ** 2) @ two[:, others].T], axis=1)
+        return np.concatenate([closed, still, (v @ norm - 1.0)[:, None]], axis=1)
+
+    def jacobian(z):
+        x, v, _ = parts(z)
+        rows, m = len(one), n - 1
+        found = np.zeros((len(z), 2 * m - 1, 2 * m - 1), dtype=complex)
+        found[:, :rows, :m] = one[:, moving]
+        found[:, rows : 2 * rows, :m] = -two[:, moving] / x[:, None] ** 2
+        found[:, 2 * rows : 3 * rows, m:] = one[:, others]
+        found[:, 3 * rows : 4 * rows, m:] = two[:, others] / x[:, None, 1:] ** 2
+        found[:, 3 * rows : 4 * rows, 1:m] = -2.0 * two[:, others] * (v / x[:, 1:] ** 3)[:, None]
+        found[:, -1, m:] = norm
+        return found
+
+    ends = np.empty((0, 2 * n - 3), dtype=complex)
+    idle = 0
+    while idle < 4:  # batches of starts that end where others have ended
+        starts = draw(2000, 2 * n - 3) * np.exp(draw(2000, 2 * n - 3).real)
+        more = different(np.concatenate([ends, solved(value, jacobian, starts)]))
+        idle = 0 if len(more) > len(ends) else idle + 1
+        ends = more
+    return len(ends)
+
+
+def goes_round(graph, driver, modes, seed):
+    """Whether all assembly modes change into one another when the driven link goes round in complex numbers."""
+    n, draw = graph.links, complex_numbers(seed)
+    one, two = loops([(joint.a, joint.b) for joint in graph.joints], n, draw)
+    others = [k for k in range(n) if k not in (graph.frame, driver)]
+
+    def system(at):
+        fixed = [own[:, graph.frame] + factor * own[:, driver] for own, factor in ((one, at), (two, 1.0 / at))]
+        return (
+            lambda x: np.concatenate(
+                [fixed[0] + x @ one[:, others].T, fixed[1] + (1.0 / x) @ two[:, others].T], axis=1
+            ),
+            lambda x: np.concatenate(
+                [np.broadcast_to(one[:, others], (len(x), *one[:, others].shape)), -two[:, others] / x[:, None] ** 2],
+                axis=1,
+            ),
+        )
+
+    begin = draw(1)[0]
+    first = solved(*system(begin), draw(2000, n - 2) * np.exp(draw(2000, n - 2).real))
+    assert len(first) == modes
+    reached, every = {0}, set(range(modes))
+    for _ in range(30):
+        corners = [begin, *draw(3), begin]
+        x = first
+        for at in np.concatenate([np.linspace(a, b, 400)[1:] for a, b in itertools.pairwise(corners)]):
+            value, jacobian = system(at)
+            x = x - np.linalg.solve(jacobian(x), value(x)[..., None])[..., 0]
+            if not 1e-6 < np.abs(x).min() <= np.abs(x).max() < 1e6:
+                break
+        to = np.abs(x[:, None] - first).max(2)
+        if sorted(to.argmin(1)) == sorted(every) and to.min(1).max() < 1e-3:  # none has jumped
+            reached |= {int(to[k].argmin()) for k in reached}
+        if reached == every:
+            return True
+    return False
+
+
+@pytest.mark.parametrize("links", [4, pytest.param(6, marks=pytest.mark.slow)])
+def test_genus_beside_dead_centres(links):
+    """A driven link has d assembly modes, which are one curve; they meet at 2 g - 2 + 2 d dead centres (Hurwitz)."""
+    seen = set()
+    for chain in enumerate_chains(links):
+        mechanisms = [MechanismGraph(links, chain.joints, frame=frame) for frame in range(links)]
+        genus = max(coupler_curve_genus(own, k) for own in mechanisms for k in range(links) if k != own.frame)
+        for joint in chain.joints:
+            mechanism, driver = mechanisms[joint.a], joint.b
+            modes = count_assembly_modes(mechanism, [driver])
+            if (modes, genus) not in seen:
+                assert dead_centres(mechanism, driver, 0) == 2 * genus - 2 + 2 * modes
+                assert goes_round(mechanism, driver, modes, 0)
+            seen.add((modes, genus))
+    assert seen == ({(2, 1)} if links == 4 else {(4, 5), (4, 7), (6, 7)})
 
 
 @pytest.mark.parametrize(

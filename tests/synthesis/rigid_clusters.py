@@ -5,17 +5,21 @@ two or more links.  Any graph falls apart in one way only into its largest rigid
 together to one vertex, a graph without rigid sets.  So graphs without rigid sets are all graphs less those that have
 clusters.  The lemma of Burnside is used on the permutations of the links: one that keeps a graph permutes its clusters.
 
+`python tests/synthesis/rigid_clusters.py 20 FILE` counts the chains of 20 links and goes on where it was stopped.
+
 An *orbit* (c, cycles) stands for c clusters that a permutation p takes one to the next, p ** c permuting the links of
 each by cycles of these lengths; a *state* is a sorted tuple of orbits.  Polynomials are in the number of joints.
 """
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from fractions import Fraction
 from itertools import combinations, product
 from math import comb, factorial, gcd, lcm, prod
+from pathlib import Path
 
 Cycles = tuple[int, ...]
 Orbit = tuple[int, Cycles]
@@ -29,11 +33,18 @@ class Clusters:
     """
 
     def __init__(self, links: int, most: int, space: int = 3) -> None:
-        self.most, self.space = most, space
+        self.links, self.most, self.space = links, most, space
         self.digits = comb(comb(links, 2), min(most, comb(links, 2) // 2)).bit_length() + 1
         self.mask = (1 << self.digits * (most + 1)) - 1
         self.known: dict[State, tuple[int, int]] = {}
         self.known_drawn: dict[State, dict[State, int]] = {}
+
+    def forget(self) -> None:
+        """Keep what is small, which all permutations need, and give the memory of the rest back."""
+        self.known, self.known_drawn = (
+            {state: own for state, own in kept.items() if links_of(state) <= self.links // 2}
+            for kept in (self.known, self.known_drawn)
+        )
 
     def coefficient(self, polynomial: int, joints: int) -> int:
         return polynomial >> self.digits * joints & ((1 << self.digits) - 1)
@@ -71,19 +82,21 @@ class Clusters:
 
     def drawn(self, state: State) -> dict[State, int]:
         """Count the ways to draw clusters together to rigid ones, but not all to one, by what they become."""
-        if state not in self.known_drawn:
-            found: dict[State, int] = {}
-            for c, block, others, choices in first_blocks(state):
-                all_in_one = c == 1 and not others and sum(size for size, _ in block) > 1
-                if all_in_one or not (rigid := self.split(block)[1]):
-                    continue
-                rigid = choices * self.spread(rigid, c)
-                new = c, drawn_together(block)
-                for drawn, ways in self.drawn_at_will(others):
-                    key = tuple(sorted((*drawn, new)))
-                    found[key] = found.get(key, 0) + (rigid * ways & self.mask)
+        if state in self.known_drawn:
+            return self.known_drawn[state]
+        found: dict[State, int] = {}
+        for c, block, others, choices in first_blocks(state):
+            all_in_one = c == 1 and not others and sum(size for size, _ in block) > 1
+            if all_in_one or not (rigid := self.split(block)[1]):
+                continue
+            rigid = choices * self.spread(rigid, c)
+            new = c, drawn_together(block)
+            for drawn, ways in self.drawn_at_will(others):
+                key = tuple(sorted((*drawn, new)))
+                found[key] = found.get(key, 0) + (rigid * ways & self.mask)
+        if links_of(state) < self.links:  # one of all links is asked for once
             self.known_drawn[state] = found
-        return self.known_drawn[state]
+        return found
 
     def drawn_at_will(self, state: State) -> Iterator[tuple[State, int]]:
         """Yield the same, all drawn to one included."""
@@ -95,14 +108,21 @@ class Clusters:
             yield ((1, drawn_together(state)),), rigid
 
 
+def links_of(state: State) -> int:
+    return sum(c * sum(cycles) for c, cycles in state)
+
+
 def drawn_together(block: State) -> Cycles:
     return tuple(sorted(c * length for c, cycles in block for length in cycles))
 
 
 def first_blocks(state: State) -> Iterator[tuple[int, State, State, int]]:
     """Yield what may be drawn together with the first orbit: (orbit's length, inside one cluster, others, choices)."""
-    first, kinds = state[0], sorted(set(state[1:]))
-    numbers = [state[1:].count(kind) for kind in kinds]
+    first = max(state, key=lambda orbit: (links_of((orbit,)), orbit))  # so that the others are few
+    at = state.index(first)
+    rest = state[:at] + state[at + 1 :]
+    kinds = sorted(set(rest))
+    numbers = [rest.count(kind) for kind in kinds]
     for c in (d for d in range(1, first[0] + 1) if first[0] % d == 0):
         ranges = [range(number + 1 if kind[0] % c == 0 else 1) for kind, number in zip(kinds, numbers)]
         for taken in product(*ranges):
@@ -146,17 +166,26 @@ def labelled_chains(links: int, space: int = 3) -> int:
     return clusters.coefficient(clusters.split(((1, (1,)),) * links)[0], joints)
 
 
-def chains(links: int, space: int = 3) -> int:
-    """Count the chains of mobility 1 up to isomorphism."""
-    joints = joints_of(links, space)
-    clusters = Clusters(links, joints, space)
-    total = Fraction(0)
-    for cycles in partitions(links, links):
-        fixed = clusters.split(tuple(sorted((length, (1,)) for length in cycles)))[0]
-        order = prod(cycles) * prod(factorial(count) for count in Counter(cycles).values())
-        total += Fraction(clusters.coefficient(fixed, joints), order)
+def kept_by(clusters: Clusters, cycles: Cycles) -> int:
+    """Count the labelled chains of mobility 1 that a permutation with these cycles keeps."""
+    kept = clusters.split(tuple(sorted((length, (1,)) for length in cycles)))[0]
+    return clusters.coefficient(kept, joints_of(clusters.links, clusters.space))
+
+
+def mean(kept: dict[Cycles, int]) -> int:
+    """Return the lemma of Burnside's sum: the mean over all permutations, by their cycles."""
+    total = sum(
+        Fraction(count, prod(cycles) * prod(factorial(n) for n in Counter(cycles).values()))
+        for cycles, count in kept.items()
+    )
     assert total.denominator == 1
     return int(total)
+
+
+def chains(links: int, space: int = 3) -> int:
+    """Count the chains of mobility 1 up to isomorphism."""
+    clusters = Clusters(links, joints_of(links, space), space)
+    return mean({cycles: kept_by(clusters, cycles) for cycles in partitions(links, links)})
 
 
 Terms = dict[Cycles, dict[int, Fraction]]
@@ -225,3 +254,22 @@ def connected(clusters: Clusters, links: int) -> Terms:
                 for i, a in mine.items():
                     own[i * power] = own.get(i * power, Fraction(0)) + a * Fraction(sign, power)
     return found
+
+
+def main(links: int, path: Path) -> None:
+    """Write for each kind of permutation how many labelled chains it keeps, and print the number of chains."""
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    pairs = [line.split(": ") for line in lines if ": " in line]
+    kept = {tuple(map(int, cycles.split())): int(count) for cycles, count in pairs}
+    clusters = Clusters(links, joints_of(links, 3))
+    for cycles in partitions(links, links):
+        if cycles not in kept:
+            kept[cycles] = kept_by(clusters, cycles)
+            clusters.forget()
+            with path.open("a", encoding="utf-8") as stream:
+                print(*cycles, end=f": {kept[cycles]}\n", file=stream)
+    print(mean(kept))
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), Path(sys.argv[2]))

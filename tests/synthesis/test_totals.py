@@ -27,7 +27,8 @@ from graphsynth.synthesis.rigid_blocks import identity_sum, identity_sums
 from graphsynth.synthesis.shards import run_of
 from graphsynth.synthesis.writing import count_with_checkpoint
 
-PUBLISHED = tomllib.loads((Path(__file__).parents[2] / "catalog/counts/published.toml").read_text(encoding="utf-8"))
+COUNTS = Path(__file__).parents[2] / "catalog/counts"
+PUBLISHED = tomllib.loads((COUNTS / "published.toml").read_text(encoding="utf-8"))
 CHAINS = {row["links"]: row["count"] for row in PUBLISHED["chains"] if row["mobility"] == 1}
 LAMAN = {3: 1, 4: 1, 5: 3, 6: 13, 7: 70, 8: 608, 9: 7222}  # OEIS A227117
 
@@ -254,8 +255,7 @@ def test_nine_loops_with_few_vertices():
 
 
 def test_the_certificate_of_twenty_links_adds_up():
-    path = Path(__file__).parents[2] / "catalog/counts/twenty-links.toml"
-    certificate = tomllib.loads(path.read_text(encoding="utf-8"))
+    certificate = tomllib.loads((COUNTS / "twenty-links.toml").read_text(encoding="utf-8"))
     rows = {row["vertices"]: row for row in certificate["by_vertices"]}
     assert list(rows) == list(range(2, 17))
     assert all(Fraction(row["identities"]) + Fraction(row["others"]) == row["chains"] for row in rows.values())
@@ -264,8 +264,31 @@ def test_the_certificate_of_twenty_links_adds_up():
     assert {k: Fraction(rows[k]["identities"]) for k in range(2, 6)} == identity_sums(20, vertices=5)
 
 
+@pytest.mark.parametrize("links", [18, 20])
+def test_the_second_count_is_the_first(links):
+    """For each kind of permutation how many labelled chains it keeps; those with few cycles are counted anew."""
+    lines = (COUNTS / f"second-count-{links}.txt").read_text(encoding="utf-8").splitlines()
+    kept = {tuple(map(int, cycles.split())): int(count) for cycles, count in (line.split(": ") for line in lines)}
+    assert list(kept) == list(rigid_clusters.partitions(links, links))
+    certificate = tomllib.loads((COUNTS / "twenty-links.toml").read_text(encoding="utf-8"))
+    assert rigid_clusters.mean(kept) == (certificate["chains"] if links == 20 else CHAINS[18])
+    clusters = rigid_clusters.Clusters(links, rigid_clusters.joints_of(links, 3))
+    few = [cycles for cycles in kept if len(cycles) <= 6]
+    assert {cycles: rigid_clusters.kept_by(clusters, cycles) for cycles in few} == {c: kept[c] for c in few}
+
+
+@pytest.mark.long
+def test_the_second_count_goes_on_where_it_was_stopped(tmp_path, capsys):
+    path = tmp_path / "kept.txt"
+    rigid_clusters.main(8, path)
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    path.write_text("".join(lines[:9]), encoding="utf-8")
+    rigid_clusters.main(8, path)
+    assert capsys.readouterr().out == "16\n16\n"
+    assert path.read_text(encoding="utf-8") == "".join(lines)
+
+
 @pytest.mark.long
 def test_twenty_links_told_apart_are_fewer_than_twenty_factorial_for_each_chain():
-    path = Path(__file__).parents[2] / "catalog/counts/twenty-links.toml"
-    count = tomllib.loads(path.read_text(encoding="utf-8"))["chains"]
+    count = tomllib.loads((COUNTS / "twenty-links.toml").read_text(encoding="utf-8"))["chains"]
     assert 0.8 < Fraction(rigid_clusters.labelled_chains(20), factorial(20)) / count < 1
