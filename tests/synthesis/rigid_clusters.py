@@ -172,6 +172,10 @@ def kept_by(clusters: Clusters, cycles: Cycles) -> int:
     return clusters.coefficient(kept, joints_of(clusters.links, clusters.space))
 
 
+def power(cycles: Cycles, n: int) -> Cycles:
+    return tuple(sorted((c // gcd(c, n) for c in cycles for _ in range(gcd(c, n))), reverse=True))
+
+
 def mean(kept: dict[Cycles, int]) -> int:
     """Return the lemma of Burnside's sum: the mean over all permutations, by their cycles."""
     total = sum(
@@ -262,9 +266,11 @@ def main(links: int, path: Path) -> None:
     pairs = [line.split(": ") for line in lines if ": " in line]
     kept = {tuple(map(int, cycles.split())): int(count) for cycles, count in pairs}
     clusters = Clusters(links, joints_of(links, 3))
-    for cycles in partitions(links, links):
+    for cycles in reversed([*partitions(links, links)]):  # powers of a permutation come before it
         if cycles not in kept:
-            kept[cycles] = kept_by(clusters, cycles)
+            divisors = [n for n in range(2, max(cycles) + 1) if any(c % n == 0 for c in cycles)]
+            none = any(kept[power(cycles, n)] == 0 for n in divisors)  # its powers keep what it keeps
+            kept[cycles] = 0 if none else kept_by(clusters, cycles)
             clusters.forget()
             with path.open("a", encoding="utf-8") as stream:
                 print(*cycles, end=f": {kept[cycles]}\n", file=stream)
