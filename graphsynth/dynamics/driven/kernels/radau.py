@@ -263,82 +263,6 @@ def react(code, setup, P, y, zeros, piece):
 
 
 @kernel
-def add_quadrature(setup, P, V, y, h, Z, sums, stage, rates, tmp):
-    """Add the four balances of a step, by the quadrature of its stages."""
-    for i in range(STAGES):
-        for a in range(y.size):
-            stage[a] = y[a] + Z[i, a]
-        field(setup, P, V, stage, rates, tmp)
-        for k in range(4):
-            sums[k] += h * A[STAGES - 1, i] * tmp[11 + k]
-
-
-@kernel
-def goes_astray(setup, P, y, Z):
-    """Whether an inner stage lies beyond a dead centre."""
-    if setup[FORM] != REGULAR:
-        return False
-    for i in range(STAGES - 1):
-        q = y[0] + Z[i, 0]
-        if q > P[HIGH] or q < P[LOW]:
-            return True
-    return False
-
-
-@kernel
-def unwind(y, low, amount):
-    """Take whole turns off a large angle, 2 pi in two parts; returns their number."""
-    if abs(y[0]) <= LEAST_ANGLE:
-        return 0
-    whole = math.floor(y[0] / TURN + 0.5)
-    for a in range(y.size):
-        amount[a] = 0.0
-    amount[0] = -whole * TURN
-    advance(y, low, amount)
-    amount[0] = -whole * TURN_LOW
-    advance(y, low, amount)
-    return int(whole)
-
-
-@kernel
-def write(setup, P, V, y, at, wound, sums, Y, turns, balance, tmp):
-    """Write an output: state, turns, balances and energies."""
-    for a in range(y.size):
-        Y[at, a] = y[a]
-    turns[at] = wound
-    for k in range(4):
-        balance[at, k] = sums[k]
-    balance[at, 4], balance[at, 5] = kinetic_energy(setup, P, V, y, tmp)
-
-
-@kernel
-def first_event(codes, goal, setup, P, V, y, h, f0, jac, unit, kappa, Z, F, stage, tmp):
-    """Shorten a step to the first event on its way, one after the other; returns (step or -1, event)."""
-    happened = NONE
-    for a in range(y.size):
-        stage[a] = y[a] + Z[STAGES - 1, a]
-    for code in codes:
-        value = passed(code, setup, P, stage, y, goal)
-        if value > 0.0:
-            h, happened = locate(code, goal, setup, P, V, y, h, value, f0, jac, unit, kappa, Z, F, tmp), code
-            if h < 0.0:
-                break
-            for a in range(y.size):
-                stage[a] = y[a] + Z[STAGES - 1, a]
-    return h, happened
-
-
-@kernel
-def note(code, x, wound, y, marks, counts):
-    """Write an event."""
-    row = counts[2]
-    marks[row, 0], marks[row, 1], marks[row, 2] = code, x, wound
-    for a in range(y.size):
-        marks[row, 3 + a] = y[a]
-    counts[2] += 1
-
-
-@kernel
 def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, balance, marks, counts):
     """Integrate from ``y`` at outs[0] through all ``outs``.
 
@@ -361,8 +285,14 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
     span = outs[-1] - outs[0]
     fresh = True
     while True:
+        # outputs that are reached: state, turns, balances and energies
         while target_index < outs.size and (y[n - 1] if regular else x) >= outs[target_index]:
-            write(setup, P, V, y, target_index, wound, sums, Y, turns, balance, tmp)
+            for a in range(n):
+                Y[target_index, a] = y[a]
+            turns[target_index] = wound
+            for k in range(4):
+                balance[target_index, k] = sums[k]
+            balance[target_index, 4], balance[target_index, 5] = kinetic_energy(setup, P, V, y, tmp)
             target_index += 1
             counts[3] = target_index
         if target_index == outs.size:
@@ -397,17 +327,35 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
             h *= 0.3 if error < 0.0 else max(0.2, 0.9 * error ** (-1.0 / (STAGES + 1)))
             wanted = h
         grown = min(8.0, 0.9 * max(error, 1e-12) ** (-1.0 / (STAGES + 1)))
+        happened = NONE  # the first event on the way shortens the step, one after the other
         trial = h
-        h, happened = first_event(codes, goal, setup, P, V, y, h, f0, jac, unit, kappa, guess, F, stage, tmp)
-        if h < 0.0:
-            return STEP_TOO_SMALL
-        last_one = last_one and happened == NONE
-        if happened == NONE and goes_astray(setup, P, y, guess):  # although its end does not: the step is too long
+        for a in range(n):
+            stage[a] = y[a] + guess[STAGES - 1, a]
+        for code in codes:
+            value = passed(code, setup, P, stage, y, goal)
+            if value > 0.0:
+                found = locate(code, goal, setup, P, V, y, h, value, f0, jac, unit, kappa, guess, F, tmp)
+                if found < 0.0:
+                    return STEP_TOO_SMALL
+                h, happened, last_one = found, code, False
+                for a in range(n):
+                    stage[a] = y[a] + guess[STAGES - 1, a]
+        # where an inner stage lies beyond a dead centre although the end does not, the step is too long
+        astray = False
+        for i in range(STAGES - 1):
+            q = y[0] + guess[i, 0]
+            astray = astray or (regular and (q > P[HIGH] or q < P[LOW]))
+        if happened == NONE and astray:
             counts[1] += 1
             wanted = 0.5 * h
             fresh = True
             continue
-        add_quadrature(setup, P, V, y, h, guess, sums, stage, work, tmp)
+        for i in range(STAGES):  # balances by the quadrature of the stages
+            for a in range(n):
+                stage[a] = y[a] + guess[i, a]
+            field(setup, P, V, stage, work, tmp)
+            for k in range(4):
+                sums[k] += h * A[STAGES - 1, i] * tmp[11 + k]
         copy(guess, Z)
         old, fresh = h, False
         for a in range(n):  # the step is taken
@@ -425,7 +373,18 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
             piece = react(happened, setup, P, y, zeros, piece)
             if happened == DEAD_CENTRE:
                 low[0] = 0.0
-            note(happened, x, wound, y, marks, counts)
+            row = counts[2]
+            marks[row, 0], marks[row, 1], marks[row, 2] = happened, x, wound
+            for a in range(n):
+                marks[row, 3 + a] = y[a]
+            counts[2] += 1
             fresh = True
-        if not regular:
-            wound += unwind(y, low, amount)
+        if not regular and abs(y[0]) > LEAST_ANGLE:  # whole turns go into the count, 2 pi in two parts
+            whole = math.floor(y[0] / TURN + 0.5)
+            wound += int(whole)
+            for a in range(n):
+                amount[a] = 0.0
+            amount[0] = -whole * TURN
+            advance(y, low, amount)
+            amount[0] = -whole * TURN_LOW
+            advance(y, low, amount)
