@@ -1,7 +1,7 @@
 __version__: str
 
 from .atlas.catalogue import Catalogue as Catalogue
-from .atlas.dataset import Dataset as Dataset
+from .atlas.dataset import Dataset as Dataset, dataset as dataset
 from .core.angles import degrees as degrees
 from .core.errors import GraphsynthError as GraphsynthError
 from .design.parts.api import parts as parts
@@ -53,7 +53,11 @@ from .mechanism.model import Mechanism as Mechanism
 from .pipeline.runner import run as run
 from .structure.gear_trains import PlanetaryGearTrain as PlanetaryGearTrain
 from .structure.graph import Joint as Joint, MechanismGraph as MechanismGraph
-from .structure.modes import count_assembly_modes as count_assembly_modes, coupler_curve_degree as coupler_curve_degree, coupler_curve_genus as coupler_curve_genus
+from .structure.modes import (
+    count_assembly_modes as count_assembly_modes,
+    coupler_curve_degree as coupler_curve_degree,
+    coupler_curve_genus as coupler_curve_genus,
+)
 from .structure.multiple_joints import MultipleJointChain as MultipleJointChain
 from .structure.slider_chains import SliderChain as SliderChain
 from .structure.system.assortment import LinkAssortment as LinkAssortment

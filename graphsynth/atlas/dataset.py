@@ -281,6 +281,25 @@ class Dataset(Shown):
         return FilesCheck(tuple(wrong), files, rows)
 
 
+def dataset(links: int | Iterable[int], folder: str | Path = "dataset", **options: Any) -> Dataset:
+    """Open a data set; chains with these numbers of links are made first where they are not there.
+
+    Parameters
+    ----------
+    links, folder, **options
+        As for `Dataset.build`.
+
+    Returns
+    -------
+    Dataset
+
+    Examples
+    --------
+    >>> dataset(8).query("SELECT girth, count(*) AS chains FROM chains GROUP BY girth")  # doctest: +SKIP
+    """
+    return Dataset.build(folder, [links] if isinstance(links, int) else links, **options)
+
+
 def _quoted(text: str) -> str:
     """Write text as SQL does."""
     return "'" + text.replace("'", "''") + "'"

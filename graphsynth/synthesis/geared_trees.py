@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.compilation import named
 from graphsynth.structure.coloured_chains import OTHER
 from graphsynth.structure.gear_trains import PlanetaryGearTrain
 from graphsynth.structure.graph import MechanismGraph
@@ -56,8 +57,7 @@ class GearedTrees:
             yield "".join(f"{line}\n" for line in lines).encode("ascii"), len(lines)
 
     def _choose(self, out: NDArray[np.int64]) -> int:
-        from graphsynth.synthesis.kernels.gears import choose_gears
-
+        (choose_gears,) = named("graphsynth.synthesis.kernels.gears", "choose_gears")
         asked = self.start, self.stop, self.links - 2, self.rotation
         return int(choose_gears(self.links, _matrices(self.links), *asked, _moves(), out))
 

@@ -99,6 +99,16 @@ def test_what_is_made_otherwise_is_not_mixed(tmp_path):
         Dataset.build(tmp_path, [6], mechanisms=False)
 
 
+def test_what_is_not_there_is_made_first(tmp_path):
+    import graphsynth as gs
+
+    data = gs.dataset(6, tmp_path / "data", mechanisms=False)
+    assert len(data) == 2
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "data").rglob("*.parquet")}
+    data = gs.dataset([6, 8], tmp_path / "data", mechanisms=False)
+    assert len(data) == 18 and {path: path.stat().st_mtime_ns for path in before} == before
+
+
 def test_all_chains_by_number(data):
     assert len({data.chain(8, k).key for k in range(16)}) == 16 and len(data) == 19
     for links, number, words in ((8, 16, "one of the 16"), (8, -1, "one of the 16"), (10, 0, "no chains")):
