@@ -4,4 +4,5 @@ from .four_bar import (
     certify_inverted_slider_crank as certify_inverted_slider_crank,
     certify_slider_crank as certify_slider_crank,
 )
+from .modes import ModesCertificate as ModesCertificate, certify_modes as certify_modes
 from .poses import MotionCertificate as MotionCertificate, certify as certify

@@ -199,7 +199,7 @@ def _proved(
     found = Cover(np.zeros(max(len(asked) - 1, 0), dtype=bool))
     if between and len(asked) > 1 and all(hasattr(d.law, "at") for d in motion.mechanism.drivers):
         found = cover(system, nodes, budget, begin)
-    return system, asked, turns, end, nodes, _radii(system, nodes, samples), found
+    return system, asked, turns, end, nodes, radii_of(system, nodes, samples), found
 
 
 def _full_turn(motion: Motion) -> Fraction | None:
@@ -230,7 +230,7 @@ def _inputs(u: Array, turns: Fraction | None) -> tuple[Balls, bool]:
     return Balls(balls.mid, rad), bool(gap < 1e-9 * (1.0 + abs(u[-1])))
 
 
-def _radii(system: MechanismSystem, nodes: Nodes, samples: Array) -> tuple[Array, Array, Array]:
+def radii_of(system: MechanismSystem, nodes: Nodes, samples: Array) -> tuple[Array, Array, Array]:
     """Distance of the exact assembly from the sample, and the room around the sample in which it is the only one."""
     proof, w = nodes.proof, system.weights
     with np.errstate(all="ignore"):

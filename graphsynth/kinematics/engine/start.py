@@ -214,8 +214,8 @@ def assembly_modes(mechanism: Mechanism, input: float | str | None = None) -> li
     list of AssemblyMode
         Poses and the modes of all groups: +1 or -1 for dyads, the rank for larger groups.  Empty if there is none.
         Complete for dyads and for triads of binary outer links (closed forms and eliminants, float64); for larger
-        groups they are searched for by Newton's method from many starts, and some may be missing: as many as
-        `count_assembly_modes` tells for the graph and its drivers (revolute joints) are all.
+        groups they are searched for by Newton's method from many starts, and some may be missing: `certify_modes`
+        tells whether all are there (revolute joints).
 
     Raises
     ------
