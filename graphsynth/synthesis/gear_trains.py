@@ -47,7 +47,7 @@ def enumerate_planetary_gear_trains(
     Examples
     --------
     >>> [train.to_text() for train in enumerate_planetary_gear_trains(4)]
-    ['C^ G:0-3,1-3', 'CR G:0-1,0-2', 'Cr G:0-3,1-2']
+    ['C~ G:1-3,2-3', 'C} G:1-2,1-3', 'C} G:0-3,1-2']
     """
     problem = EnumerationProblem.gear_trains(links, rotation)
     return map(PlanetaryGearTrain, graphs(problem.work_items(listing=True), executor))

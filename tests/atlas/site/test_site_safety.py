@@ -32,7 +32,7 @@ def test_markup_is_made_by_one_helper(name):
 
 
 def test_every_page_has_a_policy(report):
-    """Own scripts and nothing else: none in a page, none from elsewhere; of the workbench its kernels, too."""
+    """Own scripts and kernels and nothing else: none in a page, none from elsewhere."""
     folder = report.page.parent
     pages = list(folder.rglob("*.html"))
     assert len(pages) == 2
@@ -41,7 +41,7 @@ def test_every_page_has_a_policy(report):
         (policy,) = re.findall(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">', text)
         assert {"default-src 'none'", "base-uri 'none'", "form-action 'none'"} <= set(policy.split("; "))
         (scripts,) = re.findall(r"script-src ([^;]*)", policy)
-        assert scripts == ("'self' file:" if page == report.page else "'self' file: 'wasm-unsafe-eval'")
+        assert scripts == "'self' file: 'wasm-unsafe-eval'"
         assert re.findall(r"<script>(.*?)</script>", text, re.DOTALL) == []
         assert text.index("Content-Security-Policy") < text.index("<title>")
 
