@@ -356,6 +356,11 @@ def test_the_site_builds_without_warnings_and_other_sites_can_link_to_it(tmp_pat
     )
 
 
+def test_every_source_stands_once():
+    keys = re.findall(r"^@\w+\{(\w+),", (ROOT / "docs" / "references.bib").read_text("utf-8"), re.MULTILINE)
+    assert len(keys) > 100 and sorted(keys) == sorted({*keys})
+
+
 def test_every_formula_can_be_read():
     pytest.importorskip("docutils")
     read, checked = of_docs("mathml").mathml, 0
