@@ -368,6 +368,7 @@ def goes_round(graph, driver, modes, seed):
     return False
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("links", [4, pytest.param(6, marks=pytest.mark.slow)])
 def test_genus_beside_dead_centres(links):
     """A driven link has d assembly modes, which are one curve; they meet at 2 g - 2 + 2 d dead centres (Hurwitz)."""

@@ -287,7 +287,6 @@ def test_parts_of_the_second_count_made_anew(links):
     assert {cycles: rigid_clusters.kept_by(clusters, cycles) for cycles in few} == few
 
 
-@pytest.mark.long
 def test_the_second_count_goes_on_where_it_was_stopped(tmp_path, capsys):
     path = tmp_path / "kept.txt"
     rigid_clusters.main(8, path)
