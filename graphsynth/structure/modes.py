@@ -135,7 +135,8 @@ def coupler_curve_genus(mechanism: MechanismGraph, link: int) -> int:
     return _genus(joints, len(at))
 
 
-def _drawn(mechanism: MechanismGraph, link: int) -> tuple[int, set[int]]:
+@lru_cache(maxsize=100)
+def _drawn(mechanism: MechanismGraph, link: int) -> tuple[int, frozenset[int]]:
     """Return the degree of the curves of a link's points, and the links with which they move, the frame among them."""
     _check(mechanism)
     if mechanism.frame is None or mechanism.mobility != 1:
@@ -151,7 +152,7 @@ def _drawn(mechanism: MechanismGraph, link: int) -> tuple[int, set[int]]:
             needed.update(end for joint in group.outer for end in (joint.a, joint.b))
             moving.update(group.links)
             found *= _modes_of(group)
-    return found, moving - {n}
+    return found, frozenset(moving - {n})
 
 
 def _check(graph: MechanismGraph) -> None:

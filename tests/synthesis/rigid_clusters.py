@@ -168,8 +168,17 @@ def labelled_chains(links: int, space: int = 3) -> int:
 
 def kept_by(clusters: Clusters, cycles: Cycles) -> int:
     """Count the labelled chains of mobility 1 that a permutation with these cycles keeps."""
-    kept = clusters.split(tuple(sorted((length, (1,)) for length in cycles)))[0]
-    return clusters.coefficient(kept, joints_of(clusters.links, clusters.space))
+    return clusters.coefficient(all_kept_by(clusters, cycles), joints_of(clusters.links, clusters.space))
+
+
+def all_kept_by(clusters: Clusters, cycles: Cycles) -> int:
+    """Return the polynomial of the labelled graphs without rigid sets that it keeps, by numbers of joints."""
+    return clusters.split(tuple(sorted((length, (1,)) for length in cycles)))[0]
+
+
+def centraliser(cycles: Cycles) -> int:
+    """Return how many permutations commute with one: all there are, over those with its cycles."""
+    return prod(cycles) * prod(factorial(count) for count in Counter(cycles).values())
 
 
 def power(cycles: Cycles, n: int) -> Cycles:
@@ -178,10 +187,7 @@ def power(cycles: Cycles, n: int) -> Cycles:
 
 def mean(kept: dict[Cycles, int]) -> int:
     """Return the lemma of Burnside's sum: the mean over all permutations, by their cycles."""
-    total = sum(
-        Fraction(count, prod(cycles) * prod(factorial(n) for n in Counter(cycles).values()))
-        for cycles, count in kept.items()
-    )
+    total = sum(Fraction(count, centraliser(cycles)) for cycles, count in kept.items())
     assert total.denominator == 1
     return int(total)
 
@@ -233,8 +239,7 @@ def connected(clusters: Clusters, links: int) -> Terms:
     for n in range(1, links + 1):
         terms: Terms = {}
         for cycles in partitions(n, n):
-            polynomial = clusters.split(tuple(sorted((length, (1,)) for length in cycles)))[0]
-            order = prod(cycles) * prod(factorial(count) for count in Counter(cycles).values())
+            polynomial, order = all_kept_by(clusters, cycles), centraliser(cycles)
             numbers = ((i, clusters.coefficient(polynomial, i)) for i in range(clusters.most + 1))
             terms[tuple(sorted(cycles))] = {i: Fraction(count, order) for i, count in numbers if count}
         every.append(terms)
@@ -260,11 +265,15 @@ def connected(clusters: Clusters, links: int) -> Terms:
     return found
 
 
+def read(path: Path) -> dict[Cycles, int]:
+    """Read what `main` has written."""
+    pairs = [line.split(": ") for line in path.read_text(encoding="utf-8").splitlines() if ": " in line]
+    return {tuple(map(int, cycles.split())): int(count) for cycles, count in pairs}
+
+
 def main(links: int, path: Path) -> None:
     """Write for each kind of permutation how many labelled chains it keeps, and print the number of chains."""
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    pairs = [line.split(": ") for line in lines if ": " in line]
-    kept = {tuple(map(int, cycles.split())): int(count) for cycles, count in pairs}
+    kept = read(path) if path.exists() else {}
     clusters = Clusters(links, joints_of(links, 3))
     for cycles in reversed([*partitions(links, links)]):  # powers of a permutation come before it
         if cycles not in kept:

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.angles import angles
 from graphsynth.intervals.balls import exact
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.moving import prove_nodes
 from graphsynth.kinematics.certify.equations import MechanismSystem
 from graphsynth.kinematics.certify.poses import radii_of
-from graphsynth.kinematics.engine.inputs import first_input
+from graphsynth.kinematics.engine.inputs import input_of
 from graphsynth.kinematics.engine.start import AssemblyMode, assembly_modes
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.structure.modes import count_assembly_modes
@@ -101,15 +100,12 @@ def certify_modes(mechanism: Mechanism, input: float | str | None = None) -> Mod
     ModesCertificate(all 2 of at most 2 assembly modes found, each proved)
     """
     check_rounding()
-    u = first_input(mechanism) if input is None else float(angles("input", [input])[0])
+    u = input_of(mechanism, input)
     found, system = tuple(assembly_modes(mechanism, u)), MechanismSystem(mechanism)
     poses = np.array([mode.pose for mode in found]).reshape(len(found), mechanism.graph.links, 3)
     samples = poses[:, system.moving].reshape(len(found), system.size)
-    if found:
-        nodes = prove_nodes(system, exact(np.full(len(found), u)), samples)
-        position, angle, _ = radii_of(system, nodes, samples)
-    else:
-        position = angle = np.zeros(0)
+    nodes = prove_nodes(system, exact(np.full(len(found), u)), samples)
+    position, angle, _ = radii_of(system, nodes, samples)
     proved = np.isfinite(position)
     for i, j in combinations(np.flatnonzero(proved), 2):
         if not _differ(poses[i] - poses[j], position[i] + position[j], angle[i] + angle[j]):

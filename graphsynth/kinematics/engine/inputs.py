@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.angles import angles
 from graphsynth.core.checks import called, finite_array
 from graphsynth.core.errors import GeometryError, UnitWarning
 from graphsynth.mechanism.constraints import characteristic_length
@@ -150,6 +151,11 @@ def full_turn(mechanism: Mechanism, u: Array) -> bool:
             return False
         moved = moved or turns != 0 or abs(change) <= slack
     return moved
+
+
+def input_of(mechanism: Mechanism, input: float | str | None) -> float:
+    """Return the input that is asked for, a number or an angle such as "30 deg"; the first one if there is none."""
+    return first_input(mechanism) if input is None else float(angles("input", [input])[0])
 
 
 def first_input(mechanism: Mechanism) -> float:

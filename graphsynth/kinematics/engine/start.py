@@ -11,12 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.angles import angles
 from graphsynth.core.compilation import named
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.follow import Trace, Tracker
-from graphsynth.kinematics.engine.inputs import first_input
+from graphsynth.kinematics.engine.inputs import input_of
 from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.triads import conditions, triad_modes
 from graphsynth.mechanism.model import Mechanism
@@ -228,7 +227,7 @@ def assembly_modes(mechanism: Mechanism, input: float | str | None = None) -> li
     >>> [mode.modes for mode in Mechanism.four_bar(2, 1, 2.5, 2.5).modes("30 deg")]
     [{0: 1}, {0: -1}]
     """
-    u = first_input(mechanism) if input is None else float(angles("input", [input])[0])
+    u = input_of(mechanism, input)
     program = compile_program(mechanism)
     dyads = [step.group for step in program.steps if step.has_two_modes]
     found: list[AssemblyMode] = []
