@@ -155,6 +155,8 @@ def _facts(graph: MechanismGraph, driver: int | None) -> dict[str, Any]:
         "link orbits": _sets(graph.orbits),
         "rigid sub-chain": str(graph.rigid_subchain() or "none"),
     }
+    if graph.mobility > 1 and facts["rigid sub-chain"] == "none":
+        facts["type of mobility"] = graph.mobility_type
     if graph.frame is None:
         if driver is not None:
             raise SpecError("--driver needs a mechanism: choose a frame first (text form '... f0')")

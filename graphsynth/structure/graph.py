@@ -340,6 +340,17 @@ class MechanismGraph:
 
         return self._lazy("girth", girth)
 
+    @property
+    def mobility_type(self) -> str:
+        """How the mobility is shared out, ``"total"``, ``"partial"`` or ``"fractionated"`` (exact).
+
+        See :func:`graphsynth.structure.rigidity.mobility_type`; `GraphError` for a chain that does not move in all its
+        parts.
+        """
+        from graphsynth.structure.rigidity import mobility_type
+
+        return self._lazy("mobility_type", mobility_type)
+
     def rigid_subchain(self) -> RigidSubchain | None:
         """Return a report on a rigid or over-constrained sub-chain, or None if there is none (exact)."""
         from graphsynth.structure.rigidity import find_rigid_subchain

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.core.errors import TooLargeError
+from graphsynth.core.errors import GraphError, TooLargeError
 from graphsynth.core.wording import whole
 from graphsynth.structure.connectivity import bits
 
@@ -62,6 +62,12 @@ class PebbleGame:
         self.free = list(free)
         #: ``out[u][v]``: number of edges oriented from u to v, paid for by pebbles of u.
         self.out: list[dict[int, int]] = [{} for _ in self.free]
+
+    def copy(self) -> PebbleGame:
+        """Return the same state of the game, to play on."""
+        other = PebbleGame(self.free)
+        other.out = [dict(edges) for edges in self.out]
+        return other
 
     def gather(self, a: int, b: int, wanted: int) -> bool:
         """Move pebbles to ``a`` and ``b`` until they hold ``wanted`` together; False if that is impossible."""
@@ -195,6 +201,46 @@ def rigid_bodies(links: int, joints: Iterable[Sequence[int]], space: int, within
         else:
             bodies.append(1 << link)
     return [body for body in bodies if body.bit_count() > 1]
+
+
+def mobility_type(graph: MechanismGraph) -> str:
+    """Return how the mobility W of a chain is shared out: ``"total"``, ``"partial"`` or ``"fractionated"`` (exact).
+
+    *Fractionated*: a link or a joint holds the chain together.  *Partial*: it is not, and some sub-chain with a loop
+    has a mobility of less than W.  *Total*: neither; then, and only then, any W freedoms of joints can be the inputs.
+    So joints that follow one another are held, W freedoms at most, and each must be one constraint more.  Raises
+    `GraphError` for a chain without mobility or with a rigid sub-chain.
+
+    References: docs/explanation/mechanism-graph.md, section *Total, partial, fractionated*.
+
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> mobility_type(MechanismGraph(5, [(0, 1), (1, 2), (2, 3), (3, 4), (0, 4)]))
+    'total'
+    """
+    if graph.mobility < 1 or not is_sparse(graph):
+        raise GraphError(
+            f"the type of mobility is that of a chain that moves in all its parts; this one has mobility "
+            f"{graph.mobility} and {graph.rigid_subchain() or 'no rigid sub-chain'}"
+        )
+    if graph.is_fractionated:
+        return "fractionated"
+    game = PebbleGame([graph.space] * graph.links)
+    for a, b, mobility in graph.joints:
+        for _ in range(graph.space - mobility):
+            game.insert(a, b, graph.space)
+    drives = all(_can_hold(graph, game, joint, set(), graph.mobility) for joint in graph.joints)
+    return "total" if drives else "partial"
+
+
+def _can_hold(graph: MechanismGraph, game: PebbleGame, joint: Joint, held: set[Joint], free: int) -> bool:
+    """Tell whether this joint can be held beside others, and then any that follow it, ``free`` freedoms at most."""
+    game, held = game.copy(), held | {joint}
+    for _ in range(min(free, joint.mobility)):
+        if not game.insert(joint.a, joint.b, graph.space):
+            return False
+    free -= joint.mobility
+    near = (other for other in graph.joints if other not in held and {*other[:2]} & {*joint[:2]})
+    return free <= 0 or all(_can_hold(graph, game, other, held, free) for other in near)
 
 
 def _induced(graph: MechanismGraph, mask: int) -> tuple[tuple[int, ...], tuple[Joint, ...], int]:

@@ -3,7 +3,8 @@ import random
 
 import pytest
 
-from graphsynth.core.errors import TooLargeError
+from graphsynth import enumerate_chains
+from graphsynth.core.errors import GraphError, TooLargeError
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.rigidity import is_sparse
 
@@ -122,3 +123,43 @@ def test_girth_and_cuts_against_networkx():
         assert graph.is_planar == nx.check_planarity(view)[0]
         assert [set(part) for part in graph.components] == [set(p) for p in nx.connected_components(view)]
         assert graph.loops == len(nx.cycle_basis(view))
+
+
+def least_with_a_loop(graph):
+    """The smallest DOF of a set of links each of which has two joints inside it."""
+    found = []
+    for mask in range(1, 1 << graph.links):
+        links = {link for link in range(graph.links) if mask >> link & 1}
+        if all((graph.neighbours[link] & mask).bit_count() >= 2 for link in links):
+            found.append(dof(graph, links))
+    return min(found)
+
+
+@pytest.mark.parametrize(
+    ("links", "mobility", "more", "numbers"),
+    [
+        (7, 2, {}, (1, 2, 1)), (6, 3, {}, (1, 0, 0)), (8, 3, {}, (1, 4, 2)),
+        (6, 2, {"joints_by_mobility": {2: 1}}, (2, 6, 2)), (7, 3, {"space": 4}, (1, 0, 0)),
+        pytest.param(9, 2, {}, (6, 29, 5), marks=pytest.mark.long),
+        pytest.param(9, 4, {}, (0, 6, 4), marks=pytest.mark.long),
+        pytest.param(10, 3, {}, (3, 71, 24), marks=pytest.mark.long),
+        pytest.param(7, 4, {"joints_by_mobility": {2: 2}}, (0, 47, 26), marks=pytest.mark.long),
+        pytest.param(7, 3, {"joints_by_mobility": {2: 1}}, (1, 12, 6), marks=pytest.mark.long),
+    ],
+)  # fmt: skip
+def test_types_of_mobility(links, mobility, more, numbers):
+    """Against all sets of links."""
+    chains = list(enumerate_chains(links, mobility, fractionated=True, **more))
+    for chain in chains:
+        whole = "total" if least_with_a_loop(chain) >= mobility else "partial"
+        assert chain.mobility_type == ("fractionated" if chain.cut_links or chain.cut_joints else whole)
+    assert numbers == tuple(
+        sum(chain.mobility_type == kind for chain in chains) for kind in ("total", "partial", "fractionated")
+    )
+
+
+def test_no_type_of_mobility():
+    triangle = MechanismGraph(5, [(0, 1), (1, 2), (0, 2), (2, 3), (3, 4), (4, 0)])
+    for graph in (triangle, MechanismGraph(2, [])):
+        with pytest.raises(GraphError, match=r"moves in all its parts|in several parts"):
+            _ = graph.mobility_type
