@@ -8,6 +8,7 @@ accuracy tribometer``.
 from __future__ import annotations
 
 import contextlib
+import doctest
 import re
 import sys
 from pathlib import Path
@@ -28,7 +29,7 @@ from graphsynth.pipeline.runner import run
 CHOSEN = 5  # of the sixteen chains: the one that becomes a mechanism
 CELL, GAP, COLUMNS = 150, 10, 8
 #: Pages whose examples write pictures.
-WITH_EXAMPLES = ("gallery.md", "explanation/jamming-in-space.md", "how-to/build-it.md")
+WITH_EXAMPLES = ("gallery.md", "explanation/jamming-in-space.md", "how-to/build-it.md", "how-to/gear-trains.md")
 #: Parts of the best answer that can be built: file, millimetres of its unit, inputs (a full rotation if none).
 PARTS: dict[str, tuple[str, float, tuple[float, float] | None]] = {
     "excavator_bucket": ("design-bucket-parts", 100.0, (0.0, 1.0)),
@@ -125,7 +126,7 @@ def pictures_of_examples(page: str, folder: Path) -> None:
     names: dict[str, object] = {}
     with contextlib.chdir(folder):
         for code in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
-            exec(code, names)
+            exec(doctest.script_from_examples(code) if code.startswith(">>>") else code, names)
 
 
 def make(folder: Path) -> list[Path]:

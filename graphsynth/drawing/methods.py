@@ -94,10 +94,9 @@ def draw_sliders(chain: SliderChain, path: str | Path | None, **options: Any) ->
 
 def draw_gear_train(train: PlanetaryGearTrain, path: str | Path | None, **options: Any) -> Drawing:
     """Work of `PlanetaryGearTrain.draw`."""
-    from graphsynth.drawing.graphs import levels_sketch
+    from graphsynth.drawing.gear_schematic import gear_schematic
 
-    graph = train.coloured
-    return _drawing(levels_sketch(graph if graph.frame is not None else graph.with_frame(0), **options), None, path)
+    return _drawing(gear_schematic(train, **options), None, path)
 
 
 def graph_picture(graph: MechanismGraph) -> str:

@@ -92,7 +92,7 @@ def speeds(train: gs.PlanetaryGearTrain, given: Mapping[int, Any], teeth: Teeth 
     """
     import sympy
 
-    counted = _teeth(train, teeth)
+    counted = teeth_of(train, teeth)
     if not isinstance(given, Mapping):
         raise SpecError(f"given = {shown(given)} must be a mapping such as {{0: 1, 1: 0}}")
     own = {link: _exact(value, f"given[{link}]") for link, value in given.items()}
@@ -158,7 +158,7 @@ def efficiency(train: gs.PlanetaryGearTrain, arrangement: Arrangement, teeth: Te
     """
     import sympy
 
-    counted = _teeth(train, teeth)
+    counted = teeth_of(train, teeth)
     if any(not z.is_number for pair in counted.values() for z in pair):
         raise SpecError("an efficiency needs numbers of teeth, not symbols: say which power flows where")
     if train.mobility != 1:
@@ -231,8 +231,8 @@ def _solved(rows: Sequence[Any], unknowns: Sequence[Any], what: str) -> tuple[An
     raise GraphError(what)
 
 
-def _teeth(train: gs.PlanetaryGearTrain, teeth: Teeth | None) -> dict[tuple[int, int], tuple[Any, Any]]:
-    """Return the teeth of each gear pair, in its order."""
+def teeth_of(train: gs.PlanetaryGearTrain, teeth: Teeth | None) -> dict[tuple[int, int], tuple[Any, Any]]:
+    """Return the teeth of each gear pair, in its order; `SpecError` for others, missing ones or 0."""
     import sympy
 
     pairs: list[GearPair] = list(train.gears)

@@ -184,7 +184,10 @@ class PlanetaryGearTrain(ColouredChain):
         return integer(self.frame if fixed is None else fixed, "fixed", 0, self.links - 1, "number of a link")
 
     def draw(self, path: str | Path | None = None, **options: Any) -> gs.Drawing:
-        """Draw its graph by levels from the frame (link 0 of a chain); gear pairs are dashed."""
+        """Draw its functional schematic; see `graphsynth.drawing.gear_schematic.gear_schematic`.
+
+        Gears with a negative number of ``teeth`` are drawn as rings, all others as external ones; the frame is hatched.
+        """
         found: gs.Drawing = work("draw gear train")(self, path, **options)
         return found
 
