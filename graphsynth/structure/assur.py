@@ -48,10 +48,6 @@ class AssurGroup:
         Links of the group, ascending.
     inner, outer : tuple of Joint
         Joints inside the group, and joints to links placed before it.
-    group_class : int
-        Class: the largest number of joints on a contour (see `contour_class`); 2 for a dyad.
-    order : int
-        Order: the number of outer joints.
     stage : int
         1 for a group that hangs on the frame and the driven links only, else one more than the latest it hangs on.
     bodies : tuple of tuple of int
@@ -63,11 +59,23 @@ class AssurGroup:
     links: tuple[int, ...]
     inner: tuple[Joint, ...]
     outer: tuple[Joint, ...]
-    group_class: int
-    order: int
     stage: int
     bodies: tuple[tuple[int, ...], ...]
     floating: tuple[AssurGroup, ...] = ()
+
+    @property
+    def order(self) -> int:
+        """The number of outer joints."""
+        return len(self.outer)
+
+    @property
+    def group_class(self) -> int:
+        """The largest number of joints on a contour, of the floating groups too (see `contour_class`); 2 for a dyad."""
+        body = {link: own for own, links in enumerate(self.bodies) for link in links}
+        inner = ((body[joint.a], body[joint.b], joint.mobility) for joint in self.inner)
+        outer = ((body[joint.a if joint.a in body else joint.b], -1, joint.mobility) for joint in self.outer)
+        own = contour_class(joint for joint in (*inner, *outer) if joint[0] != joint[1])
+        return max([own, *(group.group_class for group in self.floating)])
 
     def __str__(self) -> str:
         links = ", ".join(map(str, self.links))
@@ -276,29 +284,24 @@ def _groups(system: _System) -> tuple[AssurGroup, ...]:
     groups = []
     for mask in system.groups():
         locked = rigid_bodies(system.graph.links, system.inner(mask), system.graph.space, mask)
-        merged = {body: min(bits(rigid)) for rigid in locked for body in bits(rigid)}
         floating: list[AssurGroup] = []
         for rigid in locked:  # bodies rigid among themselves are assembled on the smallest of them
             links = system.links_of(bits(rigid))
             floating += _groups(_System(system.graph, system.drivers, links[0], sum(1 << link for link in links)))
-        inner, outer, contours, stage = [], [], [], 0
-        for a, b, mobility, joint in system.constraints:
+        inner, outer, stage = [], [], 0
+        for a, b, _, joint in system.constraints:
             near, far = (a, b) if mask >> a & 1 else (b, a)
             if mask >> a & mask >> b & 1:
                 inner.append(joint)
-                contours.append((merged.get(a, a), merged.get(b, b), mobility))
             elif mask >> near & 1 and far in stage_of:
                 outer.append(joint)
-                contours.append((merged.get(near, near), -1, mobility))
                 stage = max(stage, stage_of[far])
-        own = contour_class((a, b, mobility) for a, b, mobility in contours if a != b)
+        merged = {body for rigid in locked for body in bits(rigid)}
         bodies = [bits(rigid) for rigid in locked] + [[body] for body in bits(mask) if body not in merged]
         group = AssurGroup(
             links=system.links_of(bits(mask)),
             inner=tuple(inner),
             outer=tuple(outer),
-            group_class=max([own, *(group.group_class for group in floating)]),
-            order=len(outer),
             stage=stage + 1,
             bodies=tuple(sorted(system.links_of(body) for body in bodies)),
             floating=tuple(floating),
