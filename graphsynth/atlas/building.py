@@ -5,9 +5,10 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING, Any
 
+from graphsynth.atlas.facts import modes_of_all
 from graphsynth.atlas.tables import INDEXES
 from graphsynth.core.errors import GraphsynthError
 
@@ -84,7 +85,8 @@ class Writer:
             ),
         )
         many("INSERT INTO dyads VALUES (?, ?)", ((start + at, parent) for at, parent in rows.dyads))
-        many("INSERT INTO inversions VALUES (?, ?, ?, ?)", ((start + at, *rest) for at, *rest in rows.inversions))
+        inversions = ((start + at, *rest) for at, *rest in rows.inversions)
+        many("INSERT INTO inversions VALUES (?, ?, ?, ?, ?, ?, ?, ?)", inversions)
         many(
             "INSERT INTO driven VALUES (?, ?, ?, ?)",
             ((start + at, frame, driver, structures[own]) for at, frame, driver, own in rows.mechanisms),
@@ -104,11 +106,12 @@ class Writer:
             members = [groups[at] for at in own]
             names = []
             for group in members:
-                values = {"key": group.key, "links": group.links, '"order"': group.order, "class": group.group_class}
+                values = dict(zip(("key", "links", '"order"', "class", "modes"), astuple(group)))
                 names.append(str(self._number("groups", "group_id", values)))
             highest = max((group.group_class for group in members), default=1)
             order = max((group.order for group in members), default=0)
-            structure = {"groups": " ".join(names), "class": highest, '"order"': order}
+            modes = modes_of_all(group.modes for group in members)
+            structure = {"groups": " ".join(names), "class": highest, '"order"': order, "modes": modes}
             numbers.append(self._number("structures", "structure_id", structure))
         return numbers
 

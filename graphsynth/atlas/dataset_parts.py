@@ -6,14 +6,14 @@ import io
 from collections import Counter
 from dataclasses import dataclass
 from hashlib import sha256
-from math import factorial, prod
+from math import factorial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.atlas.building import is_planar
-from graphsynth.atlas.facts import Rows, assortments, contracted_of, driven_text, graph6_of, mechanisms_of
+from graphsynth.atlas.facts import Rows, assortments, contracted_of, driven_text, graph6_of, mechanisms_of, modes_of_all
 from graphsynth.atlas.making import Task, blocks_of
 from graphsynth.core.extras import need
 
@@ -21,8 +21,6 @@ from graphsynth.core.extras import need
 PART = 400_000.0
 #: Chains that are compressed together: one of them is read in some milliseconds.
 TOGETHER = 8192
-#: Moving links of the largest groups whose assembly modes are counted: of larger ones there are hundred thousands.
-_COUNTED = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +137,6 @@ def _mechanisms(mechanisms: list[NDArray[Any]], rows: Rows, place: NDArray[np.in
     chains = place[chains]
     order = np.lexsort((drives, frames, chains))
     groups = list(rows.groups)
-    modes = _modes_of_groups(groups)
     facts = np.array(
         [
             (
@@ -147,7 +144,7 @@ def _mechanisms(mechanisms: list[NDArray[Any]], rows: Rows, place: NDArray[np.in
                 max((groups[at].order for at in own), default=0),
                 len(own),
                 max((groups[at].links for at in own), default=0),
-                -1 if any(modes[at] < 0 for at in own) else prod(modes[at] for at in own),
+                modes_of_all(groups[at].modes for at in own) or -1,
             )
             for own in rows.structures
         ],
@@ -167,16 +164,6 @@ def _mechanisms(mechanisms: list[NDArray[Any]], rows: Rows, place: NDArray[np.in
         },
         {"chain": "DELTA_BINARY_PACKED"},
     )
-
-
-def _modes_of_groups(groups: list[Any]) -> list[int]:
-    """Count the assembly modes of each group, -1 for one that is too large."""
-    from graphsynth.structure.graph import MechanismGraph
-    from graphsynth.structure.modes import count_assembly_modes
-
-    return [
-        count_assembly_modes(MechanismGraph.from_key(group.key)) if group.links <= _COUNTED else -1 for group in groups
-    ]
 
 
 def _parquet(columns: dict[str, Any], encodings: dict[str, str], together: int | None = None) -> bytes:

@@ -22,7 +22,7 @@ _CHAIN = "c.mobility, c.links, c.key"
 #: Rows of each table in an order that depends on the content alone.  A number of a group is its rank by size and key.
 TABLES = {
     "families": "SELECT mobility, links, fractionated, expected, complete FROM families ORDER BY mobility, links",
-    "groups": 'SELECT rank AS "group", key, links, "order", class FROM temp.ranked_groups ORDER BY rank',
+    "groups": 'SELECT rank AS "group", key, links, "order", class, modes FROM temp.ranked_groups ORDER BY rank',
     "chains": (
         "SELECT c.key, c.label, c.graph6, c.mobility, c.links, c.joints, c.loops, c.assortment, c.automorphisms, "
         "c.link_orbits, c.inversions, c.planar, c.girth, c.fractionated, h.vertices AS contracted_vertices, "
@@ -30,11 +30,11 @@ TABLES = {
     ),
     "dyads": f"SELECT c.key, d.parent_key FROM chains c JOIN dyads d USING (chain_id) ORDER BY {_CHAIN}, d.parent_key",
     "inversions": (
-        "SELECT c.key, i.frame, i.frame_joints, i.levels FROM chains c JOIN inversions i USING (chain_id) "
-        f"ORDER BY {_CHAIN}, i.frame"
+        "SELECT c.key, i.frame, i.frame_joints, i.levels, i.degree, i.genus, i.degrees, i.genera "
+        f"FROM chains c JOIN inversions i USING (chain_id) ORDER BY {_CHAIN}, i.frame"
     ),
     "mechanisms": (
-        'SELECT c.key, d.frame, CAST(d.driver AS TEXT) AS driver, s.class, s."order", s.ranks AS groups '
+        'SELECT c.key, d.frame, CAST(d.driver AS TEXT) AS driver, s.class, s."order", s.modes, s.ranks AS groups '
         "FROM chains c JOIN driven d USING (chain_id) JOIN temp.ranked_structures s USING (structure_id) "
         f"ORDER BY {_CHAIN}, d.frame, CAST(d.driver AS TEXT)"
     ),
@@ -48,9 +48,9 @@ _ROWS = 100_000
 
 _RANKS = """
 CREATE TEMP TABLE IF NOT EXISTS ranked_groups AS
-  SELECT group_id, ROW_NUMBER() OVER (ORDER BY links, key) AS rank, key, links, "order", class FROM main.groups;
+  SELECT group_id, ROW_NUMBER() OVER (ORDER BY links, key) AS rank, key, links, "order", class, modes FROM main.groups;
 CREATE TEMP TABLE IF NOT EXISTS ranked_structures (
-  structure_id INTEGER PRIMARY KEY, ranks TEXT, class INTEGER, "order" INTEGER);
+  structure_id INTEGER PRIMARY KEY, ranks TEXT, class INTEGER, "order" INTEGER, modes INTEGER);
 DELETE FROM temp.ranked_structures;
 """
 
@@ -60,10 +60,12 @@ def _prepare(connection: sqlite3.Connection) -> None:
     connection.executescript(_RANKS)
     rank = dict(connection.execute("SELECT group_id, rank FROM temp.ranked_groups"))
     rows = []
-    for number, groups, *rest in connection.execute('SELECT structure_id, groups, class, "order" FROM structures'):
+    for number, groups, *rest in connection.execute(
+        'SELECT structure_id, groups, class, "order", modes FROM structures'
+    ):
         rows.append((number, " ".join(str(rank[int(group)]) for group in groups.split()), *rest))
     connection.execute("BEGIN")
-    connection.executemany("INSERT INTO temp.ranked_structures VALUES (?, ?, ?, ?)", rows)
+    connection.executemany("INSERT INTO temp.ranked_structures VALUES (?, ?, ?, ?, ?)", rows)
     connection.execute("COMMIT")
 
 

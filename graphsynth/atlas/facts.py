@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from base64 import urlsafe_b64encode
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from math import comb
+from functools import lru_cache
+from math import comb, prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,16 +21,21 @@ if TYPE_CHECKING:
 Bytes = NDArray[np.uint8]
 
 _FRAMED = 8  # flag in the second byte of a key
+#: Moving links of the largest groups whose assembly modes are counted: of larger ones there are hundred thousands.
+_COUNTED = 10
+#: Links of the largest mechanisms whose coupler curves are stored: they take 5 ms each with ten links.
+_CURVES = 8
 
 
 @dataclass(frozen=True, slots=True)
 class GroupRow:
-    """A structural group: key with the base as frame, moving links, order, class."""
+    """A structural group: key with the base as frame, moving links, order, class, assembly modes (or None)."""
 
     key: str
     links: int
     order: int
     group_class: int
+    modes: int | None
 
 
 @dataclass(slots=True)
@@ -42,8 +48,8 @@ class Rows:
     contracted: dict[tuple[int, str], int] = field(default_factory=dict)  # (vertices, edges) to their place
     #: list of (chain, key of the parent): chains as indices into ``chains``, here and below
     dyads: list[tuple[int, str]] = field(default_factory=list)
-    #: list of (chain, frame, joints of the frame, levels)
-    inversions: list[tuple[int, int, int, str]] = field(default_factory=list)
+    #: list of (chain, frame, joints of the frame, levels, and the values of `curves_of`)
+    inversions: list[tuple[Any, ...]] = field(default_factory=list)
     #: list of (chain, frame, driver, structure): ``driver`` is a link, or text such as ``'1,3'`` for several;
     #: ``structure`` a place in the next
     mechanisms: list[tuple[int, int, int | str, int]] = field(default_factory=list)
@@ -101,7 +107,8 @@ def rows_of(block: Block, rows: Rows) -> None:
         levels = block.levels[c].tolist()
         for frame in sorted(set(orbit)):
             sizes = "-".join(str(size) for size in levels[frame] if size)
-            rows.inversions.append((start + c, frame, levels[frame][1], sizes))
+            curves = curves_of(block.joints[c].tolist(), len(orbit), frame)
+            rows.inversions.append((start + c, frame, levels[frame][1], sizes, *curves))
     n = block.orbit.shape[1]
     chains, places = np.nonzero(block.parents[:, :, 0])
     streams = _lines(block.parents[chains, places, 1 : 1 + _stream(n - 2)]) if len(chains) else []
@@ -161,6 +168,37 @@ def _orbits(orbit: list[int]) -> str:
     for link, low in enumerate(orbit):
         members.setdefault(low, []).append(str(link))
     return " ".join(",".join(links) for links in members.values())
+
+
+def curves_of(
+    joints: Collection[Sequence[int]], links: int, frame: int
+) -> tuple[int, int, str, str] | tuple[None, None, None, None]:
+    """Find the largest degree and genus of a coupler curve, and both of each link; None where they are not stored."""
+    from graphsynth.structure.graph import MechanismGraph
+    from graphsynth.structure.modes import coupler_curve_degree, coupler_curve_genus
+
+    if links > _CURVES or 3 * (links - 1) - 2 * len(joints) != 1:
+        return None, None, None, None
+    mechanism = MechanismGraph(links, [(a, b) for a, b in joints], frame=frame)
+    degrees, genera = (
+        [0 if link == frame else count(mechanism, link) for link in range(links)]
+        for count in (coupler_curve_degree, coupler_curve_genus)
+    )
+    return max(degrees), max(genera), " ".join(map(str, degrees)), " ".join(map(str, genera))
+
+
+@lru_cache(maxsize=1 << 16)
+def modes_of(key: str, links: int) -> int | None:
+    """Count the assembly modes of a group of so many moving links; None for one that is too large."""
+    from graphsynth.structure.graph import MechanismGraph
+    from graphsynth.structure.modes import count_assembly_modes
+
+    return count_assembly_modes(MechanismGraph.from_key(key)) if links <= _COUNTED else None
+
+
+def modes_of_all(groups: Iterable[int | None]) -> int | None:
+    """Multiply the assembly modes of the groups of a mechanism; None if those of one are not counted."""
+    return prod(modes or 0 for modes in groups) or None
 
 
 def contracted_of(block: Block, rows: Rows) -> list[int]:
@@ -238,7 +276,8 @@ def _structures(sizes: Bytes, outers: Bytes, forms: Bytes, rows: Rows) -> list[i
     classes_of(vertices, streams, classes)
     numbers: dict[tuple[int, int, bytes], int] = {}
     for (links, order, form), own in zip(known, classes.tolist(), strict=True):
-        row = GroupRow(chain_key(links + 1, form[: _stream(links + 1)], _FRAMED), links, order, own)
+        key = chain_key(links + 1, form[: _stream(links + 1)], _FRAMED)
+        row = GroupRow(key, links, order, own, modes_of(key, links))
         numbers[links, order, form] = rows.groups.setdefault(row, len(rows.groups))
     places = (tuple(numbers[group] for group in groups) for groups in lists)
     return [rows.structures.setdefault(own, len(rows.structures)) for own in places]

@@ -179,7 +179,9 @@ def _read(shard: sqlite3.Connection, first: int, count: int) -> Rows:
         "SELECT chain_id - ?, parent_key FROM dyads WHERE chain_id BETWEEN ? AND ?", span
     ).fetchall()
     rows.inversions = shard.execute(
-        "SELECT chain_id - ?, frame, frame_joints, levels FROM inversions WHERE chain_id BETWEEN ? AND ?", span
+        "SELECT chain_id - ?, frame, frame_joints, levels, degree, genus, degrees, genera FROM inversions "
+        "WHERE chain_id BETWEEN ? AND ?",
+        span,
     ).fetchall()
     structures: dict[str, int] = {}
     groups: dict[str, int] = {}
@@ -191,7 +193,7 @@ def _read(shard: sqlite3.Connection, first: int, count: int) -> Rows:
         if text not in structures:
             for group in text.split():
                 if group not in groups:
-                    select = 'SELECT key, links, "order", class FROM groups WHERE group_id = ?'
+                    select = 'SELECT key, links, "order", class, modes FROM groups WHERE group_id = ?'
                     row = GroupRow(*shard.execute(select, (int(group),)).fetchone())
                     groups[group] = rows.groups.setdefault(row, len(rows.groups))
             structure = tuple(groups[group] for group in text.split())

@@ -120,7 +120,9 @@ def entry(connection: sqlite3.Connection, chain: dict[str, Any]) -> dict[str, An
         chain["key"],
     )
     found["parents"], found["children"] = ([row["key"] for row in own] for own in (parents, children))
-    found["inversions"] = rows("SELECT frame, frame_joints, levels FROM inversions WHERE chain_id = ? ORDER BY frame")
+    found["inversions"] = rows(
+        "SELECT frame, frame_joints, levels, degrees, genera FROM inversions WHERE chain_id = ? ORDER BY frame"
+    )
     evaluated: dict[tuple[int, int | str], dict[str, Any]] = {}
     for row in rows(
         "SELECT frame, driver, kind, status, value, unit, guarantee, data FROM evaluations WHERE chain_id = ?"
@@ -129,9 +131,10 @@ def entry(connection: sqlite3.Connection, chain: dict[str, Any]) -> dict[str, An
         row["data"] = None if row["data"] is None else data_of(row["data"])
         evaluated.setdefault(place, {})[row.pop("kind")] = row
     found["mechanisms"] = rows(
-        'SELECT frame, driver, class, "order", levels, groups FROM mechanisms WHERE chain_id = ? ORDER BY frame, driver'
+        'SELECT frame, driver, class, "order", modes, levels, groups FROM mechanisms WHERE chain_id = ? '
+        "ORDER BY frame, driver"
     )
-    group = 'SELECT key, links, "order", class FROM groups WHERE group_id = ?'
+    group = 'SELECT key, links, "order", class, modes FROM groups WHERE group_id = ?'
     for row in found["mechanisms"]:
         row["groups"] = [rows(group, int(own))[0] for own in row["groups"].split()]
         row["evaluations"] = dict.fromkeys(KINDS, NOT_COMPUTED) | evaluated.get((row["frame"], row["driver"]), {})

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 #: In the header of every catalogue file ("GSyn"), so that another SQLite file is not taken for one.
 APPLICATION_ID = 0x4753796E
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 #: Edges of a contracted graph; none for a ring.
 EDGES = re.compile(r"(\d{1,2}-\d{1,2}(x\d{1,2})?( (?!$)|$))*", re.ASCII)
 
@@ -18,6 +18,9 @@ _DRIVER = (
     "driver NOT GLOB '*[^0-9,]*' AND length(driver) < 60"
 )
 _FLAG = "{0} IN (0, 1)"
+_MOST = 9007199254740991
+_COUNT = f"{{0}} BETWEEN 1 AND {_MOST}"
+_LIST = "{0} NOT GLOB '*[^0-9 ]*' AND length({0}) < 100"
 # words of people: not empty, not long, no control characters, and nothing that a spreadsheet takes for a formula
 _WORD = (
     "length({0}) BETWEEN 1 AND 200 AND {0} NOT GLOB '[=+@-]*' AND "
@@ -54,13 +57,15 @@ CREATE TABLE contracted (
 CREATE TABLE groups (
   group_id INTEGER PRIMARY KEY, key TEXT NOT NULL UNIQUE CHECK ({_KEY.format("key")}), -- the base as frame
   links INTEGER NOT NULL CHECK (links BETWEEN 1 AND 17), "order" INTEGER NOT NULL CHECK ("order" BETWEEN 1 AND 17),
-  class INTEGER NOT NULL CHECK (class BETWEEN 1 AND 99)) STRICT;
--- how a mechanism is assembled: the groups, and the highest class and order among them
+  class INTEGER NOT NULL CHECK (class BETWEEN 1 AND 99),
+  modes INTEGER CHECK ({_COUNT.format("modes")}) -- assembly modes, complex ones too; NULL: more than ten links
+  ) STRICT;
+-- how a mechanism is assembled: the groups, the highest class and order among them, and the product of their modes
 CREATE TABLE structures (
   structure_id INTEGER PRIMARY KEY,
   groups TEXT NOT NULL UNIQUE CHECK (groups NOT GLOB '*[^0-9 ]*' AND length(groups) < 200), -- in the order of assembly
-  class INTEGER NOT NULL CHECK (class BETWEEN 1 AND 99), "order" INTEGER NOT NULL CHECK ("order" BETWEEN 0 AND 17)
-  ) STRICT;
+  class INTEGER NOT NULL CHECK (class BETWEEN 1 AND 99), "order" INTEGER NOT NULL CHECK ("order" BETWEEN 0 AND 17),
+  modes INTEGER CHECK ({_COUNT.format("modes")})) STRICT;
 CREATE TABLE chains (
   chain_id INTEGER PRIMARY KEY, family_id INTEGER NOT NULL REFERENCES families,
   key TEXT NOT NULL UNIQUE CHECK ({_KEY.format("key")}),
@@ -72,7 +77,7 @@ CREATE TABLE chains (
   loops INTEGER NOT NULL CHECK (loops = joints - links + 1),
   assortment TEXT NOT NULL CHECK (assortment GLOB '[0-9]*' AND assortment NOT GLOB '*[^0-9-]*'
     AND assortment NOT GLOB '*--*' AND assortment NOT GLOB '*-' AND length(assortment) < 60), -- '4-4': links by joints
-  automorphisms INTEGER NOT NULL CHECK (automorphisms BETWEEN 1 AND 9007199254740991),
+  automorphisms INTEGER NOT NULL CHECK ({_COUNT.format("automorphisms")}),
   link_orbits TEXT NOT NULL CHECK (link_orbits NOT GLOB '*[^0-9, ]*' AND length(link_orbits) < 100),
   inversions INTEGER NOT NULL CHECK (inversions BETWEEN 1 AND links),
   planar INTEGER NOT NULL CHECK ({_FLAG.format("planar")}),
@@ -83,11 +88,13 @@ CREATE TABLE chains (
 CREATE TABLE dyads (
   chain_id INTEGER NOT NULL REFERENCES chains, parent_key TEXT NOT NULL CHECK ({_KEY.format("parent_key")}),
   PRIMARY KEY (chain_id, parent_key)) STRICT, WITHOUT ROWID;
--- one row for each orbit of links: the chain with that link as frame
+-- one row for each orbit of links: the chain with that link as frame, and the curves that points of its links draw
 CREATE TABLE inversions (
   chain_id INTEGER NOT NULL REFERENCES chains, frame INTEGER NOT NULL CHECK ({_LINK}),
   frame_joints INTEGER NOT NULL CHECK (frame_joints BETWEEN 1 AND 17),
   levels TEXT NOT NULL CHECK (levels NOT GLOB '*[^0-9-]*' AND length(levels) < 60), -- links on each level: '1-2-3'
+  degree INTEGER CHECK ({_COUNT.format("degree")}), genus INTEGER CHECK (genus BETWEEN 0 AND {_MOST}), -- largest
+  degrees TEXT CHECK ({_LIST.format("degrees")}), genera TEXT CHECK ({_LIST.format("genera")}), -- by link: '0 2 6 2'
   PRIMARY KEY (chain_id, frame)) STRICT, WITHOUT ROWID;
 -- one row for each orbit of (frame, as many driven links jointed to it as the mobility) that can be moved so
 CREATE TABLE driven (
@@ -96,7 +103,7 @@ CREATE TABLE driven (
   structure_id INTEGER NOT NULL REFERENCES structures,
   PRIMARY KEY (chain_id, frame, driver)) STRICT, WITHOUT ROWID;
 CREATE VIEW mechanisms AS
-  SELECT d.chain_id, d.frame, d.driver, s.class, s."order", s.groups, i.levels
+  SELECT d.chain_id, d.frame, d.driver, s.class, s."order", s.modes, s.groups, i.levels, i.degree, i.genus
   FROM driven d JOIN structures s USING (structure_id) JOIN inversions i USING (chain_id, frame);
 CREATE VIEW relatives AS
   SELECT p.chain_id AS parent_id, d.chain_id AS child_id, d.parent_key, c.key AS child_key

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from graphsynth.atlas.evaluations import GUARANTEES
+from graphsynth.atlas.facts import curves_of, modes_of, modes_of_all
 from graphsynth.atlas.rechecking import Same, recheck
 from graphsynth.atlas.references import Reference
 from graphsynth.atlas.sealing import broken_seal
@@ -157,7 +158,8 @@ def _check_groups(connection: sqlite3.Connection, checks: _Checks, found: dict[i
     from graphsynth.structure.graph import MechanismGraph
 
     keys, facts = {}, {}
-    for number, key, links, order, own in connection.execute('SELECT group_id, key, links, "order", class FROM groups'):
+    select = 'SELECT group_id, key, links, "order", class, modes FROM groups'
+    for number, key, links, order, own, modes in connection.execute(select):
         graph = MechanismGraph.from_key(key)
         pairs = [(a, b) for a, b, _ in graph.joints]
         checks.same("groups.links", key, links, graph.links - 1)
@@ -167,11 +169,14 @@ def _check_groups(connection: sqlite3.Connection, checks: _Checks, found: dict[i
         checks.same("groups.order", key, order, sum(1 for a, _ in pairs if a == 0))
         bases = ((a, b, 1) if a else (b, -1, 1) for a, b in pairs)
         checks.same("groups.class", key, own, contour_class(bases))  # by the minimum cycle basis of networkx
-        keys[number], facts[number] = key, (own, order)
-    for number, groups, own, order in connection.execute('SELECT structure_id, groups, class, "order" FROM structures'):
+        checks.same("groups.modes", key, modes, modes_of(key, links))
+        keys[number], facts[number] = key, (own, order, modes)
+    select = 'SELECT structure_id, groups, class, "order", modes FROM structures'
+    for number, groups, own, order, modes in connection.execute(select):
         members = [int(group) for group in groups.split()]
         checks.same("structures.class", groups, own, max((facts[group][0] for group in members), default=1))
         checks.same("structures.order", groups, order, max((facts[group][1] for group in members), default=0))
+        checks.same("structures.modes", groups, modes, modes_of_all(facts[group][2] for group in members))
         found[number] = " ".join(keys[group] for group in members)
 
 
@@ -265,6 +270,10 @@ def _check_chain(
     checks.same("dyads", where, parents, reference.parents())
     inversions = rows("SELECT frame, frame_joints, levels FROM inversions WHERE chain_id = ? ORDER BY frame")
     checks.same_rows("inversions", where, inversions, reference.inversions())
+    curves = rows("SELECT frame, degree, genus, degrees, genera FROM inversions WHERE chain_id = ?")
+    joints = [(a, b) for a, b in reference.graph.edges]
+    wanted = [(frame, *curves_of(joints, reference.links, frame)) for frame, *_ in inversions]
+    checks.same_rows("inversions: coupler curves", where, sorted(curves), wanted)
     stored = [
         (frame, tuple(int(link) for link in str(driver).split(",")), structures.get(structure, ""))
         for frame, driver, structure in rows("SELECT frame, driver, structure_id FROM driven WHERE chain_id = ?")

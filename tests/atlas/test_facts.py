@@ -8,6 +8,7 @@ import pytest
 from graphsynth import MechanismGraph, count_assur_groups, enumerate_assur_groups, enumerate_chains
 from graphsynth.atlas.facts import Rows, analyse_block, rows_of
 from graphsynth.structure.assur import contour_class, decompose, find_fault
+from graphsynth.structure.modes import coupler_curve_degree, coupler_curve_genus
 
 FAMILIES = [(4, 1), (6, 1), (8, 1), (5, 2), (7, 2), (9, 2), (6, 3), (8, 3), (7, 4), (9, 4)]
 
@@ -41,7 +42,22 @@ def test_facts_are_those_of_the_graph_class(links, mobility):
         for frame in sorted(orbit[0] for orbit in graph.orbits):
             levels = graph.with_frame(frame).levels
             own.append((at, frame, graph.degrees[frame], "-".join(str(len(level)) for level in levels)))
-    assert rows.inversions == own
+    assert [row[:4] for row in rows.inversions] == own
+
+
+def test_coupler_curves_are_those_of_the_mechanism_and_left_out_where_they_cost_much():
+    for links, mobility in ((6, 1), (8, 1), (10, 1), (7, 2)):
+        chains, rows = facts_of(links, mobility)
+        for at, frame, _, _, degree, genus, *texts in rows.inversions[:40]:
+            if (links, mobility) in ((10, 1), (7, 2)):
+                assert (degree, genus, *texts) == (None,) * 4
+                continue
+            mechanism = chains[at].canonical().with_frame(frame)  # numbers its links anew
+            numbers = [moved(link, frame) for link in range(links)]
+            for text, most, count in zip(texts, (degree, genus), (coupler_curve_degree, coupler_curve_genus)):
+                wanted = [count(mechanism, own) if own else 0 for own in numbers]
+                assert text == " ".join(map(str, wanted))
+                assert most == max(wanted)
 
 
 @pytest.mark.parametrize(("links", "mobility"), FAMILIES)

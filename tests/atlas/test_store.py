@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import random
 import shutil
@@ -111,6 +112,18 @@ def test_counts_per_row_of_the_published_tables(small, twelve):
             assert twelve.sql("SELECT COUNT(*) AS n FROM groups WHERE links = 10")["n"][0] == wanted
 
 
+def test_modes_and_curves_are_those_published(small):
+    """Dyads 2, triads 6, groups of six links 14, 16, 18; degrees of six-bars 14, 16, 18; products for mechanisms."""
+    modes = small.sql("SELECT links, modes FROM groups WHERE links < 7 GROUP BY links, modes ORDER BY links, modes")
+    assert modes.to_numpy().tolist() == [[2, 2], [4, 6], [6, 14], [6, 16], [6, 18]]
+    six = small.sql("SELECT degree, genus, degrees FROM inversions JOIN chains USING (chain_id) WHERE links = 6")
+    assert {int(own) for text in six["degrees"] for own in text.split()} == {0, 2, 6, 14, 16, 18}
+    assert sorted(zip(six["degree"], six["genus"])) == [(6, 1), (16, 5), (16, 7), (18, 7), (18, 7)]
+    own = dict(small.sql("SELECT group_id, modes FROM groups").itertuples(index=False, name=None))
+    for groups, product in small.sql("SELECT groups, modes FROM structures").itertuples(index=False, name=None):
+        assert product == math.prod(own[int(group)] for group in groups.split())
+
+
 def test_the_statement_repeats_the_published_table():
     import tomllib
 
@@ -144,7 +157,7 @@ def test_an_entry_is_json_and_says_what_was_not_computed(small):
     entry = json.loads(json.dumps(small.entry("1.4.4.1")))
     (mechanism,) = entry["mechanisms"]
     assert mechanism["evaluations"] == dict.fromkeys(("dimensions", "transmission", "jamming"), "not computed")
-    assert mechanism["groups"] == [{"key": "1Awvg", "links": 2, "order": 2, "class": 2}]
+    assert mechanism["groups"] == [{"key": "1Awvg", "links": 2, "order": 2, "class": 2, "modes": 2}]
 
 
 # --- the same, however built

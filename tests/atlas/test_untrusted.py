@@ -15,6 +15,7 @@ import pytest
 from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.evaluations import Evaluation
 from graphsynth.atlas.site import build_site
+from graphsynth.atlas.tables import SCHEMA_VERSION
 from graphsynth.cli import main
 from graphsynth.core.errors import FormatError, GraphsynthError, SpecError
 
@@ -144,7 +145,7 @@ SILENT = {
     "no seal": "DELETE FROM meta",
     "another seal": "UPDATE meta SET value = replace(value, 'a', 'b')",
     "two seals": "INSERT INTO meta VALUES ('other', '')",
-    "number in the header": "PRAGMA user_version = 4; VACUUM",
+    "number in the header": f"PRAGMA user_version = {SCHEMA_VERSION}; VACUUM",
 }
 
 

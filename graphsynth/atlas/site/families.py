@@ -148,9 +148,9 @@ def relatives_script(
 
 
 def groups_script(connection: sqlite3.Connection) -> str:
-    """Write the class of every structural group by its key."""
-    rows = connection.execute('SELECT key, class FROM groups ORDER BY links, "order", key').fetchall()
-    return script("takeGroups", dict(rows))
+    """Write the class and the assembly modes of every structural group by its key."""
+    rows = connection.execute('SELECT key, class, modes FROM groups ORDER BY links, "order", key')
+    return script("takeGroups", {key: facts for key, *facts in rows})
 
 
 def contents(connection: sqlite3.Connection, found: list[Family], **more: Any) -> str:

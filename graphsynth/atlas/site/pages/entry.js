@@ -145,7 +145,8 @@ ${loops} ${Atlas.term("loop")}, ${Atlas.term("mobility")} ${row.mobility}.`;
     }
     const items = groups.map((group, k) =>
       html`<li><span class="swatch g${k % 4 + 1}"></span>links ${listed(group.links)}: ${Atlas.term("class")} ${Atlas.roman(Atlas.classOf(group.key))}, ${Atlas.term("order")} ${group.order}${group.links.length === 2 && " (dyad)"}</li>`);
-    return html`<p>Driver ${listed(drivers)} on frame ${frame}, then</p><ol>${items}</ol><p>Mechanism of class ${Atlas.roman(classOf(groups))}.</p>`;
+    const modes = groups.reduce((product, group) => product * Atlas.modesOf(group.key), 1);
+    return html`<p>Driver ${listed(drivers)} on frame ${frame}, then</p><ol>${items}</ol><p>Mechanism of class ${Atlas.roman(classOf(groups))}${modes > 0 && html`, at most ${modes} ${Atlas.term("modes")}`}.</p>`;
   }
 
   function saveButtons(shown) {

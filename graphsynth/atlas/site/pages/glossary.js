@@ -21,6 +21,7 @@
     group: ["structural group", "Also Assur group: a smallest set of links that a given position of its outer joints places, and no part of it alone. A mechanism is its drivers and then one group after another."],
     class: ["class", "Of a group: the most joints on one closed contour of it (2 for a dyad, two links and three joints). Of a mechanism: its highest. Class II is solved with a square root; higher classes need polynomial systems."],
     order: ["order", "Of a group: the number of outer joints by which it hangs on what is placed before it."],
+    modes: ["assembly modes", "The ways in which it can be put together with given dimensions and drivers: so many at most, as many with complex coordinates."],
     driver: ["driver", "The link whose motion is given, here one jointed to the frame."],
     parent: ["parents and children", "A parent is left when a dyad, two jointed binary links, is taken out; putting one in between two links gives a child."],
     adjacency: ["adjacency matrix", "Row and column for each link; 1 where the two are jointed."],

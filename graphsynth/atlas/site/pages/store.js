@@ -9,7 +9,7 @@
   Atlas.rows = [];
   Atlas.families = new Map();
   const relatives = new Map(), sketches = new Map();
-  let classes = null;
+  let groups = null;
 
   Atlas.open = function (contents) {
     Atlas.contents = contents;
@@ -39,7 +39,7 @@
   Atlas.takeRelatives = (name, data) => relatives.set(name, data);
   Atlas.names = [];
   Atlas.takeNames = data => { Atlas.names = data; };
-  Atlas.takeGroups = data => { classes = data; };
+  Atlas.takeGroups = data => { groups = data; };
 
   /** Load a script of the data folder once; the promise tells whether it came. */
   function load(file) {
@@ -113,9 +113,10 @@
     return relatives.get(row.family)?.evaluations[row.place] || [];
   };
 
-  /** Class of a structural group by its key, or undefined. */
+  /** Class of a structural group by its key, and its number of assembly modes, or undefined. */
   Atlas.loadClasses = async () => { await load("groups"); };
-  Atlas.classOf = key => (classes ? classes[key] : undefined);
+  Atlas.classOf = key => groups?.[key]?.[0];
+  Atlas.modesOf = key => groups?.[key]?.[1];
 
   // --- choosing and ordering
 
