@@ -19,11 +19,18 @@ def plain(text: str) -> str:
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """Return ``"; did you mean 'x'?"`` for the nearest of ``words``, or nothing."""
+    """Return ``"; did you mean 'x'?"`` for the nearest of ``words``, or nothing.
+
+    A word with a unit too many or too few is nearest.
+
+    >>> nearest("inputs_deg", ["inputs", "outputs_deg"])
+    "; did you mean 'inputs'?"
+    """
     import difflib
 
-    word = word[:60]
-    close = difflib.get_close_matches(word, list(words), n=1, cutoff=0.5)
+    word, words = word[:60], list(words)
+    close = [own for own in words if word.startswith(f"{own}_") or own.startswith(f"{word}_")]
+    close = close or difflib.get_close_matches(word, words, n=1, cutoff=0.5)
     return f"; did you mean {close[0]!r}?" if close else ""
 
 

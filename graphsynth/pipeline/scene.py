@@ -50,14 +50,14 @@ class SceneTable:
 class GenerateTable:
     """``[structure.generate]``: which mechanisms of the question become candidates."""
 
-    symmetry: int | None = None  # keep mechanisms with an automorphism of this order that fixes the frame
+    symmetry: int | None = None  # 3: keep those with a three-fold automorphism that fixes the frame; 2: mirror images
     fixed_moving_links: int | None = None  # of such an automorphism, the number of moving links that stay in place
     planar: bool = False  # leave out graphs that cannot be drawn without crossings
     sample: int | None = None  # of more mechanisms draw so many uniformly, with the scene's seed; repeats are dropped
     limit: int = 10_000  # stop with an error when there are more candidates than this
 
     def __post_init__(self) -> None:
-        require(self.symmetry in (None, 3), f"has symmetry {self.symmetry}; only 3 is known, or leave it out")
+        require(self.symmetry in (None, 2, 3), f"has symmetry {self.symmetry}; 2 and 3 are known, or leave it out")
         require(self.limit >= 1, f"has limit {self.limit}; it must be at least 1")
         most = min(self.limit, 1_000_000)
         require(
@@ -66,7 +66,7 @@ class GenerateTable:
         )
         require(self.sample is None or self.symmetry is None, "has sample and symmetry; only one of them works")
         if self.fixed_moving_links is not None:
-            require(self.symmetry is not None, "gives fixed_moving_links without symmetry; add symmetry = 3")
+            require(self.symmetry == 3, "gives fixed_moving_links without a rotation; add symmetry = 3")
             require(self.fixed_moving_links >= 0, f"has fixed_moving_links {self.fixed_moving_links}; at least 0")
 
 

@@ -129,7 +129,10 @@ def _filtered(context: Context) -> Iterator[MechanismGraph]:
         found = enumerate_mechanisms(spec_of(context), symmetry=options.symmetry)
     fixed = options.fixed_moving_links
     for graph in found:
-        if (fixed is None or threefold_symmetry(graph, fixed)) and (not options.planar or graph.is_planar):
+        symmetric = (
+            mirror_symmetric(graph) if options.symmetry == 2 else fixed is None or threefold_symmetry(graph, fixed)
+        )
+        if symmetric and (not options.planar or graph.is_planar):
             yield graph
 
 
@@ -169,6 +172,17 @@ def assortment_text(graph: MechanismGraph) -> str:
     'n2=3'
     """
     return " ".join(f"n{joints}={count}" for joints, count in sorted(graph.assortment.items()) if count)
+
+
+def mirror_symmetric(graph: MechanismGraph) -> bool:
+    """Whether a mechanism can be its own mirror image, with one driver that turns on the frame."""
+    from graphsynth.kinematics.dimensional.design import Design
+    from graphsynth.kinematics.dimensional.mirror import mirrors
+
+    kinds = tuple("R" if joint.mobility == 1 else "higher" for joint in graph.joints)
+    frame = graph.frame or 0
+    drivers = [(frame, link) for link in range(graph.links) if graph.neighbours[frame] >> link & 1]
+    return any(True for pair in drivers for _ in mirrors(Design(graph, (pair,), kinds)))
 
 
 def threefold_symmetry(graph: MechanismGraph, fixed_moving_links: int) -> tuple[int, ...]:

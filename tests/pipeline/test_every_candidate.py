@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from graphsynth.core.errors import GeometryError, SceneError
+from graphsynth.core.errors import GeometryError, GraphError, SceneError
 from graphsynth.kinematics.dimensional import Goals, embody
 from graphsynth.mechanism.joints import Gear, PinSlot, Revolute
 from graphsynth.mechanism.laws import Driver
@@ -213,6 +213,54 @@ def test_dimensions_keep_the_symmetry_of_the_graph() -> None:
     slots = [joint.angle_a + found.pose[joint.a][2] for joint in found.joints if isinstance(joint, PinSlot)]
     turns = np.exp(2j * np.diff(slots))  # a slot has no sense
     assert len(slots) == 3 and np.abs(turns - turned[0] ** 2).max() < 1e-9
+
+
+#: Two four-bars on one crank.
+TWINS = MechanismGraph(6, [(0, 1), (1, 2), (2, 3), (0, 3), (1, 4), (4, 5), (0, 5)], frame=0)
+MET = MechanismGraph(8, [(0, 1), (0, 4), (0, 5), (1, 2), (1, 3), (2, 4), (2, 6), (3, 5), (3, 7), (6, 7)], frame=0)
+EXCHANGED = {(0, 1): (0, 1), (1, 2): (1, 4), (2, 3): (4, 5), (0, 3): (0, 5)}
+
+
+@pytest.mark.parametrize("joints", [None, {(0, 3): "P", (0, 5): "P"}])
+def test_dimensions_are_their_own_mirror_image(joints: Any) -> None:
+    """At the inputs u and -u all joints, and the directions of slides, are images about one line through the pivot."""
+    found = embody(TWINS, Goals(mirrored=True), joints=joints, tries=4)
+    assert found.accepted and found.mechanism is not None and found.drivers == ((0, 1),)
+    motion = found.mechanism.simulate(np.linspace(0.0, 2.0 * np.pi, 73))
+    at = {}
+    for joint in found.mechanism.joints:
+        link, place = (joint.b, joint.at_b) if joint.kind == "P" else (joint.a, joint.at_a)  # on the slider
+        at[joint.pair] = motion.point(link, place).position @ [1.0, 1.0j]
+    pivot = at[0, 1]
+    twice = ((at[1, 2] - pivot) * (at[1, 4] - pivot))[0]
+    twice /= abs(twice)
+    for one, other in EXCHANGED.items():
+        if joints is None or one != (0, 3):
+            assert np.abs((at[one] - pivot)[::-1] - twice * np.conj(at[other] - pivot)).max() < 1e-8
+    if joints is not None:
+        first, second = (found.mechanism.joint(0, k) for k in (3, 5))
+        assert abs(np.exp(2j * (first.angle_a + second.angle_a)) - twice**2) < 1e-9  # a slide has no sense
+
+
+def test_what_cannot_be_its_own_mirror_image_is_told() -> None:
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    with pytest.raises(GraphError, match="exchange places in pairs; take another graph"):
+        embody(graph, Goals(mirrored=True))
+    with pytest.raises(GeometryError, match="one can be given"):
+        Goals(mirrored=True, symmetry=(0, 1, 2, 3))
+    with pytest.raises(GeometryError, match=r"joint .* has no mirror image of its kind; let it be R"):
+        embody(MET, Goals(mirrored=True), joints={(6, 7): "P"})
+
+
+@pytest.mark.parametrize(("links", "count"), [(6, 1), (8, 3)])
+def test_candidates_are_their_own_mirror_image(links: int, count: int) -> None:
+    """A specification asks for them; the counts are those of `tests/design/task/test_mirror.py`, by brute force."""
+    scene = tables("worked_example")
+    scene["structure"] = {"question": {"W": 1, "links": links, "p2": 0}, "generate": {"symmetry": 2}}
+    scene["mechanism"]["embody"] = {"symmetric": True, "tries": 1, "effort": 0.05}
+    scene["outputs"]["products"] = ["candidates"]
+    candidates = execute(Scene.from_mapping(scene))["candidates"]
+    assert len(candidates) == count
 
 
 @pytest.mark.parametrize(

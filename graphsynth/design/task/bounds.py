@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.design.task.mirror import is_mirrored
 from graphsynth.design.task.plans import Plan
 from graphsynth.design.task.task import DesignTask
+from graphsynth.kinematics.dimensional.mirror import is_mirrored
 from graphsynth.kinematics.dimensional.verify import SLACK, side_lengths
 from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Mechanism

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
 
-from graphsynth.design.task.mirror import Image, images, mirrors
 from graphsynth.design.task.places import Box, Place, Point
 from graphsynth.design.task.targets import LinkTarget, PathTarget
 from graphsynth.design.task.task import DesignTask
 from graphsynth.kinematics.dimensional.design import Design, choices
+from graphsynth.kinematics.dimensional.mirror import Image, images, mirrors
 from graphsynth.structure.assur import decompose, find_fault
 from graphsynth.structure.graph import MechanismGraph
 
@@ -54,7 +54,7 @@ def plans(task: DesignTask, links: int) -> Iterator[Plan]:
 
 def fitting(task: DesignTask, design: Design) -> Iterator[Plan]:
     """Yield the plans of a design: carriers of names and given pivots in every way."""
-    if task.dyads_only and not decompose(design.graph, design.drivers).dyadic:
+    if task.dyads_only and not design.dyadic:
         return
     if task.crank_start is not None and sum(design.kinds[k] == "R" for k in design.joints_of(design.drivers[0][1])) < 2:
         return  # a driven link without a second joint that turns has no direction

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.design.task.mirror import axis_joints, images, reflected
 from graphsynth.design.task.plans import Plan
 from graphsynth.design.task.task import DesignTask
+from graphsynth.kinematics.dimensional.mirror import axis_joints, images, reflected
 
 Array = NDArray[np.float64]
 #: Imaginary step.

@@ -22,6 +22,7 @@ from graphsynth.core.errors import GeometryError, GraphError
 from graphsynth.core.shown import Shown
 from graphsynth.kinematics.dimensional.design import Design, Drivers, choices, joint_kinds
 from graphsynth.kinematics.dimensional.goals import Goals, Target
+from graphsynth.kinematics.dimensional.mirror import mirrors
 from graphsynth.kinematics.dimensional.problem import INCOMPLETE, OUTSIDE, DimensionProblem, dimensioned
 from graphsynth.kinematics.dimensional.refine import refine
 from graphsynth.kinematics.dimensional.verify import Figures, verify
@@ -329,15 +330,34 @@ def embody(
     if seconds != math.inf:
         positive("seconds", seconds)
     positive("effort", effort)
-    order = choices(graph, driver)
+    order = _order(graph, driver, joints, wanted)
     run = _Run(wanted, seed, begin, seconds, effort)
     for attempt in range(tries):
-        inversion, drivers = order[attempt % len(order)]
+        inversion, drivers, image = order[attempt % len(order)]
         kinds = _kinds(graph, inversion, joints)
-        run.start(Design(inversion, drivers, kinds, wanted.symmetry), attempt, attempt // len(order))
+        run.start(Design(inversion, drivers, kinds, image, wanted.mirrored), attempt, attempt // len(order))
         if run.ended:
             break
     return run.result()
+
+
+def _order(
+    graph: MechanismGraph, driver: Drivers | None, joints: Mapping[tuple[int, int], str] | str | None, goals: Goals
+) -> list[tuple[MechanismGraph, tuple[tuple[int, int], ...], tuple[int, ...]]]:
+    """Return frames, drivers and, of a symmetry, images of all links, in the order in which they are tried."""
+    order = [(*own, goals.symmetry) for own in choices(graph, driver)]
+    if goals.mirrored:
+        order = [
+            (own, drivers, image)
+            for own, drivers, _ in order
+            for image in mirrors(Design(own, drivers, _kinds(graph, own, joints)))
+        ]
+    if not order:
+        raise GraphError(
+            "no frame and driver make this graph its own mirror image: all other links have to exchange places in "
+            "pairs; take another graph, such as two four-bars on one crank"
+        )
+    return order
 
 
 def _check(graph: MechanismGraph, goals: Goals) -> None:

@@ -75,13 +75,20 @@ class Design:
 
     A kind is "R", "P", "pin-slot", "cam" (circular, or with a profile) or "gear", in the order of ``graph.joints``.
     ``symmetry``, if any, is the image of every link under an automorphism that keeps the frame: at the first input the
-    mechanism has it too.  Cams with a profile have the mean radius 1: it is the rest that is larger or smaller.
+    mechanism has it too, as a rotation or, if ``mirrored``, a reflection.  Cams with a profile have the mean radius 1:
+    it is the rest that is larger or smaller.
     """
 
     graph: MechanismGraph
     drivers: tuple[tuple[int, int], ...]
     kinds: tuple[str, ...]
     symmetry: tuple[int, ...] = ()
+    mirrored: bool = False
+
+    @cached_property
+    def dyadic(self) -> bool:
+        """Whether no structural group is larger than a dyad."""
+        return decompose(self.graph, self.drivers).dyadic
 
     @cached_property
     def numbers(self) -> tuple[tuple[int, str], ...]:

@@ -215,6 +215,9 @@ class Goals:
     symmetry : sequence of int, optional
         Image of every link under an automorphism that keeps the frame: at the first input a rotation carries the
         mechanism into itself so.  Without a target.
+    mirrored : bool
+        The mechanism is its own mirror image at the first input, and moves as its mirror image when the driver turns
+        back: all links but the frame and the driven one exchange places in pairs.  Without a target.
     rates : sequence of float, optional
         Rate of every driver over the input, in their order; 1 by default.  Whole numbers for a full turn.
 
@@ -229,6 +232,7 @@ class Goals:
     max_length_ratio: float = 6.0
     target: Target | None = None
     symmetry: tuple[int, ...] = ()
+    mirrored: bool = False
     rates: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -237,8 +241,8 @@ class Goals:
         if 0.0 in self.rates or (self.full_turn and any(rate % 1.0 for rate in self.rates)):
             raise GeometryError(f"rates = {self.rates} must not be 0, and whole numbers if the input is a full turn")
         object.__setattr__(self, "symmetry", _listed("symmetry", self.symmetry))
-        if self.symmetry and self.target is not None:
-            raise GeometryError("symmetry is given with a target; leave out one of them")
+        if bool(self.symmetry) + self.mirrored + (self.target is not None) > 1:
+            raise GeometryError("of symmetry, mirrored and a target one can be given; leave out the others")
         if not 0.0 <= finite("min_transmission_angle", self.min_transmission_angle) < 0.5 * math.pi:
             raise GeometryError(
                 f"min_transmission_angle = {self.min_transmission_angle} must lie in [0, pi/2); give radians"

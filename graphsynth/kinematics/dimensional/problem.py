@@ -24,6 +24,7 @@ from graphsynth.kinematics.dimensional.goals import (
     target_link,
 )
 from graphsynth.kinematics.dimensional.matching import MovingLink, at_times, matched
+from graphsynth.kinematics.dimensional.mirror import axis_joints, kept
 from graphsynth.kinematics.dimensional.sketch import layout
 from graphsynth.kinematics.dimensional.verify import group_forms, transmission_sines
 from graphsynth.kinematics.engine.batch import simulate_batch
@@ -88,7 +89,9 @@ class DimensionProblem:
             self.fit = PathFit(goals.target)
         self.link = target_link(design, goals.target) if goals.target is not None else -1
         self.ends = [(joint.a, joint.b) for joint in design.graph.joints]
-        images = [k for orbit in design.orbits for k in (orbit[1:] or orbit)]
+        images = [k for orbit in design.orbits for k in (orbit[1:] or orbit[design.mirrored :])]
+        if design.mirrored:  # the image of the crank's pin tells the axis
+            images.remove(axis_joints(design, design.symmetry)[2])
         self.free = np.setdiff1d(np.arange(len(self.ends)), [*design.held, *design.centres, *images])
         self.extras = 0 if self.fit is None else len(self.fit.ranges)
         self.size = 2 * len(self.free) + len(design.numbers) + self.extras
@@ -96,7 +99,7 @@ class DimensionProblem:
             self.sketch = self._sketch(random)
             angles = random.uniform(0.0, math.pi, len(design.numbers))
             numbers = np.where([name != "size" for _, name in design.numbers], angles, 0.0)
-            self.numbers = design.symmetric(self.sketch[None], numbers[None])[1][0]
+            self.numbers = kept(design, self.sketch[None], numbers[None])[1][0]
         else:
             self.sketch, self.numbers = begin
         base = design.mechanism(self.sketch, self.numbers)
@@ -133,7 +136,7 @@ class DimensionProblem:
         places = layout(self.design.graph).positions.copy()
         places += random.normal(0.0, 0.12, places.shape)
         places = self.design.with_cranks(places[None], np.full((len(self.design.cranks), 1), 0.3))
-        found, _ = self.design.symmetric(places, np.zeros((1, len(self.design.numbers))))
+        found, _ = kept(self.design, places, np.zeros((1, len(self.design.numbers))))
         return np.asarray(found[0])
 
     # --- from vectors to motions
@@ -143,7 +146,7 @@ class DimensionProblem:
         count, numbers = 2 * len(self.free), len(self.design.numbers)
         places = np.repeat(self.sketch[None], len(X), axis=0)
         places[:, self.free] = X[:, :count].reshape(len(X), -1, 2)
-        return *self.design.symmetric(places, X[:, count : count + numbers]), X[:, count + numbers :]
+        return *kept(self.design, places, X[:, count : count + numbers]), X[:, count + numbers :]
 
     def bounds(self) -> Array:
         """Box of the search, shape (size, 2)."""

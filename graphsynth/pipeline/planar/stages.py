@@ -101,7 +101,7 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
     from graphsynth.kinematics.dimensional.api import embody as search
 
     own = table.embody
-    goals = replace(goals_of(own), symmetry=_symmetry(context, design.graph) if own.symmetric else ())
+    goals = replace(goals_of(own), **_symmetry(context, design.graph) if own.symmetric else {})
     seed = context.scene.scene.seed
     found = search(design.graph, goals, seed, joints=own.pairs, tries=own.tries, effort=own.effort)
     if not found.accepted or found.mechanism is None or found.figures is None:
@@ -123,16 +123,18 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
     return Built(f"No. {design.number}", mechanism, tuple(margins))
 
 
-def _symmetry(context: Context, graph: MechanismGraph) -> tuple[int, ...]:
-    """Return the automorphism that ``[structure.generate]`` asks for, if any."""
+def _symmetry(context: Context, graph: MechanismGraph) -> dict[str, Any]:
+    """Return the goals of what ``[structure.generate]`` asks for, if any: a rotation or mirror images."""
     from graphsynth.pipeline.steps import threefold_symmetry
 
     table = context.scene.structure
     if table is None or table.generate.symmetry is None:
-        return ()
+        return {}
+    if table.generate.symmetry == 2:
+        return {"mirrored": True}
     fixed = table.generate.fixed_moving_links
     every = range(graph.links) if fixed is None else (fixed,)
-    return next(filter(None, (threefold_symmetry(graph, count) for count in every)), ())
+    return {"symmetry": next(filter(None, (threefold_symmetry(graph, count) for count in every)), ())}
 
 
 def goals_of(table: EmbodyTable) -> Goals:

@@ -11,7 +11,7 @@ import pytest
 import graphsynth as gs
 from graphsynth.core.errors import GeometryError
 from graphsynth.design import DesignTask, PathTarget, SwingTarget, design
-from graphsynth.design.task.mirror import mirrors
+from graphsynth.kinematics.dimensional.mirror import mirrors
 from graphsynth.design.task.model import Model
 from graphsynth.design.task.plans import plans
 from graphsynth.design.task.starts import random_starts

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.dimensional.design import Design
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ _SAME = 1e-6
 def mirrors(design: Design) -> Iterator[Image]:
     """Yield images of all links under automorphisms that exchange them in pairs, all but the frame and the driven one.
 
+    There are none for other drivers than one that turns on the frame.
+
     >>> from graphsynth.structure.graph import MechanismGraph
     >>> watt = MechanismGraph(6, [(0, 1), (1, 2), (2, 3), (0, 3), (1, 4), (4, 5), (0, 5)], frame=0)
     >>> list(mirrors(Design(watt, ((0, 1),), ("R",) * 7)))
@@ -33,6 +36,8 @@ def mirrors(design: Design) -> Iterator[Image]:
     """
     kinds = {frozenset(joint[:2]): kind for joint, kind in zip(design.graph.joints, design.kinds, strict=True)}
     still = {*design.drivers[0]}
+    if len(design.drivers) > 1 or design.graph.frame not in still or kinds[frozenset(still)] != "R":
+        return
 
     def paired(left: tuple[int, ...], image: dict[int, int]) -> Iterator[dict[int, int]]:
         if not left:
@@ -68,6 +73,29 @@ def reflected(place: Any, pivot: Any, pin: Any, image: Any) -> Any:
     across = np.stack([-turn[..., 1], turn[..., 0]], axis=-1)
     flipped = v * np.array([1.0, -1.0])  # turned by twice the direction of the axis
     return pivot + flipped[..., :1] * turn + flipped[..., 1:] * across
+
+
+def kept(design: Design, places: Array, numbers: Array) -> tuple[Array, Array]:
+    """Return places (sets, joints, 2) and numbers with the symmetry of a design, if it has any.
+
+    Of two mirror images one is kept, and joints on the axis lie there.  `GeometryError` for kinds without an image: of
+    mobility 2, or a slide on the axis.
+    """
+    if not design.mirrored:
+        return design.symmetric(places, numbers)
+    at = [places[:, k] for k in axis_joints(design, design.symmetry)]
+    (a, b, c), places, numbers = (z @ [1.0, 1.0j] for z in at), places.copy(), numbers.copy()
+    twice = np.angle((b - a) * (c - a))  # direction of the axis
+    for orbit in design.orbits:
+        k, image = orbit[0], orbit[-1]
+        if design.kinds[k] not in ("R", "P") or (k == image and design.kinds[k] == "P"):
+            raise GeometryError(f"joint {design.graph.joints[k][:2]} has no mirror image of its kind; let it be R")
+        other = reflected(places[:, k], *at)
+        places[:, image] = other if image != k else 0.5 * (other + places[:, k])
+        if design.kinds[k] == "P":
+            own, its = (design.numbers.index((joint, "angle")) for joint in (k, image))
+            numbers[:, its] = twice - numbers[:, own]
+    return places, numbers
 
 
 def is_mirrored(motion: Motion, places: Array, design: Design, mirror: Image) -> bool:
