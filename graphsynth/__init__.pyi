@@ -85,6 +85,7 @@ from .synthesis.sliders import (
     count_slider_chains as count_slider_chains,
     enumerate_slider_chains as enumerate_slider_chains,
 )
+from .synthesis.wishes import Wishes as Wishes
 from .systems.antenna.mechanism import PointingMechanism as PointingMechanism
 from .systems.lambda_linkage.model import LambdaLinkage as LambdaLinkage
 from .systems.piston.machine import PistonMachine as PistonMachine

@@ -52,6 +52,13 @@ _WORK = (
     _option("--gear-trains", "planetary gear trains of one freedom"),
     _option("--rotation-graphs", "of gear trains: one of each rotation graph"),
     _option("--symmetry P", "require an automorphism of prime order P", int),
+    _option("--girth G", "only chains whose loops have G joints or more", int),
+    _option("--jointed A-B", "with a joint between links of A and B joints (or frame)", action="append", metavar="A-B"),
+    _option("--apart A-B", "without a joint between such links", action="append", metavar="A-B"),
+    _option("--contains TEXT", "that hold this graph (text form)", action="append", metavar="TEXT"),
+    _option("--without TEXT", "that do not hold it", action="append", metavar="TEXT"),
+    _option("--planar YES|NO", "planar graphs, or those that are not", choices=("yes", "no")),
+    _option("--mobility-type T", "total, partial or fractionated", str),
     _SHARD,
     _WORKERS,
 )

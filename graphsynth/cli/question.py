@@ -11,6 +11,7 @@ from graphsynth.core.errors import SpecError
 if TYPE_CHECKING:
     from graphsynth.structure.system.spec import StructuralSpec
     from graphsynth.synthesis.problem import EnumerationProblem
+    from graphsynth.synthesis.wishes import Wishes
 
 _VARIABLES = {
     "mobility": ("W", "mobility"),
@@ -63,6 +64,30 @@ def spec_of(options: argparse.Namespace) -> StructuralSpec:
 
 def problem_of(options: argparse.Namespace, *, counted: bool = False) -> EnumerationProblem:
     """Return what ``count`` and ``enumerate`` are asked to do."""
+    wishes = _wishes(options)
+    return _problem(options, counted=counted and wishes is None).wishing(wishes)
+
+
+def _wishes(options: argparse.Namespace) -> Wishes | None:
+    """Return what chains are to be like as a whole, None for anything."""
+    names = ("girth", "jointed", "apart", "contains", "without", "planar", "mobility_type")
+    given = {name: value for name in names if (value := getattr(options, name)) is not None}
+    if not given:
+        return None
+    from graphsynth.structure.graph import MechanismGraph
+    from graphsynth.synthesis.wishes import Wishes
+
+    for name in {"jointed", "apart"} & set(given):
+        pairs = [text.split("-") for text in given[name]]
+        given[name] = [[int(role) if role.isdecimal() else role for role in pair] for pair in pairs]
+    for name in {"contains", "without"} & set(given):
+        given[name] = [MechanismGraph.from_text(text) for text in given[name]]
+    if "planar" in given:
+        given["planar"] = given["planar"] == "yes"
+    return Wishes(**given)
+
+
+def _problem(options: argparse.Namespace, *, counted: bool) -> EnumerationProblem:
     from graphsynth.synthesis.problem import EnumerationProblem
 
     given = _given(options)

@@ -10,10 +10,12 @@ from __future__ import annotations
 from base64 import urlsafe_b64decode, urlsafe_b64encode
 from binascii import Error as Base64Error
 from dataclasses import dataclass
+from itertools import combinations
 from math import prod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from graphsynth.core.errors import FormatError
+from graphsynth.core.wording import whole
 from graphsynth.structure.connectivity import bits, breadth_first
 from graphsynth.structure.search import CanonicalSearch, find_root, join_images
 from graphsynth.structure.text import LINKS_MAX, pairs_of
@@ -115,6 +117,37 @@ def joint_orbits(graph: MechanismGraph) -> tuple[tuple[Joint, ...], ...]:
     for place, joint in enumerate(graph.joints):
         orbits.setdefault(find_root(parent, place), []).append(joint)
     return tuple(tuple(orbit) for orbit in orbits.values())
+
+
+class Roles(NamedTuple):
+    """Roles of the links of a mechanism beside the frame."""
+
+    drivers: tuple[int, ...]  # links driven at their joint with the frame, ascending
+    outputs: tuple[int, ...]  # other links, ascending
+
+
+def roles(graph: MechanismGraph, drivers: int = 1, outputs: int = 1) -> tuple[Roles, ...]:
+    """Return the choices of so many drivers and outputs, one from each orbit under the automorphism group (exact).
+
+    Raises `GraphError` without a frame, `SpecError` for numbers below 0.
+
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> roles(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0))
+    (Roles(drivers=(1,), outputs=(2,)), Roles(drivers=(1,), outputs=(3,)))
+    """
+    near = [link for level in graph.levels[1:2] for link in level]
+    moving = [link for link in range(graph.links) if link != graph.frame]
+    choices = [
+        Roles(driven, others)
+        for driven in combinations(near, whole(drivers, "drivers", 0))
+        for others in combinations([link for link in moving if link not in driven], whole(outputs, "outputs", 0))
+    ]
+    number = {choice: place for place, choice in enumerate(choices)}
+    parent = list(range(len(number)))
+    for image in graph.labelling.generators:
+        moved = (Roles(*(tuple(sorted(image[link] for link in part)) for part in choice)) for choice in number)
+        join_images(parent, [number[choice] for choice in moved])
+    return tuple(choice for choice, place in number.items() if find_root(parent, place) == place)
 
 
 def key(graph: MechanismGraph) -> str:

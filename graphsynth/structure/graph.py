@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import graphsynth as gs
-    from graphsynth.structure.canonical import Labelling
+    from graphsynth.structure.canonical import Labelling, Roles
     from graphsynth.structure.rigidity import GenericMobility, RigidSubchain
 
 _T = TypeVar("_T")
@@ -255,6 +255,15 @@ class MechanismGraph:
         from graphsynth.structure.canonical import joint_orbits
 
         return self._lazy("joint_orbits", joint_orbits)
+
+    def roles(self, drivers: int = 1, outputs: int = 1) -> tuple[Roles, ...]:
+        """Return the choices of driven links on the frame and of output links, one from each orbit (exact).
+
+        See :func:`graphsynth.structure.canonical.roles`.
+        """
+        from graphsynth.structure.canonical import roles
+
+        return roles(self, drivers, outputs)
 
     def canonical(self) -> MechanismGraph:
         """Return the canonical representative of the isomorphism class; the frame, if any, becomes link 0.

@@ -18,3 +18,4 @@ from .multiple_joints import (
     enumerate_multiple_joint_chains as enumerate_multiple_joint_chains,
 )
 from .sliders import count_slider_chains as count_slider_chains, enumerate_slider_chains as enumerate_slider_chains
+from .wishes import Wishes as Wishes

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
     from graphsynth.structure.system.assortment import LinkAssortment
     from graphsynth.structure.system.spec import StructuralSpec
+    from graphsynth.synthesis.wishes import Wishes
 
 #: Graphs shown in a notebook.
 _SHOWN = 12
@@ -79,6 +80,7 @@ def enumerate_chains(
     joints_by_mobility: Mapping[int, int] | None = None,
     fractionated: bool = False,
     symmetry: int | None = None,
+    wishes: Wishes | None = None,
     executor: Executor | None = None,
 ) -> Graphs:
     """Enumerate kinematic chains: every one, each once up to isomorphism, none with a rigid sub-chain (exact).
@@ -97,6 +99,8 @@ def enumerate_chains(
         For W >= 2: include chains that one link or joint holds together.
     symmetry : int, optional
         Only chains with an automorphism of this prime order.
+    wishes : Wishes, optional
+        What the chains are to be like as a whole: girth, links side by side, sub-graphs, planarity, type of mobility.
     executor : concurrent.futures.Executor, optional
         Who does the work; the result is the same for any.  Default: this process.
 
@@ -122,7 +126,7 @@ def enumerate_chains(
     ['Er`G', 'E]`G']
     """
     problem = EnumerationProblem.chains(links, mobility, space, joints_by_mobility, fractionated, symmetry)
-    return _list(f"chains of {links} links, mobility {mobility}", problem, executor)
+    return _list(f"chains of {links} links, mobility {mobility}", problem.wishing(wishes), executor)
 
 
 def count_chains(
@@ -133,14 +137,15 @@ def count_chains(
     joints_by_mobility: Mapping[int, int] | None = None,
     fractionated: bool = False,
     symmetry: int | None = None,
+    wishes: Wishes | None = None,
     executor: Executor | None = None,
 ) -> int:
     """Count what ``enumerate_chains`` yields, without making the graphs (exact).
 
     Parameters
     ----------
-    links, mobility, space, joints_by_mobility, fractionated, symmetry, executor
-        As for `enumerate_chains`.
+    links, mobility, space, joints_by_mobility, fractionated, symmetry, wishes, executor
+        As for `enumerate_chains`; chains with wishes that the search does not take over are made and counted.
 
     Returns
     -------
@@ -157,11 +162,15 @@ def count_chains(
     [1, 2, 16, 230, 6856, 318162]
     """
     asked = links, mobility, space, joints_by_mobility, fractionated, symmetry
-    return counted(EnumerationProblem.chains(*asked, counted=True), executor)
+    return counted(EnumerationProblem.chains(*asked, counted=wishes is None).wishing(wishes), executor)
 
 
 def enumerate_mechanisms(
-    spec: StructuralSpec | LinkAssortment, *, symmetry: int | None = None, executor: Executor | None = None
+    spec: StructuralSpec | LinkAssortment,
+    *,
+    symmetry: int | None = None,
+    wishes: Wishes | None = None,
+    executor: Executor | None = None,
 ) -> Graphs:
     """Enumerate the mechanisms that answer a structural question: every one, each once (exact).
 
@@ -171,6 +180,8 @@ def enumerate_mechanisms(
         The question, or one of its integer solutions.
     symmetry : int, optional
         Only mechanisms with an automorphism of this prime order (the frame stays where it is).
+    wishes : Wishes, optional
+        What the mechanisms are to be like as a whole, as for `enumerate_chains`.
     executor : concurrent.futures.Executor, optional
         Who does the work; the result is the same for any.  Default: this process.
 
@@ -190,19 +201,25 @@ def enumerate_mechanisms(
     >>> sum(1 for _ in enumerate_mechanisms(StructuralSpec(W=1, links=8)))
     71
     """
-    return _list("mechanisms that answer the question", EnumerationProblem.mechanisms(spec, symmetry), executor)
+    problem = EnumerationProblem.mechanisms(spec, symmetry).wishing(wishes)
+    return _list("mechanisms that answer the question", problem, executor)
 
 
 def count_mechanisms(
-    spec: StructuralSpec | LinkAssortment, *, symmetry: int | None = None, executor: Executor | None = None
+    spec: StructuralSpec | LinkAssortment,
+    *,
+    symmetry: int | None = None,
+    wishes: Wishes | None = None,
+    executor: Executor | None = None,
 ) -> int:
     """Count what ``enumerate_mechanisms`` yields, without making the graphs (exact).
 
-    With a required symmetry, or wanted sizes of levels, the mechanisms are made and counted.
+    With a required symmetry, wanted sizes of levels, or wishes that the search does not take over, the mechanisms are
+    made and counted.
 
     Parameters
     ----------
-    spec, symmetry, executor
+    spec, symmetry, wishes, executor
         As for `enumerate_mechanisms`.
 
     Returns
@@ -215,7 +232,7 @@ def count_mechanisms(
     >>> count_mechanisms(StructuralSpec(W=1, Pi=3, v_ct=6, p=22, p2=3, n=14, t0=7, n4=4))
     9663907
     """
-    return counted(EnumerationProblem.mechanisms(spec, symmetry), executor)
+    return counted(EnumerationProblem.mechanisms(spec, symmetry).wishing(wishes), executor)
 
 
 def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) -> list[MechanismGraph]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from math import ceil
 from typing import TYPE_CHECKING
@@ -20,6 +20,7 @@ from graphsynth.synthesis.kernels.layout import HEADER, Work, make_work
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
     from graphsynth.synthesis.kernels.expanding import Expansion
+    from graphsynth.synthesis.wishes import Wishes
 
 LISTING_SIZE = 200_000.0  # bound on the labellings of a chunk to list, before sparsity and symmetry
 COUNTING_SIZE = 512  # contracted graphs in a chunk to count
@@ -40,9 +41,12 @@ class Chunk:
     parts: int = 1
     symmetry: int = 0
     weight: float = 1.0
+    wishes: Wishes | None = field(default=None, repr=False)
 
     def count(self) -> int:
         """Count the chains (exact)."""
+        if self.wishes:
+            return sum(1 for _ in self.graphs())
         if self.symmetry or self.family.levels:
             return sum(len(block) for block in self.packed())
         return sum(map(int, count_each(self.family, self.start, self.stop)))
@@ -69,7 +73,9 @@ class Chunk:
         for block in self.packed():
             data = block.tobytes()
             for at in range(0, len(data), size):
-                yield make(links, data[at : at + size], frame, space)
+                graph = make(links, data[at : at + size], frame, space)
+                if self.wishes is None or self.wishes.fit(graph, self.family.higher):
+                    yield graph
 
     def texts(self) -> Iterator[tuple[bytes, int]]:
         """Stream the chains as (lines of the text form, number of lines)."""
@@ -79,8 +85,10 @@ class Chunk:
         if family.pins:
             yield from ((f"{graph.to_text()} m{family.pins}\n".encode(), 1) for graph in self.graphs())
             return
-        if family.links > _ONE_BYTE:
-            yield from ((f"{graph.to_text()}\n".encode(), 1) for graph in self.graphs())
+        slides = SLIDER in dict(family.higher)
+        if family.links > _ONE_BYTE or self.wishes:
+            lines = (f"{graph.to_text()}\n".encode() for graph in self.graphs())
+            yield from ((line.replace(b" 2:", b" P:") if slides else line, 1) for line in lines)
             return
         form = family.space, max((i for i, _ in family.higher), default=1)
         line = 16 + family.links * family.links // 12 + 8 * sum(count for _, count in family.higher) + 4 * form[1]
@@ -89,7 +97,7 @@ class Chunk:
         for rows, count in self._blocks():
             size, kept = expand_text(family.vertices, family.links, family.graphs, rows, count, expansion, *form, out)
             text = out[:size].tobytes()
-            yield text.replace(b" 2:", b" P:") if SLIDER in dict(family.higher) else text, kept
+            yield text.replace(b" 2:", b" P:") if slides else text, kept
 
     def _blocks(self) -> Iterator[tuple[NDArray[np.int32], int]]:
         """Stream the labellings as (rows, count); the rows are overwritten by the next step."""

@@ -22,7 +22,9 @@ from graphsynth.core.errors import TooLargeError
 from graphsynth.synthesis.kernels.layout import (
     BETWEEN_LINKS,
     COPIES_MASK,
+    GIRTH,
     KIND_SHIFT,
+    LONGEST,
     LOOSE,
     NO_SLIDING_LINK,
     NO_SLIDING_LOOP,
@@ -68,8 +70,11 @@ class EdgeLabel:
             return EdgeLabel((paths[0], *sorted(paths[1:])), len(paths[0]) - self.mark)
         return EdgeLabel(tuple(sorted(paths)), 0)
 
-    def cover(self) -> int:
-        """Return which revolute joints the label gives: see ``graphsynth.synthesis.kernels.covers``."""
+    def cover(self, rules: int) -> int:
+        """Return what the label gives to links and loops: see ``graphsynth.synthesis.kernels.covers``."""
+        if rules >> GIRTH:
+            shortest = min(map(len, self.paths))
+            return (shortest == 1) + 4 * min(LONGEST, shortest)
         low, high = (any(path[end] != SLIDER for path in self.paths) for end in (0, -1))
         fewest = min(len(path) - path.count(SLIDER) for path in self.paths)
         return low + 2 * high + 4 * min(2, fewest)
@@ -92,7 +97,7 @@ class EdgeLabels:
     #: the two end vertices are the whole contracted graph (only then may a Baranov truss have weight Pi there)
     whole: bool
     pins: bool = False  # some vertices are multiple joints
-    rules: int = 0  # of prismatic joints: NO_SLIDING_LINK + NO_SLIDING_LOOP + CYLINDERS
+    rules: int = 0  # of prismatic joints: NO_SLIDING_LINK + NO_SLIDING_LOOP + CYLINDERS; or wishes, from GIRTH on
 
     @property
     def _lend(self) -> int:
@@ -160,8 +165,14 @@ class EdgeLabels:
         weight = sum(self.space - freedom(path) for path in stiff)
         return one or (weight <= self.space - 1 - shortest and (ends == TO_PIN or bool(stiff)))
 
+    @property
+    def _girth(self) -> int:
+        return self.rules >> GIRTH & LONGEST
+
     def _turns(self, paths: tuple[PathType, ...]) -> bool:
-        """Tell whether every loop of two of the paths has two revolute joints, if it has to."""
+        """Tell whether every loop of two of the paths has two revolute joints, if it has to, or is long enough."""
+        if len(paths) > 1 and sum(sorted(map(len, paths))[:2]) < self._girth:
+            return False
         fewest = sorted(len(path) - path.count(SLIDER) for path in paths)[:2]
         return not self.rules & NO_SLIDING_LOOP or len(paths) == 1 or sum(fewest) >= 2
 
@@ -269,7 +280,7 @@ class EdgeLabels:
             cost = self.cost(label)
             packed = sum(c << shift for c, shift in zip(cost, shifts))
             alike.append((self.weight(label), sum(c * step for c, step in zip(cost, steps)), packed))
-            covers.append(label.cover() if self.rules else 0)
+            covers.append(label.cover(self.rules) if self.rules else 0)
         reverse: list[int] = []
         kinds, group_kinds = [], []
         groups: list[tuple[int, ...]] = []
@@ -303,7 +314,7 @@ class EdgeLabels:
             target=np.int64(self.resources - 1),
             guard=np.int64(sum(0x80 << shift for shift in shifts)),
             rules=np.int64(self.rules),
-            sliders=np.int64(dict(self.higher).get(SLIDER, 0)),
+            sliders=np.int64(max(self._girth - 2, dict(self.higher).get(SLIDER, 0))),
         )
 
 

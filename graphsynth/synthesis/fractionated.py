@@ -38,6 +38,7 @@ from graphsynth.synthesis.families import Levels, chain_families, chain_joints, 
 
 if TYPE_CHECKING:
     from graphsynth.structure.system.assortment import LinkAssortment
+    from graphsynth.synthesis.wishes import Wishes
 
 Higher = tuple[tuple[int, int], ...]
 Exponents = tuple[int, ...]
@@ -64,13 +65,14 @@ class OneByOne:
     symmetry: int = 0
     weight: float = 1.0
     rules: int = field(default=0, repr=False)  # of prismatic joints, which are among ``higher``
+    wishes: Wishes | None = field(default=None, repr=False)
 
     def graphs(self) -> Iterator[MechanismGraph]:
         """Yield the graphs."""
         for graph in self._all():
             if self.symmetry and graph.automorphism_order % self.symmetry:  # Cauchy: p divides the order of the group
                 continue
-            if self._fits(graph):
+            if self._fits(graph) and (self.wishes is None or self.wishes.fit(graph, self.higher)):
                 yield graph
 
     def texts(self) -> Iterator[tuple[bytes, int]]:
@@ -84,7 +86,7 @@ class OneByOne:
     @property
     def restricted(self) -> bool:
         """Whether only some of the chains are wanted."""
-        return bool(self.assortment or self.levels or self.symmetry)
+        return bool(self.assortment or self.levels or self.symmetry or self.wishes)
 
     def count(self) -> int:
         """Count the graphs; fractionated chains without any restriction are not made."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
 from hashlib import sha256
@@ -34,6 +34,7 @@ from graphsynth.synthesis.fractionated import OneByOne
 from graphsynth.synthesis.geared_trees import MOST_LINKS as MOST_GEARED, GearedTrees, geared_trees
 from graphsynth.synthesis.kernels.layout import NO_SLIDING_LINK, NO_SLIDING_LOOP
 from graphsynth.synthesis.totals import Total, is_counted_together, totals_of
+from graphsynth.synthesis.wishes import Wishes
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
@@ -61,6 +62,7 @@ class EnumerationProblem:
     symmetry: int = 0  # 0, or the prime order of a required automorphism
     #: why there is nothing, where the structural formula says so already
     reason: str = field(default="", repr=False, compare=False)
+    wishes: Wishes | None = field(default=None, repr=False)  # those that the search does not take over
 
     @property
     def signature(self) -> str:
@@ -70,13 +72,33 @@ class EnumerationProblem:
 
     def work_items(self, *, listing: bool) -> list[WorkItem]:
         """Cut the problem; the cut depends on the problem alone."""
-        listing = listing or bool(self.symmetry) or any(family.levels for family in self.families)
+        listing = listing or bool(self.symmetry or self.wishes) or any(family.levels for family in self.families)
         return list(_work_items(self, listing))
 
     def parts(self) -> Sequence[WorkItem | Total]:
         """Cut the problem to count it as a whole; where chains are many, the counts of the parts are fractions."""
-        totals = None if self.symmetry else totals_of(self.families)
+        totals = None if self.symmetry or self.wishes else totals_of(self.families)
         return self.work_items(listing=False) if totals is None else [*self.one_by_one, *totals]
+
+    def wishing(self, wishes: Wishes | None) -> EnumerationProblem:
+        """Return the problem of those that are as wished.
+
+        Raises `SpecError` for what are no wishes, or chains that can have none.
+        """
+        if wishes is None:
+            return self
+        if not isinstance(wishes, Wishes):
+            raise SpecError(f"wishes = {shown(wishes)} must be Wishes")
+        if any(family.pins for family in self.families) or any(isinstance(i, GearedTrees) for i in self.one_by_one):
+            raise SpecError(f"{self.title}: wishes are for chains with simple joints: list these, and choose")
+        slides = any(family.rules for family in self.families)
+        return replace(
+            self,
+            title=f"{self.title} {wishes}".strip(),
+            families=tuple(replace(family, rules=family.rules or wishes.rules) for family in self.families),
+            one_by_one=tuple(replace(item, wishes=wishes) for item in self.one_by_one if isinstance(item, OneByOne)),
+            wishes=None if wishes.is_searched and not slides else wishes,
+        )
 
     @classmethod
     def chains(
@@ -248,7 +270,10 @@ class EnumerationProblem:
 
 @lru_cache(maxsize=4)
 def _work_items(problem: EnumerationProblem, listing: bool) -> tuple[WorkItem, ...]:
-    return (*problem.one_by_one, *cut(problem.families, listing=listing, symmetry=problem.symmetry))
+    chunks = cut(problem.families, listing=listing, symmetry=problem.symmetry)
+    if problem.wishes:
+        chunks = [replace(chunk, wishes=problem.wishes) for chunk in chunks]
+    return (*problem.one_by_one, *chunks)
 
 
 def check_loops(loops: int, links: int, mobility: int, space: int, higher: Mapping[int, int], *, framed: bool) -> None:

@@ -1,9 +1,10 @@
-"""What prismatic joints may not take: a link needs a revolute joint, a loop two of them.
+"""What links and loops need: revolute joints beside prismatic ones; or a loop its length, links to be jointed or not.
 
-Needs of vertices and of cycles of the contracted graph stand behind those of critical sets, a byte each, and start with
-a word of their own.  A label gives to the two ends of its class, and to the cycles through it, by its *cover*: 1 if a
-path has a revolute joint at the lower end, 2 at the higher end, and 4 times the fewest revolute joints of a path, 2 at
-most.
+Needs of vertices, of cycles and of sets of classes of the contracted graph stand behind those of critical sets, a byte
+each, and start with a word of their own.  A label gives to the two ends of its class, and to the cycles through it, by
+its *cover*: 1 if a path has a revolute joint at the lower end, 2 at the higher end, and 4 times the fewest revolute
+joints of a path, 2 at most.  Without prismatic joints it is 1 if a path is a single joint, and 4 times the joints of
+the shortest path, 15 at most.
 """
 
 from __future__ import annotations
@@ -13,29 +14,55 @@ import numpy as np
 from graphsynth.synthesis.kernels import layout as lay
 from graphsynth.synthesis.kernels.layout import inner
 
-PLAIN, LAID = 19, 20  # in work.state: words of the needs of critical sets; classes of the graph
+# in work.state: words of the needs of critical sets; classes of the graph; covers that labels have
+PLAIN, LAID, LAID_COVERS = 19, 20, 21
 
 
 @inner
 def covered_sets(k, mult, sets, tables, work):
-    """Add the vertices and cycles that prismatic joints could take; return the number of sets, -1 without room."""
+    """Add the vertices, cycles and pairs of links that need something; return the number of sets, -1 without room."""
+    girth = (tables.rules >> lay.GIRTH) & lay.LONGEST
+    pairs = tables.rules >> lay.PAIRS
+    work.state[LAID_COVERS] = lay.COVERS if girth or pairs else lay.SLIDING_COVERS
     count = 8 * work.state[PLAIN]
     for s in range(sets, min(count, work.sets.shape[1])):  # the word is filled with sets that need nothing
         work.sets[lay.MASK, s] = 0
         work.sets[lay.NEED, s] = 0
     if tables.rules & lay.NO_SLIDING_LINK:
         for v in range(k):
-            joints = 0
-            for w in range(k):
-                if w != v:
-                    joints += mult[v, w] & lay.COPIES_MASK
-            if joints <= tables.sliders and mult[v, v] == 0:
+            if _joints_at(k, mult, v) <= tables.sliders and mult[v, v] == 0:
                 count = _add(count, 1, v, np.int64(0), work)
                 if count < 0:
                     return np.int64(-1)
-    if tables.rules & lay.NO_SLIDING_LOOP:
-        return _add_cycles(k, mult, count, tables, work)
+    while pairs:
+        count = _add_pair(k, mult, count, pairs & 15, (pairs >> 4) & 15, (pairs >> 8) & 1, work)
+        pairs >>= lay.PAIR
+    if tables.rules & lay.NO_SLIDING_LOOP or girth:
+        return _add_cycles(k, mult, count, max(np.int64(2), girth), tables.sliders, work)
     return count
+
+
+@inner
+def _joints_at(k, mult, v):
+    joints = np.int64(0)
+    for w in range(k):
+        if w != v:
+            joints += mult[v, w] & lay.COPIES_MASK
+    return joints
+
+
+@inner
+def _add_pair(k, mult, count, one, other, apart, work):
+    """Add the classes between links with these numbers of joints: one is to have a single joint, or all of them not."""
+    between = np.int64(0)
+    classes = np.int64(0)
+    for e in range(work.state[LAID]):
+        a = _joints_at(k, mult, work.classes[lay.U, e])
+        b = _joints_at(k, mult, work.classes[lay.V, e])
+        if (a == one and b == other) or (a == other and b == one):
+            between |= np.int64(1) << e
+            classes += 1
+    return _add(count, classes if apart else np.int64(1), lay.APART if apart else lay.JOINTED, between, work)
 
 
 @inner
@@ -50,8 +77,8 @@ def _add(count, need, vertex, cycle, work):
 
 
 @inner
-def _add_cycles(k, mult, count, tables, work):
-    """Add the cycles of one class more than there are prismatic joints at most: longer ones have two others anyway."""
+def _add_cycles(k, mult, count, need, longest, work):
+    """Add the cycles of ``longest`` classes and one more: larger ones have anyway what they need."""
     path = np.empty(k + 1, np.int64)
     following = np.empty(k + 1, np.int64)
     for first in range(k):  # the lowest vertex of the cycle
@@ -64,7 +91,7 @@ def _add_cycles(k, mult, count, tables, work):
             w = following[depth]
             while w < k and (used >> w & 1 or mult[at, w] == 0):
                 w += 1
-            if w == k or depth == tables.sliders:
+            if w == k or depth == longest:
                 used &= ~(np.int64(1) << at)
                 depth -= 1
                 continue
@@ -77,24 +104,29 @@ def _add_cycles(k, mult, count, tables, work):
                 cycle = np.int64(1) << work.class_of[w, first]
                 for i in range(depth):
                     cycle |= np.int64(1) << work.class_of[path[i], path[i + 1]]
-                count = _add(count, 2, np.int64(-1), cycle, work)
+                count = _add(count, need, np.int64(-1), cycle, work)
     return count
 
 
 @inner
 def cover_of(j, cover, s, work):
-    """Return what variable j gives to a vertex or a cycle, set s, by a label with this cover."""
+    """Return what variable j gives to set s, no critical one, by a label with this cover."""
     given = np.int64(0)
     vertex, cycle = work.sets[lay.VERTEX, s], work.sets[lay.CYCLE, s]
     for e in range(work.state[LAID]):
         if work.classes[lay.VAR, e] != j:
             continue
+        if vertex == lay.JOINTED:
+            given += (cycle >> e) & cover & 1
+        elif vertex == lay.APART:
+            given += (cycle >> e) & ~cover & 1
+        elif vertex < 0:
+            given += ((cycle >> e) & 1) * (cover >> 2)
         if vertex < 0:
-            given += (cycle >> e & 1) * (cover >> 2)
             continue
         turned = work.classes[lay.FLIP, e]
         if work.classes[lay.U, e] == vertex:
             given += (cover >> turned) & 1
         elif work.classes[lay.V, e] == vertex:
             given += (cover >> (1 - turned)) & 1
-    return given
+    return min(given, np.int64(lay.BYTE))

@@ -41,9 +41,12 @@ GROUPS, GROUPS_END = 0, 1
 WEIGHT, INDEX, PACKED = 0, 1, 2
 REVERSE, FOLD = 3, 4  # labels: the label read from the other end; largest number of equal paths
 GAIN, COPIES = 0, 3  # entries and groups: weight given up (instead of WEIGHT); number of labels alike
-COVER, LABEL_COVER = 4, 5  # of entries and groups, of labels: revolute joints, see ``graphsynth.synthesis.edge_labels``
-COVERS = 12  # numbers that a cover takes
-NO_SLIDING_LINK, NO_SLIDING_LOOP = 1, 2  # Tables.rules: bits
+COVER, LABEL_COVER = 4, 5  # of entries and groups, of labels: see ``graphsynth.synthesis.kernels.covers``
+COVERS, SLIDING_COVERS = 64, 12  # numbers that a cover takes; with rules of prismatic joints
+# Tables.rules: two bits; where the girth stands, and the pairs of links to be jointed or not, each of so many bits
+NO_SLIDING_LINK, NO_SLIDING_LOOP = 1, 2
+GIRTH, LONGEST, PAIRS, PAIR = 3, 15, 7, 9
+JOINTED, APART = -2, -3  # Work.sets: instead of VERTEX (-1 for a cycle)
 # rows of Tables.resources
 DIGITS, FINAL = 0, 1
 # rows of Work.classes
@@ -84,8 +87,8 @@ class Tables(NamedTuple):
     space: np.int64
     target: np.int64  # resources to be used up, as an index
     guard: np.int64  # the top bit of every packed digit
-    rules: np.int64  # of prismatic joints
-    sliders: np.int64  # number of prismatic joints
+    rules: np.int64  # of prismatic joints, or wishes
+    sliders: np.int64  # number of prismatic joints; cycles of so many classes and one more have needs
 
 
 class Work(NamedTuple):
@@ -96,7 +99,7 @@ class Work(NamedTuple):
     class_of: NDArray[np.int64]  # (MAX_VERTICES, MAX_VERTICES) number of the class between two vertices
     classes: NDArray[np.int64]  # (7, MAX_CLASSES) ends U < V, KIND, HEAVIEST, VAR and FLIP, LABEL at a leaf
     subsets: NDArray[np.int16]  # (2, 2**MAX_VERTICES) needs of vertex sets
-    sets: NDArray[np.int64]  # (5, MAX_SETS) MASK of classes inside, NEED, what is LEFT; VERTEX or CYCLE to be covered
+    sets: NDArray[np.int64]  # (5, MAX_SETS) MASK of classes inside, NEED, what is LEFT; VERTEX, CYCLE to be covered
     variables: NDArray[np.int64]  # (7, MAX_CLASSES + 1) REP, SIZE, OWN reversal; first ROW and ENTRY; search stack
     rows: NDArray[np.int64]  # (2, MAX_SETS * MAX_CLASSES) SET and COEF of each entry
     entries: NDArray[np.int64]  # (5, MAX_ENTRIES) choices of a variable: GAIN, INDEX, PACKED, COPIES, COVER

@@ -7,7 +7,7 @@ import numpy as np
 from graphsynth.core.intrinsics import popcount
 from graphsynth.synthesis.kernels import layout as lay
 from graphsynth.synthesis.kernels.contracted import critical_sets
-from graphsynth.synthesis.kernels.covers import LAID, PLAIN, cover_of, covered_sets
+from graphsynth.synthesis.kernels.covers import LAID, LAID_COVERS, PLAIN, cover_of, covered_sets
 from graphsynth.synthesis.kernels.layout import inner
 
 
@@ -252,7 +252,7 @@ def lay_lanes(count, sets, words, work):
             work.lanes[base + s // 8] |= np.uint64(work.rows[lay.COEF, q]) << np.uint64(8 * (s % 8))
         for s in range(8 * work.state[PLAIN], sets):
             most = 0
-            for cover in range(lay.COVERS):
+            for cover in range(work.state[LAID_COVERS]):
                 given = cover_of(j, cover, s, work)
                 place = (j * lay.COVERS + cover) * words + s // 8
                 if s % 8 == 0:

@@ -1,0 +1,124 @@
+"""Random questions of every kind against trying everything: numbers and keys of the answers are equal."""
+
+from __future__ import annotations
+
+import coloured
+import pytest
+from coloured import Question
+
+from graphsynth import (
+    StructuralSpec,
+    Wishes,
+    count_chains,
+    count_mechanisms,
+    count_multiple_joint_chains,
+    enumerate_chains,
+    enumerate_mechanisms,
+    enumerate_multiple_joint_chains,
+    enumerate_slider_chains,
+)
+from graphsynth.cli.main import main
+from graphsynth.core.errors import SpecError
+from graphsynth.synthesis.problem import EnumerationProblem, counted
+
+
+def asked(question: Question):
+    """Return the list of answers and their number, as graphsynth finds them."""
+    numbers = question.links, question.mobility
+    if question.kind == "multiple":
+        more = {"multiple": question.higher, "framed": question.framed}
+        return list(enumerate_multiple_joint_chains(*numbers, **more)), count_multiple_joint_chains(*numbers, **more)
+    if question.kind == "sliders":
+        more = dict(zip(("sliding_links", "sliding_loops", "cylinders"), question.rules))
+        given = question.links, question.higher, question.mobility
+        chains = enumerate_slider_chains(*given, framed=question.framed, **more)
+        problem = EnumerationProblem.sliders(*given, *question.rules, question.framed).wishing(question.wishes)
+        return [chain for chain in chains if question.wishes.fit(chain.graph)], counted(problem, None)
+    wanted = {"symmetry": question.symmetry, "wishes": question.wishes}
+    if question.framed:
+        spec = StructuralSpec(
+            W=question.mobility, links=question.links, p2=question.higher, fractionated=question.fractionated
+        )
+        return list(enumerate_mechanisms(spec, **wanted)), count_mechanisms(spec, **wanted)
+    more = {"joints_by_mobility": {2: question.higher}, "fractionated": question.fractionated, **wanted}
+    return list(enumerate_chains(*numbers, **more)), count_chains(*numbers, **more)
+
+
+def check(numbers, *, large):
+    for number in numbers:
+        question = coloured.question(number, large=large)
+        keys, choices = coloured.answers(question)
+        listed, count = asked(question)
+        assert (count, len(listed)) == (len(keys), len(keys)), (number, question)
+        assert {answer.key for answer in listed} == keys, (number, question)
+        if question.roles != (0, 0):
+            assert sum(len(graph.roles(*question.roles)) for graph in listed) == choices, (number, question)
+
+
+@pytest.mark.long
+def test_some_questions():
+    check(range(40), large=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tenth", range(10))
+def test_a_thousand_questions(tenth):
+    check(range(1000 + 100 * tenth, 1100 + 100 * tenth), large=True)
+
+
+@pytest.mark.parametrize(
+    ("links", "mobility", "symmetry"),
+    [(9, 2, None), (10, 1, 3), *(pytest.param(10, 1, p, marks=pytest.mark.long) for p in (None, 2))],
+)
+def test_wishes_that_the_search_takes_over_are_counted_without_a_list(links, mobility, symmetry):
+    """Counts by the dynamic program, beside the filter behind the list."""
+    wishes = [
+        *(Wishes(girth=girth) for girth in (4, 5, 6)),
+        *(Wishes(**{name: [pair]}) for name in ("jointed", "apart") for pair in ((3, 3), (3, 4), (4, 4))),
+        Wishes(girth=5, jointed=[(3, 3)], apart=[(3, 4), (4, 4)]),
+    ]
+    chains = list(enumerate_chains(links, mobility, symmetry=symmetry))
+    for wish in wishes:
+        assert wish.is_searched
+        keys = sorted(chain.key for chain in chains if wish.fit(chain))
+        assert count_chains(links, mobility, symmetry=symmetry, wishes=wish) == len(keys), wish
+        listed = enumerate_chains(links, mobility, symmetry=symmetry, wishes=wish)
+        assert sorted(chain.key for chain in listed) == keys
+
+
+def test_wishes_at_the_command_line(capsys, tmp_path):
+    def counted(line):
+        assert main(["count", *line.split()]) == 0
+        return int(capsys.readouterr().out.split()[-1])
+
+    assert counted("--links 8 --girth 5") == counted("--links 8 --without Cl") == 1
+    assert counted("--links 8 --contains Cl") == 15
+    assert counted("--links 10 --jointed 4-4 --apart 3-3 --planar yes") == 14
+    assert counted("--links 9 --mobility 2 --mobility-type total") == 6
+    assert main(["enumerate", "--links", "8", "--sliders", "1", "--girth", "5", "-o", str(tmp_path / "a.txt")]) == 0
+    assert {line.split()[0] for line in (tmp_path / "a.txt").read_text().splitlines()} == {"G`iRA_"}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"girth": 2}, "girth = 2 must be a whole number from 3 to 15"),
+        ({"jointed": [(3,)]}, "must be pairs of links"),
+        ({"apart": 3}, "must be pairs of links"),
+        ({"jointed": [("drum", 3)]}, "joints of a link = 'drum' must be a whole number, at least 1"),
+        ({"contains": "Cl"}, "must be a list of MechanismGraph"),
+        ({"planar": "yes"}, "planar = 'yes' must be True, False or None"),
+        ({"mobility_type": "half"}, "must be one of total, partial, fractionated"),
+    ],
+)
+def test_wishes_that_are_none(wrong, said):
+    with pytest.raises(SpecError, match=said):
+        Wishes(**wrong)
+
+
+def test_chains_that_can_have_no_wishes(capsys):
+    with pytest.raises(SpecError, match="must be Wishes"):
+        count_chains(6, wishes={"girth": 4})
+    for line in ("--links 6 --multiple-joints 1 --girth 4", "--links 6 --gear-trains --planar no"):
+        assert main(["count", *line.split()]) == 2
+        assert "wishes are for chains with simple joints" in capsys.readouterr().err
