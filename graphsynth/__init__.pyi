@@ -76,14 +76,17 @@ from .synthesis.api import (
 from .synthesis.gear_trains import (
     count_planetary_gear_trains as count_planetary_gear_trains,
     enumerate_planetary_gear_trains as enumerate_planetary_gear_trains,
+    sample_planetary_gear_trains as sample_planetary_gear_trains,
 )
 from .synthesis.multiple_joints import (
     count_multiple_joint_chains as count_multiple_joint_chains,
     enumerate_multiple_joint_chains as enumerate_multiple_joint_chains,
+    sample_multiple_joint_chains as sample_multiple_joint_chains,
 )
 from .synthesis.sliders import (
     count_slider_chains as count_slider_chains,
     enumerate_slider_chains as enumerate_slider_chains,
+    sample_slider_chains as sample_slider_chains,
 )
 from .synthesis.wishes import Wishes as Wishes
 from .systems.antenna.mechanism import PointingMechanism as PointingMechanism

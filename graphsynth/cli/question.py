@@ -106,11 +106,16 @@ def _problem(options: argparse.Namespace, *, counted: bool) -> EnumerationProble
             raise SpecError(f"Pi = {space} must be a whole number from 2 to 6")
         links = options.truss if options.assur is None else options.assur + 1
         return EnumerationProblem.trusses(links, int(space), options.assur is not None)
-    if options.gear_trains or options.rotation_graphs:
-        more = options.frame or options.symmetry or options.spec or options.set or options.fractionated
-        if more or not options.gear_trains or set(given) != {"N"} or not given["N"].isdecimal():
-            raise SpecError("--gear-trains takes --links N and --rotation-graphs, and nothing else of a question")
-        return EnumerationProblem.gear_trains(int(given["N"]), options.rotation_graphs)
+    if options.gear_trains or options.rotation_graphs or options.drive:
+        more = options.symmetry or options.spec or options.set or options.fractionated
+        size = given.get("N", ""), given.get("W", "1")
+        if more or not options.gear_trains or set(given) - {"N", "W"} or not all(map(str.isdecimal, size)):
+            raise SpecError(
+                "--gear-trains takes --links N, --mobility W, --frame, --drive and --rotation-graphs, and nothing else "
+                "of a question"
+            )
+        roles = {"rotation": options.rotation_graphs, "framed": options.frame, "drive": options.drive}
+        return EnumerationProblem.gear_trains(int(size[0]), int(size[1]), **roles)
     slides = options.cylinders or options.sliding_links or options.sliding_loops
     if options.multiple_joints is not None or options.sliders is not None or slides:
         return _with_special_joints(options, given)

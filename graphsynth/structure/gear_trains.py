@@ -123,6 +123,14 @@ class PlanetaryGearTrain(ColouredChain):
         """Mobility by the structural formula, W = N - 1 - gear pairs, with any link fixed (exact count)."""
         return self.links - 1 - len(self.gears)
 
+    @property
+    def is_fractionated(self) -> bool:
+        """Whether gear pairs with their carriers fall apart, or would without one of the links (exact)."""
+        import networkx
+
+        near = networkx.Graph(ends for pair in self.gears for ends in combinations(pair, 2))
+        return len(near) < self.links or not networkx.is_biconnected(near)
+
     def rotation_graph(self) -> PlanetaryGearTrain:
         """Return the train with the same gear pairs and carriers on as many axes as can be (exact).
 

@@ -12,10 +12,16 @@ from .api import (
 from .gear_trains import (
     count_planetary_gear_trains as count_planetary_gear_trains,
     enumerate_planetary_gear_trains as enumerate_planetary_gear_trains,
+    sample_planetary_gear_trains as sample_planetary_gear_trains,
 )
 from .multiple_joints import (
     count_multiple_joint_chains as count_multiple_joint_chains,
     enumerate_multiple_joint_chains as enumerate_multiple_joint_chains,
+    sample_multiple_joint_chains as sample_multiple_joint_chains,
 )
-from .sliders import count_slider_chains as count_slider_chains, enumerate_slider_chains as enumerate_slider_chains
+from .sliders import (
+    count_slider_chains as count_slider_chains,
+    enumerate_slider_chains as enumerate_slider_chains,
+    sample_slider_chains as sample_slider_chains,
+)
 from .wishes import Wishes as Wishes

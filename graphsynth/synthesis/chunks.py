@@ -19,6 +19,8 @@ from graphsynth.synthesis.kernels.layout import HEADER, Work, make_work
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
+    from graphsynth.structure.multiple_joints import MultipleJointChain
+    from graphsynth.structure.slider_chains import SliderChain
     from graphsynth.synthesis.kernels.expanding import Expansion
     from graphsynth.synthesis.wishes import Wishes
 
@@ -76,6 +78,15 @@ class Chunk:
                 graph = make(links, data[at : at + size], frame, space)
                 if self.wishes is None or self.wishes.fit(graph, self.family.higher):
                     yield graph
+
+    def chain(self, graph: MechanismGraph) -> MechanismGraph | MultipleJointChain | SliderChain:
+        """Return what a graph stands for."""
+        from graphsynth.structure.multiple_joints import MultipleJointChain
+        from graphsynth.structure.slider_chains import SliderChain
+
+        if self.family.pins:
+            return MultipleJointChain(graph, self.family.pins)
+        return SliderChain(graph) if SLIDER in dict(self.family.higher) else graph
 
     def texts(self) -> Iterator[tuple[bytes, int]]:
         """Stream the chains as (lines of the text form, number of lines)."""

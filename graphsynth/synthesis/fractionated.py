@@ -32,9 +32,12 @@ import numpy as np
 from graphsynth.structure.connectivity import bits, components_of
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.kernels import canon_packed
+from graphsynth.structure.slider_chains import SliderChain
 from graphsynth.synthesis.chunks import cut
 from graphsynth.synthesis.edge_labels import SLIDER
 from graphsynth.synthesis.families import Levels, chain_families, chain_joints, rings
+from graphsynth.synthesis.kernels.counting import COUNTING, MAKING
+from graphsynth.synthesis.made import EACH, Made
 
 if TYPE_CHECKING:
     from graphsynth.structure.system.assortment import LinkAssortment
@@ -45,10 +48,11 @@ Exponents = tuple[int, ...]
 Series = dict[Exponents, int]
 Cycles = tuple[tuple[int, int], ...]
 """Numbers of cycles of a permutation: (length, cycles)."""
+_EFFORT = 10.0  # work of a chain that is made one by one, in chains of a catalogue
 
 
 @dataclass(frozen=True)
-class OneByOne:
+class OneByOne(Made):
     """Rings, or fractionated chains.
 
     ``assortment`` and ``levels`` restrict mechanisms, ``symmetry`` asks for an automorphism of that prime order.
@@ -75,13 +79,16 @@ class OneByOne:
             if self._fits(graph) and (self.wishes is None or self.wishes.fit(graph, self.higher)):
                 yield graph
 
-    def texts(self) -> Iterator[tuple[bytes, int]]:
-        """Yield them as (lines of the text form, number of lines), at once."""
-        lines = [f"{graph.to_text()}\n" for graph in self.graphs()]
-        if SLIDER in dict(self.higher):
-            lines = [line.replace(" 2:", " P:") for line in lines]
-        if lines:
-            yield "".join(lines).encode("ascii"), len(lines)
+    def chain(self, graph: MechanismGraph) -> MechanismGraph | SliderChain:
+        """Return what a graph stands for."""
+        return SliderChain(graph) if SLIDER in dict(self.higher) else graph
+
+    def work(self, purpose: int) -> float:
+        """Estimate the work; of a catalogue, the number of chains."""
+        if self.kind == "rings" or (purpose == COUNTING and not self.restricted):
+            return _EFFORT if purpose == MAKING else 100.0
+        count = count_fractionated(self.links, self.mobility, self.space, self.higher, self.framed)
+        return _EFFORT * (1 + count) if purpose == MAKING else 100.0 + EACH * count
 
     @property
     def restricted(self) -> bool:

@@ -86,3 +86,36 @@ def count_multiple_joint_chains(
     [22, 18, 3, 1]
     """
     return counted(EnumerationProblem.multiple_joints(links, mobility, multiple, framed=framed), executor)
+
+
+def sample_multiple_joint_chains(
+    links: int, mobility: int = 1, *, k: int, seed: int, multiple: int | None = None, framed: bool = False
+) -> list[MultipleJointChain]:
+    """Draw k of what ``enumerate_multiple_joint_chains`` yields, independently and exactly uniformly, without a list.
+
+    Parameters
+    ----------
+    links, mobility, multiple, framed
+        As for `enumerate_multiple_joint_chains`.
+    k, seed : int
+        As for `sample_mechanisms`.
+
+    Returns
+    -------
+    list of MultipleJointChain
+        Of length ``k``.
+
+    Raises
+    ------
+    InfeasibleSpecError
+        If there is nothing to draw from; else as for `enumerate_multiple_joint_chains`.
+
+    Examples
+    --------
+    >>> [chain.mobility for chain in sample_multiple_joint_chains(10, k=2, seed=1)]
+    [1, 1]
+    """
+    from graphsynth.synthesis.sampling import sample
+
+    drawn = sample(EnumerationProblem.multiple_joints(links, mobility, multiple, framed=framed), k, seed)
+    return [MultipleJointChain(graph, graph.links - int(links)) for graph in drawn]

@@ -31,8 +31,9 @@ from graphsynth.synthesis.families import (
     slider_families,
 )
 from graphsynth.synthesis.fractionated import OneByOne
-from graphsynth.synthesis.geared_trees import MOST_LINKS as MOST_GEARED, GearedTrees, geared_trees
+from graphsynth.synthesis.geared_trees import COAXIAL, DRIVE, FRAME, MOST_LINKS as MOST_GEARED, NO_ROLES, geared_trees
 from graphsynth.synthesis.kernels.layout import NO_SLIDING_LINK, NO_SLIDING_LOOP
+from graphsynth.synthesis.made import Made
 from graphsynth.synthesis.totals import Total, is_counted_together, totals_of
 from graphsynth.synthesis.wishes import Wishes
 
@@ -49,7 +50,7 @@ _COUNTED_LOOPS = 6  # counts of so many loops take a moment
 # 1-DOF planar chains with 2, 3, ..., 8 loops (published and recomputed): where there is nothing smaller to count
 _KNOWN = (2, 16, 230, 6856, 318162, 19819281, 1535380884)
 
-WorkItem = Chunk | OneByOne | GearedTrees
+WorkItem = Chunk | Made
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class EnumerationProblem:
 
     title: str  # one line for people
     families: tuple[Family, ...]  # what the search kernels generate
-    one_by_one: tuple[OneByOne | GearedTrees, ...] = ()  # what is made one by one; listed first
+    one_by_one: tuple[Made, ...] = ()  # what is made one by one; listed first
     symmetry: int = 0  # 0, or the prime order of a required automorphism
     #: why there is nothing, where the structural formula says so already
     reason: str = field(default="", repr=False, compare=False)
@@ -131,7 +132,7 @@ class EnumerationProblem:
         if not (together and is_counted_together(mobility, loops, placed)):
             check_loops(loops, links, mobility, space, higher, framed=framed)
         common = (links, mobility, space, placed, framed)
-        one_by_one = [OneByOne("rings", *common, symmetry=order)]
+        one_by_one: list[Made] = [OneByOne("rings", *common, symmetry=order)]
         if fractionated and mobility > 1:
             one_by_one.append(OneByOne("fractionated", *common, symmetry=order))
         families = chain_families(links, mobility, space, higher, framed)
@@ -187,19 +188,35 @@ class EnumerationProblem:
         return cls(title, tuple(slider_families(links, mobility, number, rules, framed)), (ring,))
 
     @classmethod
-    def gear_trains(cls, links: int, rotation: bool) -> EnumerationProblem:
-        """State the enumeration of planetary gear trains of one freedom, or of their rotation graphs.
+    def gear_trains(
+        cls, links: int, mobility: int = 1, *, rotation: bool = False, framed: bool = False, drive: str | None = None
+    ) -> EnumerationProblem:
+        """State the enumeration of planetary gear trains, or of their rotation graphs; see the function.
 
         Raises `SpecError` for a value out of its bounds, `TooLargeError` for too many links.
         """
-        links = whole(links, "links", 3)
-        title = f"planetary gear trains W=1 N={links}" + (" rotation graphs" if _truth(rotation, "rotation") else "")
+        links, mobility = whole(links, "links", 3), whole(mobility, "mobility", 1, 50)
+        title = f"planetary gear trains W={mobility} N={links}"
+        title += " rotation graphs" if _truth(rotation, "rotation") else ""
+        roles = FRAME if _truth(framed, "framed") else NO_ROLES
+        if drive is not None:
+            if drive not in ("any", "coaxial"):
+                raise SpecError(f"drive = {shown(drive)} must be 'any', 'coaxial' or None")
+            if rotation or mobility > 1:
+                raise SpecError(
+                    "input and output are chosen in trains of mobility 1 whose axes are known: leave out "
+                    f"{'rotation' if rotation else 'mobility'}, or drive"
+                )
+            roles = DRIVE if drive == "any" else COAXIAL
+        title += ("", " framed", " driven", " driven on one axis")[roles]
         if links > MOST_GEARED:
             raise TooLargeError(
                 f"planetary gear trains of {links} links are more than the bound of {MOST_GEARED}, of which there are "
-                f"904156: ask for {MOST_GEARED} links at most"
+                f"12402182: ask for {MOST_GEARED} links at most"
             )
-        return cls(title, (), geared_trees(links, bool(rotation)))
+        if mobility > 1 and links < 2 * mobility + 2:
+            return cls(title, (), reason=f"{title}: a train that does not fall apart takes {2 * mobility + 2} links")
+        return cls(title, (), geared_trees(links, bool(rotation), mobility, roles))
 
     @classmethod
     def mechanisms(cls, question: StructuralSpec | LinkAssortment, symmetry: int | None) -> EnumerationProblem:
@@ -227,7 +244,7 @@ class EnumerationProblem:
                 f"{shown(question)} is not a structural question: give a StructuralSpec or a LinkAssortment"
             )
         families: list[Family] = []
-        one_by_one: list[OneByOne] = []
+        one_by_one: list[Made] = []
         for assortment in assortments:
             if assortment.mobility < 1:
                 raise InfeasibleSpecError(

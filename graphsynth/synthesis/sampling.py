@@ -9,6 +9,7 @@ again.
 from __future__ import annotations
 
 from bisect import bisect_right
+from functools import partial
 from itertools import accumulate
 from random import Random
 
@@ -36,23 +37,20 @@ def sample(problem: EnumerationProblem, k: int, seed: int) -> list[MechanismGrap
     k, seed = whole(k, "k", 0, 10**9), whole(seed, "seed", -(10**100), 10**100)  # None would draw others every time
     if problem.symmetry or any(family.levels for family in problem.families):
         raise SpecError("sampling with a required symmetry or wanted levels is not supported: list them and choose")
-    listed = [graph for made in problem.one_by_one for graph in made.graphs()]
-    sources: list[tuple[Family, int]] = []
-    weights: list[int] = []
+    urns = [urn for made in problem.one_by_one for urn in made.urns()]
     for family in problem.families:
         graphs = len(family.graphs)
-        for h, count in enumerate(count_each(family, 0, graphs).tolist() if graphs else ()):
-            if count:
-                sources.append((family, h))
-                weights.append(count)
-    sums = list(accumulate([len(listed), *weights]))
-    if sums[-1] == 0 and k:
+        counts = count_each(family, 0, graphs).tolist() if graphs else ()
+        urns += [(count, partial(_draw, family, h)) for h, count in enumerate(counts) if count]
+    sums = list(accumulate(weight for weight, _ in urns))
+    if k and (not sums or sums[-1] == 0):
         raise InfeasibleSpecError(f"no mechanism answers the question ({problem.title}): nothing to draw from")
     random = Random(seed)
-    drawn = []
-    for _ in range(k):
-        at = bisect_right(sums, random.randrange(sums[-1]))
-        drawn.append(random.choice(listed) if at == 0 else _draw(*sources[at - 1], random))
+    drawn: list[MechanismGraph] = []
+    while len(drawn) < k:
+        graph = urns[bisect_right(sums, random.randrange(sums[-1]))][1](random)
+        if graph is not None:
+            drawn.append(graph)
     return drawn
 
 

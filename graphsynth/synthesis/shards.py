@@ -18,17 +18,14 @@ from graphsynth.core.errors import SpecError
 from graphsynth.core.wording import shown, whole
 from graphsynth.synthesis.chunks import Chunk, estimates, workspace
 from graphsynth.synthesis.families import Family
-from graphsynth.synthesis.fractionated import OneByOne, count_fractionated
-from graphsynth.synthesis.geared_trees import GearedTrees
 from graphsynth.synthesis.kernels.counting import COUNTING, LISTING, MAKING, weigh_block
+from graphsynth.synthesis.made import Made
 from graphsynth.synthesis.problem import WorkItem
 from graphsynth.synthesis.totals import Total
 
 Shard = tuple[int, int]
 Costs = NDArray[np.float64]
 _WEIGHED = 20_000  # contracted graphs of a problem whose work is estimated one by one
-_MADE = 1000.0  # work of a chain that is made one by one, as the kernel weighs
-_EFFORT = 10.0  # the same in chains of a catalogue
 
 
 def shard_of(items: Sequence[WorkItem], shard: Shard | None, *, listing: bool = True) -> list[WorkItem]:
@@ -120,11 +117,8 @@ def _atoms(items: tuple[WorkItem, ...], purpose: int) -> list[Costs]:
     known: dict[Family, Costs] = {}
     atoms = []
     for item in items:
-        if isinstance(item, OneByOne):
-            atoms.append(np.array([_made(item, purpose)]))
-            continue
-        if isinstance(item, GearedTrees):
-            atoms.append(np.array([_MADE * (item.stop - item.start)]))
+        if isinstance(item, Made):
+            atoms.append(np.array([item.work(purpose)]))
             continue
         if item.symmetry:  # few labellings are searched; nobody knows how many
             atoms.append(np.ceil([item.weight]))
@@ -135,15 +129,6 @@ def _atoms(items: tuple[WorkItem, ...], purpose: int) -> list[Costs]:
         costs = known[family][item.start : item.stop]
         atoms.append(costs if item.parts == 1 else np.ceil(costs / item.parts))
     return atoms
-
-
-def _made(listed: OneByOne, purpose: int) -> float:
-    """Estimate the work of what is made one by one."""
-    if listed.kind == "rings" or (purpose == COUNTING and not listed.restricted):
-        return _EFFORT if purpose == MAKING else 100.0
-    numbers = listed.links, listed.mobility, listed.space, listed.higher
-    count = count_fractionated(*numbers, listed.framed)
-    return _EFFORT * (1 + count) if purpose == MAKING else 100.0 + _MADE * count
 
 
 def works(family: Family, share: float, purpose: int) -> Costs:

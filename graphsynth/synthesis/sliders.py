@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import Executor
 
+from graphsynth.core.errors import SpecError
 from graphsynth.structure.slider_chains import SliderChain
 from graphsynth.synthesis.problem import EnumerationProblem, counted, graphs
 
@@ -99,3 +100,42 @@ def count_slider_chains(
     """
     given = links, sliders, mobility, sliding_links, sliding_loops, cylinders, framed
     return counted(EnumerationProblem.sliders(*given), executor)
+
+
+def sample_slider_chains(
+    links: int, sliders: int, mobility: int = 1, *, k: int, seed: int, framed: bool = False, **rules: bool
+) -> list[SliderChain]:
+    """Draw k of what ``enumerate_slider_chains`` yields, independently and exactly uniformly, without a list.
+
+    Parameters
+    ----------
+    links, sliders, mobility, framed
+        As for `enumerate_slider_chains`.
+    k, seed : int
+        As for `sample_mechanisms`.
+    rules : bool
+        ``sliding_links``, ``sliding_loops`` and ``cylinders``, as for `enumerate_slider_chains`.
+
+    Returns
+    -------
+    list of SliderChain
+        Of length ``k``.
+
+    Raises
+    ------
+    InfeasibleSpecError
+        If there is nothing to draw from; else as for `enumerate_slider_chains`.
+
+    Examples
+    --------
+    >>> len(sample_slider_chains(12, 3, k=2, seed=1))
+    2
+    """
+    from graphsynth.synthesis.sampling import sample
+
+    names = ("sliding_links", "sliding_loops", "cylinders")
+    if unknown := set(rules) - set(names):
+        raise SpecError(f"{min(unknown)} is no rule of prismatic joints: the rules are {', '.join(names)}")
+    links_slide, loops_slide, cylinders = (rules.get(name, False) for name in names)
+    given = links, sliders, mobility, links_slide, loops_slide, cylinders, framed
+    return list(map(SliderChain, sample(EnumerationProblem.sliders(*given), k, seed)))

@@ -22,11 +22,8 @@ from graphsynth.core.journal import Journal, Work, digest_of
 from graphsynth.core.ordered import in_order
 from graphsynth.structure.gear_trains import PlanetaryGearTrain
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.structure.multiple_joints import MultipleJointChain
 from graphsynth.structure.slider_chains import SliderChain
 from graphsynth.synthesis.chunks import Chunk
-from graphsynth.synthesis.edge_labels import SLIDER
-from graphsynth.synthesis.geared_trees import GearedTrees
 from graphsynth.synthesis.problem import EnumerationProblem, WorkItem, counts, graphs, texts, whole_sum
 from graphsynth.synthesis.shards import run_of, shard_of
 from graphsynth.synthesis.totals import Grown, Total
@@ -54,29 +51,23 @@ def _work(
     return Work(form, problem.title, digest_of(problem.signature, form, cut), remedy=remedy, again=again)
 
 
-def _json_line(graph: MechanismGraph, item: WorkItem) -> str:
-    if isinstance(item, GearedTrees):
-        train = PlanetaryGearTrain(graph)
-        return json.dumps({"key": train.key, "links": train.links, "axes": train.axes, "gears": train.gears}) + "\n"
-    multiple = item.family.pins if isinstance(item, Chunk) else 0
-    higher = item.family.higher if isinstance(item, Chunk) else item.higher
-    if multiple or SLIDER in dict(higher):
-        chain = MultipleJointChain(graph, multiple) if multiple else SliderChain(graph)
-        named: dict[str, Any] = {"key": chain.key, "links": chain.links, "frame": chain.frame}
-        if isinstance(chain, MultipleJointChain):
-            named["joints"] = chain.joints
-        else:
-            named |= {"joints": [(a, b) for a, b, _ in graph.joints], "sliders": chain.sliders}
-        return json.dumps(named) + "\n"
-    record: dict[str, Any] = {"key": graph.key, "links": graph.links, "space": graph.space, "frame": graph.frame}
-    record["joints"] = [list(joint) for joint in graph.joints]
-    if graph.frame is not None:
-        record["levels"] = [list(level) for level in graph.levels]
+def _json_line(chain: Any) -> str:
+    record: dict[str, Any] = {"key": chain.key, "links": chain.links}
+    if isinstance(chain, MechanismGraph):
+        record |= {"space": chain.space, "frame": chain.frame, "joints": [list(joint) for joint in chain.joints]}
+        if chain.frame is not None:
+            record["levels"] = [list(level) for level in chain.levels]
+    elif isinstance(chain, PlanetaryGearTrain):
+        record |= {"frame": chain.frame, "axes": chain.axes, "gears": chain.gears}
+    else:
+        record |= {"frame": chain.frame, "joints": chain.joints}
+    if isinstance(chain, SliderChain):
+        record["sliders"] = chain.sliders
     return json.dumps(record) + "\n"
 
 
 def _json_lines(item: WorkItem) -> tuple[bytes, int]:
-    lines = [_json_line(graph, item) for graph in item.graphs()]
+    lines = [_json_line(item.chain(graph)) for graph in item.graphs()]
     return "".join(lines).encode(), len(lines)
 
 
@@ -156,7 +147,9 @@ def estimated_size(
     chosen = chunks[:: max(1, len(chunks) // _SAMPLED)]
     made = [sum(lines for _, lines in chunk.texts()) for chunk in chosen]
     some = [(next(graphs([chunk], None)), chunk) for chunk, lines in zip(chosen, made) if lines]
-    size = sum(len(_json_line(*one)) if form == "jsonl" else len(one[0].to_text()) + 1 for one in some)
+    size = sum(
+        len(_json_line(item.chain(graph))) if form == "jsonl" else len(graph.to_text()) + 1 for graph, item in some
+    )
     number = weight * sum(made) / sum(chunk.weight for chunk in chosen)
     return number, number * size / max(len(some), 1)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 import tomllib
 from fractions import Fraction
-from itertools import combinations, islice
+from itertools import combinations, islice, permutations
 from pathlib import Path
 
 import networkx as nx
@@ -30,14 +30,20 @@ RAVIGNEAUX = PlanetaryGearTrain.from_axes(6, [(0, 1, 2, 3), (3, 4), (3, 5)], [(0
 STEPPED = {(0, 3): (99, 101), (1, 3): (100, 100)}
 
 
-def moves_freely(links, pairs, rng):
-    """Whether the equations have rank N - 2 and tell all links apart, with random coefficients modulo a prime."""
+def equations(links, pairs, rng):
+    """Return the equations with random coefficients modulo a prime."""
     rows = []
     for a, b, carrier in pairs:
         row = [0] * links
         row[a], row[b] = rng.randrange(1, PRIME), rng.randrange(1, PRIME)
         row[carrier] = -row[a] - row[b]
         rows.append(row)
+    return rows
+
+
+def moves_freely(links, pairs, rng):
+    """Whether the equations have rank N - 2 and tell all links apart, with random coefficients modulo a prime."""
+    rows = equations(links, pairs, rng)
     for fixed, turned in combinations(range(links), 2):  # else they always turn alike
         place = [link for link in range(links) if link not in (fixed, turned)]
         square = [[row[link] for link in place] for row in rows]
@@ -62,6 +68,32 @@ def determinant(square):
     return value
 
 
+def rank(rows):
+    """Return the rank modulo the prime."""
+    rows, found = [list(row) for row in rows], 0
+    for column in range(len(rows[0])):
+        pivot = next((i for i in range(found, len(rows)) if rows[i][column] % PRIME), None)
+        if pivot is None:
+            continue
+        rows[found], rows[pivot] = rows[pivot], rows[found]
+        inverse = pow(rows[found][column], -1, PRIME)
+        for i in range(found + 1, len(rows)):
+            factor = rows[i][column] * inverse % PRIME
+            rows[i] = [(x - factor * y) % PRIME for x, y in zip(rows[i], rows[found])]
+        found += 1
+    return found
+
+
+def moves_with(links, pairs, rng):
+    """Whether no two links always turn alike, by rank, and no link holds the gear pairs together alone."""
+    rows = equations(links, pairs, rng)
+    held = nx.Graph(ends for pair in pairs for ends in combinations(pair, 2))
+    if len(held) < links or not nx.is_biconnected(held):
+        return False
+    alike = ([(link == a) - (link == b) for link in range(links)] for a, b in combinations(range(links), 2))
+    return rank(rows) == len(rows) and all(rank([*rows, row]) > len(rows) for row in alike)
+
+
 def block_graphs(links):
     """Connected graphs all of whose blocks are complete, from the atlas of networkx: trees of links and axes."""
     for graph in nx.graph_atlas_g():
@@ -70,14 +102,14 @@ def block_graphs(links):
             yield graph
 
 
-def brute_force(links):
+def brute_force(links, mobility=1):
     """Return one train of each class as (axes graph with gear pairs, gear pairs with carriers)."""
     rng, found = random.Random(1), {}
     for graph in block_graphs(links):
         far = dict(nx.all_pairs_shortest_path(graph))
         pairs = [(a, b, far[a][b][1]) for a, b in combinations(range(links), 2) if len(far[a][b]) == 3]
-        for chosen in combinations(pairs, links - 2):
-            if not moves_freely(links, chosen, rng):
+        for chosen in combinations(pairs, links - 1 - mobility):
+            if not (moves_freely if mobility == 1 else moves_with)(links, chosen, rng):
                 continue
             train = nx.Graph()
             train.add_edges_from(graph.edges, kind=1)
@@ -129,6 +161,71 @@ def test_brute_force_finds_the_same_trains(links):
     assert len(keys) == len(trains) == len(found)
     assert {train.key.removeprefix("1g.") for train in found} == keys
     assert rotation_classes(trains) == count_planetary_gear_trains(links, rotation=True)
+
+
+@pytest.mark.parametrize("row", PUBLISHED["two_freedoms"], ids=lambda row: f"{row[0]} links")
+def test_trains_of_two_freedoms_are_those_of_tsai_and_lin(row):
+    links, rotation = row
+    assert count_planetary_gear_trains(links, 2, rotation=True) == rotation
+
+
+@pytest.mark.parametrize(
+    ("links", "mobility"),
+    [(5, 2), pytest.param(6, 2, marks=pytest.mark.slow), pytest.param(7, 2, marks=pytest.mark.slow),
+     pytest.param(7, 3, marks=pytest.mark.slow)],
+)  # fmt: skip
+def test_brute_force_finds_the_same_trains_of_more_freedoms(links, mobility):
+    trains = brute_force(links, mobility)
+    keys = {
+        MechanismGraph(links, [(a, b, kind) for a, b, kind in train.edges(data="kind")]).key[1:] for train, _ in trains
+    }
+    found = list(enumerate_planetary_gear_trains(links, mobility))
+    assert len(keys) == len(trains) == len(found) == count_planetary_gear_trains(links, mobility)
+    assert {train.key.removeprefix("1g.") for train in found} == keys
+    assert not any(train.is_fractionated for train in found)
+    assert rotation_classes(trains) == count_planetary_gear_trains(links, mobility, rotation=True)
+
+
+def roles_by_hand(train, which):
+    """Choices of a fixed link, of (fixed, input, output) on axes of the fixed one, or on one axis, up to symmetries."""
+    near = {link: {other for other in train[link] if train[link][other]["kind"] == 1} for link in train}
+    ways = [(f,) for f in train]
+    if which != "frame":
+        ways = [(f, a, b) for f in train for a, b in permutations(sorted(near[f]), 2)]
+    if which == "coaxial":
+        ways = [(f, a, b) for f, a, b in ways if b in near[a]]
+    matcher = nx.isomorphism.GraphMatcher(train, train, edge_match=categorical_edge_match("kind", 0))
+    moves = list(matcher.isomorphisms_iter())
+    return {min(tuple(move[link] for link in way) for move in moves) for way in ways}
+
+
+@pytest.mark.parametrize("links", [4, *(pytest.param(links, marks=pytest.mark.slow) for links in (5, 6))])
+def test_roles_are_the_orbits_of_brute_force(links):
+    trains = [train for train, _ in brute_force(links)]
+    for which, asked in {"frame": {"framed": True}, "any": {"drive": "any"}, "coaxial": {"drive": "coaxial"}}.items():
+        number = sum(len(roles_by_hand(train, which)) for train in trains)
+        found = list(enumerate_planetary_gear_trains(links, **asked))
+        assert number == len(found) == count_planetary_gear_trains(links, **asked)
+        assert {train.frame for train in found} == {0}
+        assert len({role_key(train, which) for train in found}) == number
+    assert count_planetary_gear_trains(links, framed=True, rotation=True) == sum(
+        len(train.coloured.orbits) for train in enumerate_planetary_gear_trains(links, rotation=True)
+    )
+
+
+def role_key(train, which="any"):
+    """Return a form that two trains share if one is the other, links 0, or 0 to 2, being what they are."""
+    first = [0] if which == "frame" else [0, 1, 2]
+    rest = range(len(first), train.links)
+    places = ([*first, *order] for order in permutations(rest))
+    return min(train.coloured.relabelled(place).packed for place in places)
+
+
+@pytest.mark.parametrize("asked", [{"framed": True}, {"drive": "any"}, {"drive": "coaxial"}])
+def test_lists_of_roles_are_as_long_as_their_counts(asked):
+    for links, mobility in ((5, 1), (6, 1), *(((7, 2),) if "framed" in asked else ())):
+        found = sum(1 for _ in enumerate_planetary_gear_trains(links, mobility, **asked))
+        assert found == count_planetary_gear_trains(links, mobility, **asked)
 
 
 @pytest.mark.parametrize("links", [5, *(pytest.param(links, marks=pytest.mark.slow) for links in (6, 7))])
@@ -292,7 +389,10 @@ def test_bad_trains_and_teeth_get_one_sentence():
         (lambda: SIMPLE.ratio(0, 2, 1, teeth={(0, 3): (0, 20)}), "must not be 0"),
         (lambda: SIMPLE.efficiency(0, 2, 1, teeth={(0, 3): (20, 20), (1, 3): (-60, 20)}, mesh=1.2), "at most 1"),
         (lambda: count_planetary_gear_trains(2), "at least 3|3"),
-        (lambda: count_planetary_gear_trains(11), "10 links at most"),
+        (lambda: count_planetary_gear_trains(12), "11 links at most"),
+        (lambda: count_planetary_gear_trains(6, drive="all"), "'any', 'coaxial' or None"),
+        (lambda: count_planetary_gear_trains(6, drive="any", rotation=True), "leave out rotation, or drive"),
+        (lambda: count_planetary_gear_trains(6, 2, drive="any"), "leave out mobility, or drive"),
     ]
     for call, words in cases:
         with pytest.raises((FormatError, GraphError, SpecError, TooLargeError), match=words):
@@ -312,4 +412,8 @@ def test_the_command_line_counts_lists_and_shows(capsys, tmp_path):
     assert main(["show", SIMPLE.to_text(), "-o", str(tmp_path / "train.svg")]) == 0
     assert "0-3 on 2" in capsys.readouterr().out
     assert (tmp_path / "train.svg").read_text().startswith("<svg")
-    assert main(["count", "--links", "6", "--gear-trains", "--frame"]) == 2
+    for more, number in {"--frame": 408, "--drive any": 1316, "--mobility 2": 3}.items():
+        assert main(["count", "--links", "6", "--gear-trains", *more.split()]) == 0
+        assert capsys.readouterr().out.splitlines()[-1] == str(number)
+    assert main(["count", "--links", "6", "--gear-trains", "--space", "6"]) == 2
+    assert main(["count", "--links", "6", "--drive", "any"]) == 2

@@ -13,7 +13,7 @@ import numpy as np
 from graphsynth.core.compilation import kernel
 from graphsynth.synthesis.kernels import layout as lay
 from graphsynth.synthesis.kernels.contracted import automorphisms
-from graphsynth.synthesis.kernels.covers import PLAIN
+from graphsynth.synthesis.kernels.covers import PLAIN, cover_of
 from graphsynth.synthesis.kernels.layout import glue, inner
 from graphsynth.synthesis.kernels.variables import (
     build_variables,
@@ -366,6 +366,8 @@ def _nth_label(j, g, rank, tables, work):
             continue
         if tables.labels[lay.PACKED, label] * work.variables[lay.SIZE, j] != packed:
             continue
+        if tables.labels[lay.LABEL_COVER, label] != work.entries[lay.COVER, g]:
+            continue
         if rank == 0:
             return label
         rank -= 1
@@ -394,6 +396,8 @@ def decode_fixed(count, m, sets, number, tables, work, row):
             for q in range(work.variables[lay.ROW, j], work.variables[lay.ROW, j + 1]):
                 s = work.rows[lay.SET, q]
                 work.sets[lay.LEFT, s] -= work.rows[lay.COEF, q] * work.entries[lay.GAIN, g]
+            for s in range(8 * work.state[PLAIN], sets):
+                work.sets[lay.LEFT, s] -= cover_of(j, work.entries[lay.COVER, g], s, work)
             break
     for s in range(sets):
         if work.sets[lay.LEFT, s] > 0:
