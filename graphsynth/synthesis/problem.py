@@ -90,7 +90,7 @@ class EnumerationProblem:
             return self
         if not isinstance(wishes, Wishes):
             raise SpecError(f"wishes = {shown(wishes)} must be Wishes")
-        if any(family.pins for family in self.families) or any(isinstance(i, GearedTrees) for i in self.one_by_one):
+        if any(family.pins for family in self.families) or not all(isinstance(i, OneByOne) for i in self.one_by_one):
             raise SpecError(f"{self.title}: wishes are for chains with simple joints: list these, and choose")
         slides = any(family.rules for family in self.families)
         return replace(
