@@ -87,7 +87,7 @@ def computations(*, many: bool) -> Recorded:
 
 #: Kernels of the page's engine alone; natively they are compiled when a test asks for them.
 PAGE = ("engine.kernels.planning.", "engine.kernels.advancing.", "engine.kernels.dragging.", "jamming.joints.kernels.",
-        "design.poses.kernels.")  # fmt: skip
+        "design.poses.kernels.", "certify.kernels.")  # fmt: skip
 
 
 def page_computations() -> Recorded:
@@ -125,8 +125,27 @@ def page_computations() -> Recorded:
                 at = np.array([0.3, 0.2])
                 dragging.drag(rows, table[0], 0, near, 2, at, np.array(target), way, length[0], found[:3].copy())
         _tilted(mechanism, np.ascontiguousarray(pose[None]), kept)
+        _proved(mechanism, pose, kept)
     _through_poses(kept)
     return kept
+
+
+def _proved(mechanism: Any, pose: np.ndarray, kept: Recorded) -> None:
+    """Record the calls with which the page proves a motion, a few boxes at a time."""
+    from graphsynth.kinematics.certify import kernels
+    from graphsynth.kinematics.engine.program import equations
+
+    rows, (table,) = equations(mechanism.joints, mechanism.dimensions[None], mechanism.drivers)
+    inputs, box, turns = np.array([pose[1, 2]]), np.zeros((4, *pose.shape)), np.zeros(len(rows))
+    box[0], state, end = pose, np.array([inputs[0], 0.05, 0.0, 0.0]), inputs[0] + 2.0 * np.pi
+    with recording(kept, all_calls=True):
+        march = rows, table, mechanism.frame, inputs, 0, end, 2.0, turns, box, state
+        kernels.march(*march, 0)
+        first = box.copy()
+        for limit in (3, 6):
+            kernels.march(*march, limit)
+        kernels.closes(rows, table, mechanism.frame, 0, first, inputs[0], first + 0.0, inputs[0], 0)
+        kernels.closes(rows, table, mechanism.frame, 0, first, inputs[0], box, end, 1)
 
 
 def _through_poses(kept: Recorded) -> None:

@@ -16,7 +16,7 @@ from graphsynth.workbench.modules import names, script
 from graphsynth.workbench.posing import assembled
 
 #: Modules of kernels that the page loads at once, and those that it loads when they are asked for.
-_FIRST, _LATER = ("motion", "labels"), ("chains", "sketch", "binding", "design")
+_FIRST, _LATER = ("motion", "labels"), ("chains", "sketch", "binding", "design", "proof")
 _FOLDER = PageFolder("workbench-page.txt", {".": (".html", ".css", ".js")})
 
 

@@ -97,7 +97,9 @@ def check_turns(folder: Path, turns: list[tuple[Mechanism, Any]]) -> None:
         links, swept = mechanism.graph.links, result["done"][0]["result"]
         assert result["known"]["fault"] is None and swept["full"], (mechanism.graph, swept["stop"])
         poses, rates = array(swept["poses"], 121, links, 3), array(swept["velocities"], 121, links, 3)
-        assert np.abs(array(swept["inputs"], 121) - motion.inputs).max() < 1e-14
+        # the page takes the pose, which closes to rounding, onto the joints: the driver may be a few digits elsewhere
+        off = array(swept["inputs"], 121) - motion.inputs
+        assert abs(off[0]) < 1e-13 and np.abs(off - off[0]).max() < 1e-14
         assert np.abs(poses[..., :2] - motion.poses[..., :2]).max() < 1e-9 * motion.Lc
         assert np.abs(np.exp(1j * poses[..., 2]) - np.exp(1j * motion.poses[..., 2])).max() < 1e-9
         fastest = np.abs(motion.velocities).max()

@@ -158,21 +158,26 @@ const Binding = (() => {
         const text = guided ? `SlideLimits(${first}, ${second}, ${end})` : `JointLimits(${first}, ${end})`;
         return `    (${Number(own.a)}, ${Number(own.b)}): ${text},\n`;
       });
-      return [
-        "import math\n",
-        "import numpy as np\n",
-        "import graphsynth",
-        "from graphsynth.jamming.joints import JointLimits, Misalignment, SlideLimits\n",
-        `mechanism = graphsynth.Mechanism.from_json(${JSON.stringify(JSON.stringify(drawn))})`,
-        "motion = mechanism.simulate(np.linspace(0.0, math.tau, 361))",
+      return program(drawn, ["from graphsynth.jamming.joints import JointLimits, Misalignment, SlideLimits"], [
         `limits = {\n${limits.join("")}}`,
         `tilt = Misalignment(${base}, ${a + b - base}, ${tilt.alpha}, ${tilt.direction ?? 0}, rigid=${tilt.rigid === false ? "False" : "True"})`,
         "print(graphsynth.assess_jamming(motion, tilt=tilt, joints=limits, certify=True))\n",
-      ].join("\n");
+      ]);
     }
   }
 
-  return { open: (module, drawn, limits, tilt) => new Seats(module, drawn, limits, tilt) };
+  /* A program that asks the library about a turn of a mechanism: imports, then lines about `mechanism` and `motion`. */
+  const program = (drawn, imports, lines) => [
+    "import math\n",
+    "import numpy as np\n",
+    "import graphsynth",
+    ...imports,
+    `\nmechanism = graphsynth.Mechanism.from_json(${JSON.stringify(JSON.stringify(drawn))})`,
+    "motion = mechanism.simulate(np.linspace(0.0, math.tau, 361))",
+    ...lines,
+  ].join("\n");
+
+  return { program, open: (module, drawn, limits, tilt) => new Seats(module, drawn, limits, tilt) };
 })();
 
 if (typeof module !== "undefined") module.exports = Binding;

@@ -56,7 +56,38 @@
     const rows = [[Bench.word("know.rotation"), text]];
     if (angles.length) rows.push([Bench.word("know.transmission"), `${Bench.shown(Math.round((Math.min(...angles) * 1800) / Math.PI) / 10)}°`]);
     const events = swept.events.map(event => [motion.told(event), () => { motion.to(event.input); app.changed("rest"); }]);
-    return [Bench.rows(rows), events.length ? buttons(events) : null];
+    return [Bench.rows(rows), ...proof(app, motion, swept), events.length ? buttons(events) : null];
+  }
+
+  /** The certificate of the motion: asked for by a button, computed in the worker. */
+  function proof(app, motion, swept) {
+    const own = app.proof && app.proof.swept === swept ? app.proof : null;
+    if (own && own.told) return [make("p", { id: "proved", class: own.good ? "" : "warn" }, own.told), make("p", { class: "soft" }, Bench.word("know.proofabout", { n: own.boxes }))];
+    return [make("div", { class: "acts" }, make("button", { type: "button", "data-certify": true, disabled: Boolean(own), on: { click: () => prove(app, motion, swept) } }, Bench.word("know.prove")))];
+  }
+
+  async function prove(app, motion, swept) {
+    const { engine, driver } = motion, data = Bench.written(app.sheet), turns = swept.full && swept.turns < Infinity ? swept.turns : 0;
+    const asked = { pose: Array.from(engine.pose), driver, from: swept.inputs[0], to: swept.inputs[swept.inputs.length - 1], turns };
+    if (app.work.busy) app.work.stop();
+    app.proof = { swept };
+    app.changed("rest");
+    app.say("said.proving", { share: 0 });
+    const found = await Bench.job(app, ["proof.wasm"], "prove", [data, asked], share => app.say("said.proving", { share: Math.round(100 * share) }));
+    app.proof = null;
+    if (found && !found.known) Bench.showPython(Binding.program(data, [], ["print(graphsynth.certify(motion).statement)\n"]), "python.certify", "prove.py");
+    if (found && found.known) app.proof = { swept, boxes: found.boxes, good: found.high > found.low, told: proved(motion, found, turns) };
+    if (app.proof) app.say(app.proof.good ? "said.proved" : "know.unproved");
+    app.changed("rest");
+  }
+
+  /** What is proved, in words; the ends are rounded inward. */
+  function proved(motion, { low, high, full }, turns) {
+    if (full) return Bench.word(turns === 1 ? "know.provedfull" : "know.provedmany", { n: turns });
+    if (!(high > low)) return Bench.word("know.unproved");
+    const unit = motion.turns ? 180 / Math.PI : 1, step = 10 ** (Math.floor(Math.log10(unit * Math.max(-low, high))) - 3);
+    const at = (value, round) => Bench.shownInput(motion, (round((value * unit) / step) * step) / unit);
+    return Bench.word("know.provedrange", { from: at(low, Math.ceil), to: at(high, Math.floor) });
   }
 
   function drivers(app, motion) {

@@ -43,6 +43,10 @@ const Work = (() => {
     async passing([poses], tell) {
       return Passing.found(await Kernels.load("design"), await Kernels.load("motion"), poses, tell);
     },
+    /* One branch over a range of the driver, proved. */
+    async prove([data, asked], tell) {
+      return Proving.found(await Kernels.load("motion"), await Kernels.load("proof"), data, asked, tell);
+    },
   };
 
   const run = (name, args, tell = () => true) => jobs[name](args, tell);

@@ -1,0 +1,110 @@
+"""The certificate of a motion on the page: beside the library's proofs, and bit for bit that of the native kernels."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from graphsynth import Mechanism, certify
+from graphsynth.kinematics.certify.four_bar import certify_four_bar
+from graphsynth.mechanism import gallery
+from graphsynth.mechanism.files import to_dict
+from graphsynth.mechanism.laws import Linear
+from graphsynth.workbench.posing import assembled
+from tests.workbench.test_workbench_scripts import geared
+
+FOUND = """const motion = await Kernels.load("motion"), proof = await Kernels.load("proof"), found = [];
+for (const data of args[0]) {
+  const engine = Engine.open(motion, data), swept = engine.sweep(), { inputs } = swept;
+  const turns = swept.full && swept.turns < Infinity ? swept.turns : 0;
+  const asked = { pose: Array.from(engine.pose), driver: 0, from: inputs[0], to: inputs[inputs.length - 1], turns };
+  found.push({ ...await Proving.found(motion, proof, data, asked), asked, start: engine.inputs[0], Lc: engine.Lc });
+  engine.close();
+}
+return found;"""
+TURNING = ["klann", "stephenson_six_bar", "toggle_press", "whitworth_quick_return"]
+
+
+def proved(scripts, *mechanisms):
+    return scripts(FOUND, [to_dict(assembled(own)) for own in mechanisms], modules=("motion", "proof"))
+
+
+@pytest.mark.long
+def test_full_turns_are_proved_where_the_library_proves_them(scripts):
+    own = [getattr(gallery, name)() for name in TURNING] + [Mechanism.slider_crank(1.0, 3.0, 0.2)]
+    for mechanism, found in zip(own, proved(scripts, *own)):
+        theirs = certify(mechanism.simulate(np.linspace(0.0, 2.0 * np.pi, 73)))
+        assert theirs.certified and theirs.closed
+        assert found["full"] and found["boxes"] > 10
+
+
+@pytest.mark.long
+def test_a_rocker_is_proved_up_to_its_exact_limits_and_not_beyond(scripts):
+    lengths = [(2.0, 1.5, 1.0, 1.0), (4.0, 3.0, 2.0, 2.5)]
+    for given, found in zip(lengths, proved(scripts, *(Mechanism.four_bar(*own) for own in lengths))):
+        (limit,) = certify_four_bar(*given).limits  # of both signs
+        assert not found["full"]
+        assert limit.low - 1e-5 < -found["low"] < limit.low and limit.low - 1e-5 < found["high"] < limit.low
+
+
+@pytest.mark.long
+def test_nothing_is_proved_through_a_position_where_branches_meet(scripts):
+    """A parallelogram folds flat after half a turn; a gear is none of the known joints."""
+    flat, wheels = proved(scripts, Mechanism.four_bar(2.0, 1.0, 2.0, 1.0, crank_angle=1.0), geared())
+    assert not flat["full"] and flat["low"] == flat["start"]
+    assert math.pi - 1e-5 < flat["high"] < math.pi
+    assert wheels == {"known": False} | {key: wheels[key] for key in ("asked", "start", "Lc")}
+
+
+@pytest.mark.slow  # numba compiles the kernels
+@pytest.mark.parametrize("name", ["klann", "peaucellier"])
+def test_the_page_has_the_bits_of_the_library_and_boxes_hold_the_motion(scripts, name):
+    from graphsynth.kinematics.certify import kernels
+    from graphsynth.kinematics.engine.program import equations
+
+    mechanism = Mechanism.from_json(json.dumps(to_dict(assembled(getattr(gallery, name)()))))
+    (found,) = proved(scripts, mechanism)
+    asked, start, Lc = found["asked"], float(found["start"]), float(found["Lc"])
+    (driver,) = mechanism.drivers
+    assert driver.law == Linear()  # inputs are coordinates
+    rows, (table,) = equations(mechanism.joints, mechanism.dimensions[None], mechanism.drivers)
+    poses = np.array(asked["pose"], dtype=np.float64).reshape(-1, 3)
+    box, turns, inputs = np.zeros((4, *poses.shape)), np.zeros(len(rows)), np.array([start])
+    box[0], state, seen = poses, np.array([start, 0.05, 0.0, 0.0]), {start: box}
+
+    def march(goal):
+        """Node after node, as far as it goes."""
+        given = rows, table, mechanism.frame, inputs, 0, goal, Lc, turns, box, state
+        while (code := kernels.march(*given, int(state[kernels.TESTED] + 1))) == kernels.LIMIT:
+            if state[kernels.AT] not in seen:
+                seen[state[kernels.AT]] = box.copy()
+        return code
+
+    assert kernels.march(rows, table, mechanism.frame, inputs, 0, 9.0, Lc, turns, box, state, 0) == kernels.LIMIT
+    first, goal = box.copy(), start + 2.0 * math.pi * asked["turns"] if asked["turns"] else float(asked["to"])
+    code = march(goal)
+    assert found["high"] == state[kernels.AT]
+    if asked["turns"]:
+        assert code == kernels.DONE and found["boxes"] == state[kernels.NODES]
+        given = [rows, table, mechanism.frame, 0, first, start, box, goal, asked["turns"]]
+        assert found["full"] == kernels.closes(*given) is True
+        given[4] = first * [[[1.0]], [[1.0]], [[1e-9]], [[1.0]]]  # nothing comes back so exactly
+        assert not kernels.closes(*given)
+    else:
+        boxes = state[kernels.NODES]
+        box[:], state[:] = first, [start, -0.05, 1.0, 0.0]
+        march(float(asked["from"]))
+        assert found["low"] == state[kernels.AT] and found["boxes"] == boxes + state[kernels.NODES] - 1
+    # the engine goes through the nodes
+    for way in (1.0, -1.0):
+        own = sorted((node for node in seen.items() if way * (node[0] - start) > 0.0), key=lambda node: way * node[0])
+        motion = mechanism.simulate([start, *(at for at, _ in own)], start=poses, events=False)
+        assert motion.assembled.all()
+        for pose, (_, node) in zip(motion.poses[1:], own, strict=True):
+            off = pose - node[kernels.CENTRE]
+            off[:, 2] = np.remainder(off[:, 2] + math.pi, math.tau) - math.pi
+            assert (np.abs(off) < node[kernels.TIGHT] + 1e-9).all()
+    assert len(seen) > 100
