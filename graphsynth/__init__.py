@@ -23,6 +23,7 @@ _shown.WORK.update(
         "embody": "graphsynth.kinematics.dimensional.api:embody",
         "draw graph": "graphsynth.drawing.methods:draw_graph",
         "draw multiple joints": "graphsynth.drawing.methods:draw_multiple_joints",
+        "mechanism of gear train": "graphsynth.mechanism.geared_trains:train_mechanism",
         "draw gear train": "graphsynth.drawing.methods:draw_gear_train",
         "draw sliders": "graphsynth.drawing.methods:draw_sliders",
         "graph picture": "graphsynth.drawing.methods:graph_picture",

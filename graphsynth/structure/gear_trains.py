@@ -186,6 +186,28 @@ class PlanetaryGearTrain(ColouredChain):
         """Return the efficiency with losses in the teeth; see `graphsynth.structure.gear_speeds.efficiency`."""
         return efficiency(self, Arrangement(input, output, self._fixed(fixed)), teeth, mesh)
 
+    def mechanism(self, input: int, fixed: int | None = None, *, teeth: Teeth) -> gs.Mechanism:
+        """Return it as a planar mechanism that moves: axes placed, pitch radii by the teeth, the input driven.
+
+        Axes are placed by the teeth, in directions of their own; every gear pair has the module that fits there.
+
+        Parameters
+        ----------
+        input, fixed : int
+            The driven link, on an axis of the fixed one (the frame by default).
+        teeth : mapping
+            As for the speeds, numbers; internal gears, with negative ones, larger than their pinions.
+
+        Raises
+        ------
+        GraphError
+            For an input that does not turn about an axis of the fixed link.
+        SpecError
+            For teeth without a number or of an internal gear that is too small; else as for the speeds.
+        """
+        found: gs.Mechanism = work("mechanism of gear train")(self, input, self._fixed(fixed), teeth)
+        return found
+
     def _fixed(self, fixed: int | None) -> int:
         if fixed is None and self.frame is None:
             raise GraphError("no link is fixed: name the fixed link, or choose a frame")
