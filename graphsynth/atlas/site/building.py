@@ -199,7 +199,7 @@ def _write_pages(folder: Path, data: list[str]) -> list[Path]:
     loaded = {
         "style.css": texts["style.css"],
         "theme.js": texts["theme.js"],
-        "atlas.js": "".join([page_file("kernels.js"), script("labels"), *own]),
+        "atlas.js": "".join([page_file("kernels.js"), page_file("labelling.js"), script("labels"), *own]),
         "index.html": page.from_string(texts["index.html"]).render(data=data),
     }
     for name, text in loaded.items():

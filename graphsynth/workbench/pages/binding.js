@@ -41,8 +41,8 @@ const Binding = (() => {
       const rows = this.joints.map((k) => this.limitsOf(k));
       if (rows.flat().some((value) => !(value >= 0 && value < Infinity))) this.fault = this.fault || "limits";
       if (this.fault) return;
-      const codes = [...drawn.graph].map((letter) => letter.charCodeAt(0) - 63), frame = /\sf(\d+)/.exec(drawn.graph);
-      this.links = codes[0] < 63 ? codes[0] : (codes[1] << 12) | (codes[2] << 6) | codes[3];
+      const { links, frame } = Engine.graphOf(drawn.graph);
+      this.links = links;
       const own = this.joints.map((k) => drawn.joints[k]), count = own.length;
       const direction = tilt.direction ?? 0, side = (tilt.base ?? tilted.a) === tilted.a ? 1 : -1;
       this.seats = {
@@ -55,7 +55,7 @@ const Binding = (() => {
           ? [tilt.alpha * Math.cos(direction), tilt.alpha * Math.sin(direction), side] : [0, 0, 1]))),
       };
       const loops = this.array("f8", [Math.max(1, count), Math.max(1, count)]);
-      const found = this.call("loops", this.seats.pairs, this.links, frame ? Number(frame[1]) : 0, loops);
+      const found = this.call("loops", this.seats.pairs, this.links, frame, loops);
       this.incidence = this.array("f8", [found, count], loops.data.slice(0, found * count));
     }
 

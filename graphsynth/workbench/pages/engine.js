@@ -17,6 +17,7 @@
      engine.pointMotion(link, at, swept) -> n x [x, y, vx, vy, ax, ay] of a point of a link over a sweep, or as it stands
      engine.transmission(margins)       -> [{group, angle}]
      engine.drivers()                   -> joints that could drive it
+     Engine.graphOf(text)               -> {links, frame} of the text of a graph
      engine.place(pose)                 -> whether the joints close there; the branch is the nearest one
      engine.close()                     gives its memory back */
 
@@ -374,7 +375,7 @@ const Engine = (() => {
     }
   }
 
-  return { open: (motion, drawn) => new Mechanism(motion, drawn), FAULTS, STOPS, DRIVE_P };
+  return { open: (motion, drawn) => new Mechanism(motion, drawn), graphOf, FAULTS, STOPS, DRIVE_P };
 })();
 
 if (typeof module !== "undefined") module.exports = Engine;

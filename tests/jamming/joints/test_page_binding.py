@@ -26,6 +26,7 @@ from graphsynth.workbench import __file__ as _workbench
 PAGES = Path(_workbench).with_name("pages")
 RUNNER = """
 const fs = require("fs"), [, , pages, modules, jobs, results] = process.argv;
+globalThis.Engine = require(`${pages}/engine.js`);
 const Kernels = require(`${pages}/kernels.js`), Binding = require(`${pages}/binding.js`);
 const plain = (key, value) => ArrayBuffer.isView(value) ? Array.from(value) : value === Infinity ? "inf" : value;
 async function main() {

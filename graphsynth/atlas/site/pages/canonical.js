@@ -9,16 +9,13 @@
 
   /** {to: canonical place of each link, order (BigInt), orbits, key, canonical}. */
   Atlas.label = function (graph) {
-    const colours = new Array(graph.links).fill(0), to = [];
+    const colours = new Array(graph.links).fill(0);
     if (graph.frame !== null) {
       const levels = Atlas.levels(graph);
       colours.fill(levels.length);
       levels.forEach((level, k) => level.forEach(link => { colours[link] = k; }));
     }
-    const found = labels.call("structure.kernels.canon_packed", graph.links, graph.joints.flat(), colours);
-    const [vertices, , index, orbits] = found.map(array => Array.from(array.data, Number));
-    vertices.forEach((link, place) => { to[link] = place; });
-    const canonical = Atlas.relabelled(graph, to), order = index.reduce((product, size) => product * BigInt(size), 1n);
-    return {to, canonical, key: Atlas.encodeKey(canonical), order, orbits};
+    const {to, order, orbits} = Labelling.found(labels, graph.links, graph.joints, colours), canonical = Atlas.relabelled(graph, to);
+    return {to, canonical, key: Labelling.key(graph.links, canonical.joints, graph.space | (graph.frame !== null ? 8 : 0)), order, orbits};
   };
 })();

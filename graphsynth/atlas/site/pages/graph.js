@@ -129,8 +129,6 @@ Atlas.fromGraph6 = function (text) {
 
 // --- canonical keys, version 1: see docs/explanation/mechanism-graph.md
 
-Atlas.KEY_VERSION = "1";
-
 Atlas.DIGITS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
 
 Atlas.fromBase64 = function (text) {
@@ -146,33 +144,10 @@ Atlas.fromBase64 = function (text) {
   return bytes;
 };
 
-Atlas.toBase64 = function (bytes) {
-  let text = "", held = 0, bits = 0;
-  for (const byte of bytes) {
-    held = (held << 8 | byte) & 0xffff;
-    bits += 8;
-    while (bits >= 6) { bits -= 6; text += Atlas.DIGITS[held >> bits & 63]; }
-  }
-  return bits ? text + Atlas.DIGITS[held << 6 - bits & 63] : text;
-};
-
-/** The bytes of a graph whose links are in canonical order. */
-Atlas.encodeKey = function (graph) {
-  const size = graph.links * (graph.links - 1) / 2, coloured = graph.joints.some(joint => joint[2] !== 1);
-  const stream = new Array(Math.ceil((size + (coloured ? 3 * graph.joints.length : 0)) / 8)).fill(0);
-  const put = bit => { stream[bit >> 3] |= 128 >> (bit & 7); };
-  graph.joints.forEach(([a, b, mobility], k) => {
-    put(b * (b - 1) / 2 + a);
-    if (coloured) for (let i = 0; i < 3; i++) if (mobility - 1 & 4 >> i) put(size + 3 * k + i);
-  });
-  const flags = graph.space | (graph.frame !== null ? 8 : 0) | (coloured ? 16 : 0);
-  return Atlas.KEY_VERSION + Atlas.toBase64([graph.links, flags, ...stream]);
-};
-
 Atlas.decodeKey = function (text) {
-  if (text[0] !== Atlas.KEY_VERSION) throw new Atlas.Fault(`A key of this version starts with ${Atlas.KEY_VERSION}.`);
+  if (text[0] !== Labelling.VERSION) throw new Atlas.Fault(`A key of this version starts with ${Labelling.VERSION}.`);
   const data = Atlas.fromBase64(text.slice(1));
-  if (data.length < 2 || Atlas.toBase64(data) !== text.slice(1)) throw new Atlas.Fault("This is not a whole key.");
+  if (data.length < 2 || Labelling.base64(data) !== text.slice(1)) throw new Atlas.Fault("This is not a whole key.");
   const [links, flags] = data, space = flags & 7, size = links * (links - 1) / 2;
   if (links < 1 || links > Atlas.LINKS_MAX || space < 2 || space > 6 || flags >> 5) throw new Atlas.Fault("The first bytes of this key describe no graph.");
   const bit = place => data[2 + (place >> 3)] >> 7 - (place & 7) & 1;
