@@ -267,13 +267,19 @@ def connected(clusters: Clusters, links: int) -> Terms:
 
 def read(path: Path) -> dict[Cycles, int]:
     """Read what `main` has written."""
-    pairs = [line.split(": ") for line in path.read_text(encoding="utf-8").splitlines() if ": " in line]
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    pairs = [line.split(": ") for line in lines if ": " in line and line.endswith("\n")]  # the last may be cut short
     return {tuple(map(int, cycles.split())): int(count) for cycles, count in pairs}
+
+
+def _line(cycles: Cycles, count: int) -> str:
+    return f"{' '.join(map(str, cycles))}: {count}\n"
 
 
 def main(links: int, path: Path) -> None:
     """Write for each kind of permutation how many labelled chains it keeps, and print the number of chains."""
     kept = read(path) if path.exists() else {}
+    path.write_text("".join(_line(cycles, count) for cycles, count in kept.items()), encoding="utf-8")
     clusters = Clusters(links, joints_of(links, 3))
     for cycles in reversed([*partitions(links, links)]):  # powers of a permutation come before it
         if cycles not in kept:
@@ -282,7 +288,7 @@ def main(links: int, path: Path) -> None:
             kept[cycles] = 0 if none else kept_by(clusters, cycles)
             clusters.forget()
             with path.open("a", encoding="utf-8") as stream:
-                print(*cycles, end=f": {kept[cycles]}\n", file=stream)
+                stream.write(_line(cycles, kept[cycles]))
     print(mean(kept))
 
 
