@@ -39,12 +39,6 @@ def slopes(z: Any, p: Any, q: Any) -> list[Any]:
     return found
 
 
-def third_pivot(z: Any) -> tuple[Any, Any, Any, Any]:
-    """Numerators and denominators of the third pivot and of its conjugate (Roberts)."""
-    a, aa, x, xx, b, bb, y, yy = z
-    return a * y - b * x, y - x, aa * yy - bb * xx, yy - xx
-
-
 def cognates(z: Any) -> list[tuple[Any, ...]]:
     """Return the three linkages with the same path, the given one first; numbers that can be divided.
 
