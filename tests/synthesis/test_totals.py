@@ -277,6 +277,20 @@ def test_the_second_count_is_the_first(links):
     assert rigid_clusters.mean(kept) == (certificate["chains"] if links == 20 else CHAINS[18])
 
 
+def test_what_there_is_of_22_links_bounds_their_number():
+    """The identity and up to four exchanges; the same pieces of smaller numbers of links leave out less and less."""
+    kinds = list(second_count(22))
+    shares = []
+    for links, whole in ((18, CHAINS[18]), (20, 141_954_670_341)):
+        kept = second_count(links)
+        few = {cycles[: links - 22] for cycles in kinds}
+        own = {cycles: kept[cycles] for cycles in few}
+        shares.append(sum(Fraction(count, rigid_clusters.centraliser(cycles)) for cycles, count in own.items()) / whole)
+    assert 0.9993 < shares[0] < shares[1] < 1
+    least = sum(Fraction(kept, rigid_clusters.centraliser(cycles)) for cycles, kept in second_count(22).items())
+    assert 15_245_455_172_180 < least < 15_245_455_172_181
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("links", [18, 20])
 def test_parts_of_the_second_count_made_anew(links):
