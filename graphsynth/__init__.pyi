@@ -71,6 +71,7 @@ from .synthesis.api import (
     enumerate_baranov_trusses as enumerate_baranov_trusses,
     enumerate_chains as enumerate_chains,
     enumerate_mechanisms as enumerate_mechanisms,
+    sample_chains as sample_chains,
     sample_mechanisms as sample_mechanisms,
 )
 from .synthesis.gear_trains import (

@@ -7,6 +7,7 @@ from .api import (
     enumerate_baranov_trusses as enumerate_baranov_trusses,
     enumerate_chains as enumerate_chains,
     enumerate_mechanisms as enumerate_mechanisms,
+    sample_chains as sample_chains,
     sample_mechanisms as sample_mechanisms,
 )
 from .gear_trains import (

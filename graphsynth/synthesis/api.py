@@ -165,6 +165,45 @@ def count_chains(
     return counted(EnumerationProblem.chains(*asked, counted=wishes is None).wishing(wishes), executor)
 
 
+def sample_chains(
+    links: int,
+    mobility: int = 1,
+    *,
+    k: int,
+    seed: int,
+    space: int = 3,
+    joints_by_mobility: Mapping[int, int] | None = None,
+    fractionated: bool = False,
+) -> list[MechanismGraph]:
+    """Draw k of what ``enumerate_chains`` yields, independently and exactly uniformly, without a list.
+
+    Parameters
+    ----------
+    links, mobility, space, joints_by_mobility, fractionated
+        As for `enumerate_chains`; fractionated chains are listed, to be drawn.
+    k, seed : int
+        As for `sample_mechanisms`.
+
+    Returns
+    -------
+    list of MechanismGraph
+        Of length ``k``.
+
+    Raises
+    ------
+    InfeasibleSpecError
+        If there is nothing to draw from; else as for `enumerate_chains`.
+
+    Examples
+    --------
+    >>> [chain.mobility for chain in sample_chains(12, k=2, seed=1)]
+    [1, 1]
+    """
+    from graphsynth.synthesis.sampling import sample
+
+    return sample(EnumerationProblem.chains(links, mobility, space, joints_by_mobility, fractionated, None), k, seed)
+
+
 def enumerate_mechanisms(
     spec: StructuralSpec | LinkAssortment,
     *,
