@@ -179,6 +179,9 @@ def _label_place(outline: Rounded, holes: Sequence[Rounded]) -> complex:
     if isinstance(outline, Cut):  # between hub and rim
         reach = 0.5 * min(abs(corner.at - middle) for corner in outline.corners)
         tries += [middle + reach * cmath.exp(0.25j * math.pi * k) for k in range(8)]
+    for teeth in (hole for hole in holes if isinstance(hole, Cut)):  # on the rim of a ring
+        reach = 0.5 * (outline.radius + teeth.radius)
+        tries += [middle + reach * cmath.exp(0.25j * math.pi * k) for k in range(8)]
     return max(
         tries, key=lambda z: min((min(abs(z - c) for c in hole.hull) - hole.radius for hole in holes), default=0.0)
     )

@@ -41,8 +41,8 @@ def parts(
     Parameters
     ----------
     motion : Motion
-        Of a planar mechanism; its links are sheets, the frame is the board below all others.  External gears become
-        wheels with involute teeth, cams disks, each in the layer of what it touches.
+        Of a planar mechanism; its links are sheets, the frame is the board below all others.  Gears become wheels
+        and rings with involute teeth, cams disks, each in the layer of what it touches.
     unit : float
         Millimetres of one unit of length of the mechanism.
     sizes : PartSizes, optional

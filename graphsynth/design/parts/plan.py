@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import positive
 from graphsynth.core.errors import GeometryError
 from graphsynth.design.parts.outline import Rounded
-from graphsynth.design.parts.wheels import Wheel, pair
+from graphsynth.design.parts.wheels import Cut, Wheel, pair
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
 
@@ -150,6 +150,12 @@ class PartsPlan(NamedTuple):
         at = sheet - self._first
         return self.wheels[at] if 0 <= at < len(self.wheels) else ""
 
+    def through(self, pin: Pin) -> list[int]:
+        """Return the rings through the middle of whose hole a pin goes."""
+        rings = (sheet for sheet, own in enumerate(self.holes) if any(isinstance(hole, Cut) for hole in own))
+        ends = dict(zip(pin.sheets, pin.places))
+        return [k for k in rings if self.links[k] in ends and _near(ends[self.links[k]], self.outlines[k].hull[0])]
+
     @property
     def _first(self) -> int:
         """First sheet that is no link."""
@@ -259,9 +265,10 @@ def _fastened(
     pins: list[Pin],
 ) -> list[tuple[Rounded, str]]:
     """Put a wheel on the pin in its centre, a roller on one of its own, and dowels through it; return its holes."""
-    link, at, found = own.link, own.centre, []
+    link, at = own.link, own.centre
+    found: list[tuple[Rounded, str]] = [] if own.hole is None else [(own.hole, "teeth")]
     name = f"{own.told.partition(',')[0]} {sheet} of link {link}"
-    for k, pin in enumerate(pins):
+    for k, pin in enumerate(pins if own.hole is None else ()):
         if pin.kind != "guide" and link in pin.sheets and _near(pin.places[pin.sheets.index(link)], at):
             pins[k] = pin._replace(sheets=(*pin.sheets, sheet), places=(*pin.places, at))
             tight = pin.link == link and not own.rolls
@@ -276,8 +283,10 @@ def _fastened(
         return found
     far = max((p - at for p in places[link]), key=abs, default=1.0 + 0j)
     along = far / abs(far) if abs(far) > _SAME * abs(at) else 1.0 + 0j
+    before = sum(pin.kind == "dowel" and pin.link == link for pin in pins) // 2
+    along *= cmath.exp(1j * math.pi / 3.0 * before)  # clear of those of another wheel
     for side in (1.0, -1.0):
-        there = at + side * _dowels(sizes) * along
+        there = at + side * (own.dowels or _dowels(sizes)) * along
         other = "" if side > 0.0 else ", second"
         pins.append(Pin((link, sheet), (there, there), link, there, "dowel", name + other))
         places[link].append(there)

@@ -1,7 +1,8 @@
 """Gear wheels and disk cams as sheets beside their links, in the layer of what they touch (theory/parts 4).
 
-A wheel has involute teeth of 20 degrees, addendum one module and dedendum 1.25; a cam the curve within its pitch curve
-by the radius of its roller.  Two dowels fasten each to its link; a roller turns on a pin of its own.
+A wheel has involute teeth of 20 degrees, addendum one module and dedendum 1.25, and so has a ring, inside; a cam is the
+curve within its pitch curve by the radius of its roller.  Two dowels fasten each to its link; a roller turns on its own
+pin.
 """
 
 from __future__ import annotations
@@ -26,6 +27,9 @@ Complex = NDArray[np.complex128]
 _PRESSURE, _ADDENDUM, _DEDENDUM, _BACKLASH = math.radians(20.0), 1.0, 1.25, 0.04
 #: Fewest teeth, below which a rack would undercut them; largest whole numbers of a ratio; points of a flank.
 _FEWEST, _RATIO, _FLANK = 17, 200, 8
+#: Fewest teeth of a ring, all involute, and by how many at least it has more than its wheel: else tips meet on the way
+#: in and out of the mesh.
+_RING, _MORE = 34, 9
 #: Points of a cam, more where it has many harmonics; directions in which it is touched by what holds it.
 _POINTS, _WAVES, _TOUCHED = 360, 24, 24
 #: Distances of centres that differ by less, of their size, are what they should be.
@@ -58,7 +62,7 @@ class Cut(Rounded):
 class Wheel(NamedTuple):
     """A sheet of a link that touches another one: its link, centre, outline, the radius free for dowels, what it is.
 
-    ``rolls``: it turns on a pin and needs no dowels.
+    ``rolls``: it turns on a pin and needs no dowels.  ``hole``: of a ring its teeth; ``dowels``, from the centre.
     """
 
     link: int
@@ -67,33 +71,33 @@ class Wheel(NamedTuple):
     free: float
     told: str
     rolls: bool = False
+    hole: Rounded | None = None
+    dowels: float = 0.0
 
 
 def check(motion: Motion) -> None:
-    """Refuse what has no teeth: rings, ratios without whole numbers, centres elsewhere than both radii apart."""
+    """Refuse what has no teeth: ratios without whole numbers, centres elsewhere than where the pitch circles touch."""
     poses = motion.poses[motion.assembled]
     for joint in motion.mechanism.joints:
         if not isinstance(joint, Gear):
             continue
         name = f"gear {joint.a}-{joint.b}"
-        if joint.internal:
-            raise GeometryError(f"{name} is internal; parts are made for external wheels, a ring has no outline yet")
         teeth(joint)
         ends = ((joint.a, joint.at_a), (joint.b, joint.at_b))
         a, b = (poses[:, k, :2] @ [1, 1j] + np.exp(1j * poses[:, k, 2]) * complex(*at) for k, at in ends)
-        far, need = np.abs(b - a), joint.radius_a + joint.radius_b
+        far, need = np.abs(b - a), abs(joint.radius_a + joint.sign * joint.radius_b)
         if np.abs(far - need).max() > _SAME * need:
             raise GeometryError(
-                f"the centres of {name} are {far.min():.6g} to {far.max():.6g} apart, its pitch radii together "
-                f"{need:.6g}; make them equal, so that teeth meet"
+                f"the centres of {name} are {far.min():.6g} to {far.max():.6g} apart, and its pitch circles "
+                f"touch at {need:.6g}; make them equal, so that teeth meet"
             )
 
 
 def teeth(joint: Gear) -> tuple[int, int]:
-    """Return the least numbers of teeth of a pair, none below 17.
+    """Return the least numbers of teeth of a pair, none below 17; of a ring 34 or more, and 9 more than of its wheel.
 
-    >>> teeth(Gear(0, 1, radius_a=1.0, radius_b=1.5))
-    (18, 27)
+    >>> teeth(Gear(0, 1, radius_a=1.0, radius_b=1.5)), teeth(Gear(0, 1, radius_a=1.0, radius_b=1.5, internal=True))
+    ((18, 27), (24, 36))
     """
     ratio = joint.radius_a / joint.radius_b
     whole = Fraction(ratio).limit_denominator(_RATIO)
@@ -102,17 +106,21 @@ def teeth(joint: Gear) -> tuple[int, int]:
             f"the radii of gear {joint.a}-{joint.b}, {joint.radius_a:g} and {joint.radius_b:g}, have no ratio of whole "
             f"numbers up to {_RATIO}; give such radii, for teeth are counted"
         )
-    times = -(-_FEWEST // min(whole.numerator, whole.denominator))
+    few, many = sorted((whole.numerator, whole.denominator))
+    times = -(-_FEWEST // few)
+    if joint.internal:
+        times = max(times, -(-_RING // many), -(-_MORE // (many - few)))
     return whole.numerator * times, whole.denominator * times
 
 
-def wheel(count: int, pitch: float, centre: complex, first: float) -> Cut:
-    """Return a wheel with so many teeth on a pitch radius, the middle of one of them in a direction."""
+def wheel(count: int, pitch: float, centre: complex, first: float, ring: bool = False) -> Cut:
+    """Return a wheel with so many teeth on a pitch radius, the middle of one in a direction; or the hole of a ring."""
     module = 2.0 * pitch / count
-    base, tip, root = pitch * math.cos(_PRESSURE), pitch + _ADDENDUM * module, pitch - _DEDENDUM * module
+    out, inward, play = (_DEDENDUM, _ADDENDUM, -_BACKLASH) if ring else (_ADDENDUM, _DEDENDUM, _BACKLASH)
+    base, tip, root = pitch * math.cos(_PRESSURE), pitch + out * module, pitch - inward * module
     radii: NDArray[np.float64] = np.linspace(max(base, root), tip, _FLANK)
     angle = np.arccos(base / radii)
-    whole = math.pi / (2 * count) - 0.25 * _BACKLASH * module / pitch + math.tan(_PRESSURE) - _PRESSURE
+    whole = math.pi / (2 * count) - 0.25 * play * module / pitch + math.tan(_PRESSURE) - _PRESSURE
     half = np.asarray(whole - (np.tan(angle) - angle))  # of a tooth, at these radii
     if root < base:
         radii, half = np.append(root, radii), np.append(half[0], half)
@@ -154,12 +162,21 @@ def pair(joint: Gear | Cam, unit: float, pose: NDArray[np.float64], roller: floa
         )
     a, b = (complex(*pose[k, :2]) + cmath.exp(1j * pose[k, 2]) * at for k, at in ((joint.a, A), (joint.b, B)))
     towards, found = cmath.phase(b - a), []
-    for count, link, at, radius, first in zip(
-        teeth(joint), (joint.a, joint.b), (A, B), (joint.radius_a, joint.radius_b), (towards, towards + math.pi)
+    rings = tuple(
+        joint.internal and own == max(joint.radius_a, joint.radius_b) for own in (joint.radius_a, joint.radius_b)
+    )
+    meet = (towards + math.pi * rings[1], towards + math.pi * (not rings[0]))  # where the pitch circles touch
+    for count, link, at, radius, first, ring in zip(
+        teeth(joint), (joint.a, joint.b), (A, B), (joint.radius_a, joint.radius_b), meet, rings
     ):
-        pitch, gap = radius * unit, math.pi / count if link == joint.b else 0.0  # a tooth of a in a gap of b
+        # a tooth of a in a gap of b; the hole of a ring has teeth where the ring has gaps
+        pitch, gap = radius * unit, 0.0 if joint.internal or link == joint.a else math.pi / count
         module = 2.0 * pitch / count
-        outline = wheel(count, pitch, at, first + gap - float(pose[link, 2]))
-        told = f"wheel, {count} teeth, module {module:.4g} mm"
-        found.append(Wheel(link, at, outline, pitch - _DEDENDUM * module, told))
+        outline = wheel(count, pitch, at, first + gap - float(pose[link, 2]), ring)
+        told = f"{'ring' if ring else 'wheel'}, {count} teeth, module {module:.4g} mm"
+        if ring:
+            rim = outline.radius + roller
+            found.append(Wheel(link, at, Rounded((at,), rim + roller), math.inf, told, hole=outline, dowels=rim))
+        else:
+            found.append(Wheel(link, at, outline, pitch - _DEDENDUM * module, told))
     return found[0], found[1]

@@ -40,6 +40,22 @@ def planetary():
     return Mechanism(PLANET, joints, (Driver(0, 1),))
 
 
+def ringed(few, many):
+    """A planet in a ring on the frame, with the fewest teeth that mesh."""
+    joints = (Revolute(0, 1), Revolute(1, 2, (3.0, 0.0)))
+    unit = 3.0 / (many - few)
+    gear = Gear(0, 2, radius_a=many * unit, radius_b=few * unit, internal=True)
+    return Mechanism(PLANET, (*joints, gear), (Driver(0, 1),))
+
+
+def train():
+    """Sun, planet, carrier, and a ring on the frame."""
+    graph = MechanismGraph(4, [(0, 1), (0, 3), (2, 3), (1, 2, 2), (0, 2, 2)], frame=0)
+    turning = (Revolute(0, 1), Revolute(0, 3), Revolute(2, 3, (0.0, 0.0), (3.0, 0.0)))
+    gears = (Gear(1, 2, radius_a=2, radius_b=1), Gear(0, 2, radius_a=4, radius_b=1, internal=True))
+    return Mechanism(graph, (*turning, *gears), (Driver(0, 1),))
+
+
 def distances(P, Q):
     """Distances of points (n,) from the sides of a closed polygon (m,)."""
     side = np.roll(Q, -1) - Q
@@ -48,15 +64,20 @@ def distances(P, Q):
 
 
 def edges(made, poses):
-    """Boundaries of both sheets that touch, at poses."""
+    """Boundaries of both sheets that touch, at poses; of a ring its hole."""
     ((one, other),) = made.plan.touching
+    shapes = [(made.plan.holes[k][0] if "ring" in made.plan.wheel(k) else made.plan.outlines[k]) for k in (one, other)]
     return [
-        carried(np.array(made.plan.outlines[k].flat(1e-3)), poses, made.plan.links[k], made.unit) for k in (one, other)
+        carried(np.array(own.flat(1e-3)), poses, made.plan.links[k], made.unit) for own, k in zip(shapes, (one, other))
     ]
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("mechanism", [geared(), planetary()], ids=["pair", "planet"])
+@pytest.mark.parametrize(
+    "mechanism",
+    [geared(), planetary(), ringed(17, 34), ringed(25, 34), ringed(41, 50)],
+    ids=["pair", "planet", "ring", "ring with nine teeth more", "the same with more"],
+)
 def test_teeth_mesh_and_nowhere_cut_each_other(mechanism):
     made = gs.parts(gs.simulate(mechanism, np.linspace(0.0, 2.0 * math.pi, 73)), unit=60.0)
     assert made.certified and "touch by design" in made.statement
@@ -67,7 +88,8 @@ def test_teeth_mesh_and_nowhere_cut_each_other(mechanism):
     for P, Q in zip(*edges(made, gs.simulate(mechanism, inputs).poses)):
         for A, B in ((P, Q), (Q, P)):
             shape = Path(np.column_stack([B.real, B.imag]))
-            assert not shape.contains_points(np.column_stack([A.real, A.imag])).any()
+            within = shape.contains_points(np.column_stack([A.real, A.imag]))
+            assert within.all() if "ring" in made.plan.wheel(one) and A is Q else not within.any()
         near = min(distances(P, Q).min(), distances(Q, P).min())
         assert near < 0.04 * module  # the play of a pitch, of which a flank has half at most
 
@@ -86,6 +108,23 @@ def test_a_wheel_has_its_teeth_and_its_mass():
         assert len(holes) == 3  # the pivot and two dowels
     text = str(made)
     assert "1w" in text and {"wheel 1w", "wheel 2w"} <= {row.part for row in made.bill}
+
+
+def test_a_train_with_a_ring_is_built():
+    """The shaft of the sun and the carrier goes through the hole of the ring, which is on the board."""
+    made = gs.parts(gs.simulate(train(), np.linspace(0.0, 6.0, 25)), unit=30.0, prove=False)
+    told = {made.plan.label(k): made.plan.wheel(k).split(",")[:2] for k in range(4, 8)}
+    assert told["0w"] == ["ring", " 68 teeth"] and told["1w"] == ["wheel", " 34 teeth"]
+    assert [told[k][1] for k in ("2w", "2w2")] == [" 17 teeth"] * 2
+    ring = next(k for k in range(4, 8) if made.plan.label(k) == "0w")
+    shaft = next(pin for pin in made.plan.pins if pin.kind == "shaft")
+    assert made.plan.through(shaft) == [ring] and min(made.layers[k] for k in (1, 3)) > made.layers[ring]
+    outline, holes = made.plan.outlines[ring], made.plan.holes[ring]
+    area = math.pi * outline.radius**2 - sum(polygon_moments(np.array(h.flat(1e-4)))[0] for h in holes)
+    assert math.isclose(made.moments(ring).area, area, rel_tol=1e-6)
+    for dowel in holes[1:]:  # in the rim
+        far = abs(dowel.hull[0] - outline.hull[0])
+        assert holes[0].radius + dowel.radius < far < outline.radius - dowel.radius
 
 
 def test_a_roller_touches_its_cam_all_around():
@@ -117,7 +156,7 @@ def test_files_hold_the_teeth(tmp_path):
     [
         (geared(radius_a=math.pi / 3.0, radius_b=math.hypot(3.0, 0.4) - math.pi / 3.0), "whole numbers"),
         (geared(radius_a=1.0, radius_b=3.0), "centres of gear 1-2 are 3.02655"),
-        (geared(radius_a=1.0, radius_b=4.0, internal=True), "internal"),
+        (geared(radius_a=1.0, radius_b=4.0, internal=True), "3.02655 apart, and its pitch circles touch at 3;"),
     ],
 )
 def test_what_cannot_mesh_is_refused(mechanism, words):

@@ -11,11 +11,11 @@ import pytest
 import graphsynth as gs
 from graphsynth.core.errors import GeometryError
 from graphsynth.design import DesignTask, PathTarget, SwingTarget, design
-from graphsynth.kinematics.dimensional.mirror import mirrors
 from graphsynth.design.task.model import Model
 from graphsynth.design.task.plans import plans
 from graphsynth.design.task.starts import random_starts
 from graphsynth.kinematics.dimensional.design import Design, choices
+from graphsynth.kinematics.dimensional.mirror import mirrors
 from graphsynth.synthesis import enumerate_chains
 
 ARCH = PathTarget(points=[(x, 0.5 * (4.0 - x * x)) for x in np.linspace(-2.0, 2.0, 9).tolist()], tolerance=0.01)
