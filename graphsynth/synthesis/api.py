@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from html import escape
 from itertools import islice
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Protocol, TypeVar, overload
 
 from graphsynth.core.errors import GraphError
 from graphsynth.synthesis.problem import EnumerationProblem, counted, graphs
@@ -17,12 +17,20 @@ if TYPE_CHECKING:
     from graphsynth.structure.system.spec import StructuralSpec
     from graphsynth.synthesis.wishes import Wishes
 
+T = TypeVar("T", bound="Drawn")
+
 #: Graphs shown in a notebook.
 _SHOWN = 12
 
 
-class Graphs(Iterator["MechanismGraph"]):
-    """Graphs of an enumeration, made one after the other.
+class Drawn(Protocol):
+    """What shows itself as a picture."""
+
+    def _repr_svg_(self) -> str: ...
+
+
+class Graphs(Iterator[T]):
+    """Graphs of an enumeration, made one after the other; or chains with other joints, or gear trains.
 
     An iterator like any other; ``graphs[3]`` and ``graphs[2:5]`` enumerate anew up to there, whatever was taken from
     it, and a notebook shows the first twelve.
@@ -35,17 +43,17 @@ class Graphs(Iterator["MechanismGraph"]):
     ('E]`G', 2, Graphs: chains of 6 links, mobility 1; list(...) makes them all, [k] one of them)
     """
 
-    def __init__(self, what: str, make: Callable[[], Iterator[MechanismGraph]]) -> None:
+    def __init__(self, what: str, make: Callable[[], Iterator[T]]) -> None:
         self._what, self._make, self._graphs = what, make, make()
 
-    def __next__(self) -> MechanismGraph:
+    def __next__(self) -> T:
         return next(self._graphs)
 
     @overload
-    def __getitem__(self, k: int) -> MechanismGraph: ...
+    def __getitem__(self, k: int) -> T: ...
     @overload
-    def __getitem__(self, k: slice) -> list[MechanismGraph]: ...
-    def __getitem__(self, k: int | slice) -> MechanismGraph | list[MechanismGraph]:
+    def __getitem__(self, k: slice) -> list[T]: ...
+    def __getitem__(self, k: int | slice) -> T | list[T]:
         if isinstance(k, slice):
             return list(islice(self._make(), k.start, k.stop, k.step))
         if k < 0:
@@ -68,7 +76,7 @@ class Graphs(Iterator["MechanismGraph"]):
         return f"<p>{escape(self._what)}</p>{pictures}{more}"
 
 
-def _list(what: str, problem: EnumerationProblem, executor: Executor | None) -> Graphs:
+def _list(what: str, problem: EnumerationProblem, executor: Executor | None) -> Graphs[MechanismGraph]:
     return Graphs(what, lambda: graphs(problem.work_items(listing=True), executor))
 
 
@@ -82,7 +90,7 @@ def enumerate_chains(
     symmetry: int | None = None,
     wishes: Wishes | None = None,
     executor: Executor | None = None,
-) -> Graphs:
+) -> Graphs[MechanismGraph]:
     """Enumerate kinematic chains: every one, each once up to isomorphism, none with a rigid sub-chain (exact).
 
     Parameters
@@ -210,7 +218,7 @@ def enumerate_mechanisms(
     symmetry: int | None = None,
     wishes: Wishes | None = None,
     executor: Executor | None = None,
-) -> Graphs:
+) -> Graphs[MechanismGraph]:
     """Enumerate the mechanisms that answer a structural question: every one, each once (exact).
 
     Parameters
@@ -307,7 +315,7 @@ def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) 
     return sample(EnumerationProblem.mechanisms(spec, None), k, seed)
 
 
-def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | None = None) -> Graphs:
+def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | None = None) -> Graphs[MechanismGraph]:
     """Enumerate the Assur groups with n moving links and mobility-1 joints, each once (exact).
 
     The group is given with the frame, contracted to one link, as link 0.
@@ -351,7 +359,9 @@ def count_assur_groups(links: int, *, space: int = 3, executor: Executor | None 
     return counted(EnumerationProblem.groups(links, space), executor)
 
 
-def enumerate_baranov_trusses(links: int, *, space: int = 3, executor: Executor | None = None) -> Graphs:
+def enumerate_baranov_trusses(
+    links: int, *, space: int = 3, executor: Executor | None = None
+) -> Graphs[MechanismGraph]:
     """Enumerate the Baranov trusses with N links and mobility-1 joints, each once (exact).
 
     Parameters

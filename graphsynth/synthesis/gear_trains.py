@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from concurrent.futures import Executor
 
 from graphsynth.structure.gear_trains import PlanetaryGearTrain
+from graphsynth.synthesis.api import Graphs
 from graphsynth.synthesis.problem import EnumerationProblem, counted, graphs
 
 
@@ -17,7 +17,7 @@ def enumerate_planetary_gear_trains(
     framed: bool = False,
     drive: str | None = None,
     executor: Executor | None = None,
-) -> Iterator[PlanetaryGearTrain]:
+) -> Graphs[PlanetaryGearTrain]:
     """Enumerate planetary gear trains: every one, each once, none with a locked sub-chain, none fractionated (exact).
 
     A train of N links and mobility W has N - 1 turning joints, which make a tree of links and axes, and N - 1 - W gear
@@ -63,7 +63,8 @@ def enumerate_planetary_gear_trains(
     ['C~ G:1-3,2-3', 'C} G:1-2,1-3', 'C} G:0-3,1-2']
     """
     problem = EnumerationProblem.gear_trains(links, mobility, rotation=rotation, framed=framed, drive=drive)
-    return map(PlanetaryGearTrain, graphs(problem.work_items(listing=True), executor))
+    items = problem.work_items(listing=True)
+    return Graphs(problem.title, lambda: map(PlanetaryGearTrain, graphs(items, executor)))
 
 
 def count_planetary_gear_trains(

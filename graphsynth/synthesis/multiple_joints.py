@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor
 
 from graphsynth.structure.multiple_joints import MultipleJointChain
+from graphsynth.synthesis.api import Graphs
 from graphsynth.synthesis.problem import EnumerationProblem, counted, graphs
 
 
@@ -16,7 +17,7 @@ def enumerate_multiple_joint_chains(
     multiple: int | None = None,
     framed: bool = False,
     executor: Executor | None = None,
-) -> Iterator[MultipleJointChain]:
+) -> Graphs[MultipleJointChain]:
     """Enumerate planar chains with multiple joints: every one, each once, none with a rigid sub-chain (exact).
 
     Revolute joints; three links or more on a multiple joint, two on every other.  No chain is fractionated: neither a
@@ -57,8 +58,12 @@ def enumerate_multiple_joint_chains(
     [(1, 3, 5)]
     """
     problem = EnumerationProblem.multiple_joints(links, mobility, multiple, framed=framed)
-    made = graphs(problem.work_items(listing=True), executor)
-    return (MultipleJointChain(graph, graph.links - int(links)) for graph in made)
+    items = problem.work_items(listing=True)
+
+    def make() -> Iterator[MultipleJointChain]:
+        return (MultipleJointChain(graph, graph.links - int(links)) for graph in graphs(items, executor))
+
+    return Graphs(f"chains with multiple joints, {problem.title}", make)
 
 
 def count_multiple_joint_chains(

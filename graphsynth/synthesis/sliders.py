@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from concurrent.futures import Executor
 
 from graphsynth.core.errors import SpecError
 from graphsynth.structure.slider_chains import SliderChain
+from graphsynth.synthesis.api import Graphs
 from graphsynth.synthesis.problem import EnumerationProblem, counted, graphs
 
 
@@ -20,7 +20,7 @@ def enumerate_slider_chains(
     cylinders: bool = False,
     framed: bool = False,
     executor: Executor | None = None,
-) -> Iterator[SliderChain]:
+) -> Graphs[SliderChain]:
     """Enumerate planar chains with revolute and prismatic joints: every one, each once (exact).
 
     None has a rigid sub-chain by the structural formula, none is fractionated.
@@ -68,7 +68,8 @@ def enumerate_slider_chains(
     """
     given = links, sliders, mobility, sliding_links, sliding_loops, cylinders, framed
     problem = EnumerationProblem.sliders(*given)
-    return map(SliderChain, graphs(problem.work_items(listing=True), executor))
+    items = problem.work_items(listing=True)
+    return Graphs(f"chains with prismatic joints, {problem.title}", lambda: map(SliderChain, graphs(items, executor)))
 
 
 def count_slider_chains(

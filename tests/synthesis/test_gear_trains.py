@@ -13,7 +13,14 @@ import pytest
 import sympy
 from networkx.algorithms.isomorphism import categorical_edge_match, categorical_node_match
 
-from graphsynth import MechanismGraph, PlanetaryGearTrain, count_planetary_gear_trains, enumerate_planetary_gear_trains
+from graphsynth import (
+    MechanismGraph,
+    PlanetaryGearTrain,
+    count_planetary_gear_trains,
+    enumerate_multiple_joint_chains,
+    enumerate_planetary_gear_trains,
+    enumerate_slider_chains,
+)
 from graphsynth.cli.main import main
 from graphsynth.core.errors import FormatError, GraphError, SpecError, TooLargeError
 from graphsynth.structure.canonical import label_coloured
@@ -417,3 +424,11 @@ def test_the_command_line_counts_lists_and_shows(capsys, tmp_path):
         assert capsys.readouterr().out.splitlines()[-1] == str(number)
     assert main(["count", "--links", "6", "--gear-trains", "--space", "6"]) == 2
     assert main(["count", "--links", "6", "--drive", "any"]) == 2
+
+
+def test_a_list_has_places_and_pictures():
+    trains = enumerate_planetary_gear_trains(4)
+    assert [trains[k] for k in range(3)] == list(trains)
+    assert trains._repr_html_().count("<svg") == 3
+    assert enumerate_slider_chains(4, 1)._repr_html_().count("<svg") == 1
+    assert enumerate_multiple_joint_chains(6)._repr_html_().count("<svg") == 2
