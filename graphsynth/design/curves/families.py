@@ -52,7 +52,7 @@ class Family:
     @property
     def dyadic(self) -> bool:
         """Whether all groups are dyads."""
-        return decompose(self.design.graph, self.design.drivers).dyadic
+        return self.design.dyadic
 
     @property
     def turns(self) -> bool:

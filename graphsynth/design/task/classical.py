@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _THROUGH, _POSITIONS = {0: 9, 1: 7, 2: 5}, 5
 #: Four-bars of the infinitely many through one position fewer.
 _OF_MANY = 16
-#: Time limit of a search from which on it begins with all four-bars through points, which take some 20 s.
+#: Time limit of a search from which on it begins with all four-bars through nine points, which take some 20 s.
 _PATIENT = 60.0
 
 
@@ -65,6 +65,6 @@ def _found(task: DesignTask, target: object, seconds: float) -> Sequence[Mechani
         exact = len(target.points) == _POSITIONS
         return [linkage.mechanism for linkage in timed_paths(target.points, target.inputs)] if exact else []
     given = task.given_pivots
-    if len(target.points) == _THROUGH.get(len(given)):
+    if len(target.points) == _THROUGH.get(len(given)) and (given or seconds >= _PATIENT):
         return [linkage.mechanism for linkage in four_bars_through(target.points, given).linkages if linkage.in_order]
     return []

@@ -29,7 +29,6 @@ from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted
 from graphsynth.kinematics.engine.batch import simulate_batch
 from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.model import Mechanism
-from graphsynth.structure.assur import decompose
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -87,7 +86,7 @@ def index_starts(index: CurveIndex, count: int = 32) -> Starts:
             turns, sliders = design.kinds[design.driver_joints[0]] == "R", design.kinds.count("P")
             few = sliders <= task.sliders + (not turns) and design.graph.links in task.links
             good = few and turns == (task.drive in ("rotation", "rocking"))
-            return good and not (task.dyads_only and not decompose(design.graph, design.drivers).dyadic)
+            return good and (design.dyadic or not task.dyads_only)
 
         rocking = task.drive == "rocking"
         most = (1.0 + _SLACK) * task.span if rocking else math.inf

@@ -334,6 +334,12 @@ def test_two_targets_at_once_share_one_mechanism() -> None:
     assert lengths and max(found[0].errors) < 1e-6
 
 
+def test_a_short_search_does_not_begin_with_all_four_bars_through_nine_points() -> None:
+    """They take some 20 s."""
+    points = [(math.cos(u), 0.3 * math.sin(u) + 0.1 * u * u) for u in even(9, 5.0)]
+    assert list(solutions(DesignTask(targets=[PathTarget(points=points)]), 59.0)) == []
+
+
 @pytest.mark.parametrize("kind", ["poses", "function", "timed path"])
 def test_classical_problems_begin_with_every_solution_of_algebra(kind: str) -> None:
     """Five positions of a hidden four-bar: it is among the solutions, and the first pieces find it exactly."""
