@@ -150,13 +150,14 @@ def _proved(mechanism: Any, pose: np.ndarray, kept: Recorded) -> None:
 
 def _through_poses(kept: Recorded) -> None:
     """Record the calls with which the page finds dyads of two to five poses."""
-    from graphsynth.design.poses.kernels import candidates
+    from graphsynth.design.poses.kernels import candidates, cranks
 
     random = np.random.default_rng(3)
     with recording(kept, all_calls=True):
         for count in (2, 3, 4, 5):
             poses = np.column_stack([random.normal(size=(count, 2)), random.uniform(-3.0, 3.0, count)])
             candidates(poses, 60, np.zeros((400, 4)))
+            cranks(poses, random.uniform(-3.0, 3.0, count - 1), np.zeros((100, 4)))
 
 
 def _tilted(mechanism: Any, poses: np.ndarray, kept: Recorded) -> None:
@@ -188,13 +189,20 @@ class Bits:
         self.remote, self.module, self.signature = remote, module, signature
         self.kernel = kernel_of(signature.kernel)
         self.name = signature.kernel.removeprefix("graphsynth.")
+        self.seconds = np.zeros(3)  #: native calls, the module's with the way there and back, making and comparing
 
     def agree(self, args: tuple[Any, ...], blocks: list[Any], count: int) -> bool:
         """Make the same calls in both: whether all results and all arrays have the same bits."""
+        begin = perf_counter()
         copies, calls = rows_of(args, blocks)
+        made = perf_counter()
         wanted = [found.__name__ if isinstance(found, type) else found for found in results(self.kernel, calls)]
+        native = perf_counter()
         found, arrays = self.remote.call(self.module, self.name, args, blocks, count)
-        return same_results(found, wanted) and all(map(same_bits, arrays, copies))
+        remote = perf_counter()
+        same = same_results(found, wanted) and all(map(same_bits, arrays, copies))
+        self.seconds += native - made, remote - native, made - begin + perf_counter() - remote
+        return same
 
     def agree_on(self, args: tuple[Any, ...]) -> bool:
         """Compare one call."""
@@ -243,7 +251,8 @@ def main(most: int, place: str, *wanted: str) -> None:
             bits = Bits(remote, module, signature)
             calls, wrong = bits.run(kept.get(signature.kernel, []), most, seconds, np.random.default_rng(20))
             bad += wrong
-            print(f"{calls:>9} calls, {wrong} chunks differ  {module}: {bits.name}", flush=True)
+            each = " ".join(f"{1e6 * part / calls:9.1f}" for part in bits.seconds)
+            print(f"{calls:>9} calls, {wrong} chunks differ, us {each}  {module}: {bits.name}", flush=True)
     remote.close()
     sys.exit(bad > 0)
 

@@ -140,6 +140,30 @@ def test_four_bars_pass_through_the_poses_in_the_library(scripts, count):
         assert 0 < quality <= 1 and min(far for far in own if far is not None) < 1e-5
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("turns", [[0.9], [-0.8, -1.9], [0.7, 1.5]])
+def test_timed_poses_are_met_at_the_angles_of_the_driver(scripts, turns):
+    """Poses of the coupler of a hidden four-bar; of three, the crank can only be its crank."""
+    hidden = Mechanism.four_bar(80.0, 20.0, 70.0, 60.0)
+    poses = hidden.simulate(np.sort([0.0, *turns])).poses[:, 2]
+    poses = poses if turns[0] > 0.0 else poses[::-1]
+    asked = PASSING.replace("args[0])", "args[0], args[1])")
+    found = scripts(asked, poses.tolist(), turns, modules=("design", "motion"))
+    assert len(found) >= 3
+    for text, quality in found:
+        own = Mechanism.from_json(text)
+        goals = np.concatenate([*(np.linspace(a, b, 61)[:-1] for a, b in pairwise([0.0, *turns])), turns[-1:]])
+        motion = own.simulate(goals)
+        assert 0 < quality <= 1 and motion.assembled.all()
+        at = motion.poses[60 * np.arange(len(poses)), 2]
+        turned = np.exp(1j * (poses[:, 2] - poses[0, 2]))
+        there = at[:, :2] @ [1, 1j] + np.exp(1j * at[:, 2]) * complex(*poses[0, :2])
+        assert np.abs(there - poses[:, :2] @ [1, 1j]).max() < 1e-5
+        assert np.abs(np.exp(1j * at[:, 2]) - turned).max() < 1e-7
+        pivot, tip = own.joint(0, 1).at_a, own.joint(1, 2).at_a
+        assert len(turns) == 1 or np.abs(np.array([*pivot, *tip]) - [0.0, 0.0, 20.0, 0.0]).max() < 1e-9
+
+
 def test_poses_at_one_place_have_no_four_bars(scripts):
     for poses in ([[1, 2, 0], [1, 2, 0]], [[0, 0, 0], [1, 0, 0], [2, 1, 0], [3, 0, 0]]):
         assert scripts(PASSING, poses, modules=("design", "motion")) == []

@@ -243,3 +243,34 @@ def candidates(poses, samples, out):
             if meeting(rows, centre, math.pi * (i + 0.5) / samples, 1.0 - 2.0 * k, T, joint):
                 count = put(joint, poses, size, out, count)
     return count
+
+
+@kernel
+def cranks(poses, turns, out):
+    """Write RR dyads (most, 4), as `candidates` does, whose link turns by given angles from the first pose on.
+
+    ``turns`` (n - 1,).  Three poses leave one dyad (theory/poses 1), two a joint at the body, which a grid takes.
+    """
+    n, size, count, joint = poses.shape[0], 0.0, 0, np.empty(4)
+    for k in range(1, n):
+        size = max(size, abs(poses[k, 0] - poses[0, 0]), abs(poses[k, 1] - poses[0, 1]))
+    if n < 2 or n > 3 or turns.size != n - 1 or not size > 0.0:
+        return 0
+    # a w - b g + d = 0 for both joints, w at the body and g at the frame
+    a, b, d = np.empty(n - 1, np.complex128), np.empty(n - 1, np.complex128), np.empty(n - 1, np.complex128)
+    for k in range(n - 1):
+        body, own = poses[k + 1, 2] - poses[0, 2], turns[k]
+        a[k] = complex(cos(body) - cos(own), sin(body) - sin(own))
+        b[k] = complex(1.0 - cos(own), -sin(own))
+        d[k] = complex((poses[k + 1, 0] - poses[0, 0]) / size, (poses[k + 1, 1] - poses[0, 1]) / size)
+    under = a[1] * b[0] - a[0] * b[1] if n == 3 else b[0]
+    if under.real * under.real + under.imag * under.imag < 1e-18:
+        return 0
+    for i in range(1 if n == 3 else GRID * GRID):
+        w = complex(WIDE * (2.0 * (i // GRID) / (GRID - 1) - 1.0), WIDE * (2.0 * (i % GRID) / (GRID - 1) - 1.0))
+        g = (a[0] * w + d[0]) / under
+        if n == 3:
+            w, g = (d[0] * b[1] - d[1] * b[0]) / under, (a[1] * d[0] - a[0] * d[1]) / under
+        joint[0], joint[1], joint[2], joint[3] = g.real, g.imag, w.real, w.imag
+        count = put(joint, poses, size, out, count)
+    return count

@@ -53,11 +53,12 @@
   /** The poses in numbers, and what can be done with them. */
   Bench.posePanel = app => {
     const poses = app.poses || [], { unit } = app.sheet, tidy = value => String(Number(value.toPrecision(8)));
-    const set = (k, c, value) => { app.poses = poses.map((own, n) => (n === k ? own.map((old, i) => (i === c ? value : old)) : own)); app.changed("view"); };
-    const rows = poses.flatMap(([x, y, turn], k) => [make("h3", {}, Bench.word("panel.pose", { n: k + 1 })),
+    const set = (k, c, value) => { app.poses = poses.map((own, n) => (n === k ? Object.assign([...own], { [c]: value }) : own)); app.changed("view"); };
+    const rows = poses.flatMap(([x, y, turn, own], k) => [make("h3", {}, Bench.word("panel.pose", { n: k + 1 })),
       Bench.field(app, "panel.x", tidy(x), text => set(k, 0, Bench.typedLength(text, unit)), { unit }),
       Bench.field(app, "panel.y", tidy(y), text => set(k, 1, Bench.typedLength(text, unit)), { unit }),
-      Bench.field(app, "panel.angle", tidy((turn * 180) / Math.PI), text => set(k, 2, Bench.typedAngle(text)), { unit: "°" })]);
+      Bench.field(app, "panel.angle", tidy((turn * 180) / Math.PI), text => set(k, 2, Bench.typedAngle(text)), { unit: "°" }),
+      k > 0 && Bench.field(app, "panel.turned", own === undefined ? "" : tidy((own * 180) / Math.PI), text => set(k, 3, text.trim() ? Bench.typedAngle(text) : undefined), { unit: "°" })].filter(Boolean));
     const drop = left => () => { app.poses = left; app.changed("view"); };
     return [make("p", { class: "soft" }, Bench.word("hint.poses")), ...rows, make("div", { class: "acts" },
       poses.length > 1 && Bench.button("do.passing", () => Bench.do.passing(app), { "data-passing": true }),
@@ -67,7 +68,10 @@
   Bench.do.passing = app => {
     const poses = app.poses || [];
     if (poses.length < 2) { app.fault(new Bench.Fault("fault.poses.few")); return null; }
-    return answer(app, ["design.wasm"], "passing", [poses], "said.passing", "fault.passing");
+    const turns = poses.slice(1).map(pose => pose[3]), timed = turns.some(own => own !== undefined), steps = turns.map((own, k) => own - (k ? turns[k - 1] : 0));
+    const fit = turns.length < 3 && (steps.every(own => own > 0) || steps.every(own => own < 0)) && Math.abs(turns[turns.length - 1]) < 2 * Math.PI;
+    if (timed && !fit) { app.fault(new Bench.Fault("fault.poses.turns")); return null; }
+    return answer(app, ["design.wasm"], "passing", [poses.map(pose => pose.slice(0, 3)), timed ? turns : null], "said.passing", "fault.passing");
   };
 
   const told = ({ error, quality, data }) => (error === undefined ? Bench.word("passing.quality", { angle: Bench.shown((Math.asin(quality) * 180) / Math.PI, 2) })

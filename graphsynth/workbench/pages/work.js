@@ -40,8 +40,8 @@ const Work = (() => {
       return Curves.found(await Kernels.load("motion"), curve, tell, closed);
     },
     /* Four-bars through poses. */
-    async passing([poses], tell) {
-      return Passing.found(await Kernels.load("design"), await Kernels.load("motion"), poses, tell);
+    async passing([poses, turns], tell) {
+      return Passing.found(await Kernels.load("design"), await Kernels.load("motion"), poses, turns, tell);
     },
     /* One branch over a range of the driver, proved. */
     async prove([data, asked], tell) {
