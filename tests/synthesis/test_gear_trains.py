@@ -235,7 +235,19 @@ def test_lists_of_roles_are_as_long_as_their_counts(asked):
         assert found == count_planetary_gear_trains(links, mobility, **asked)
 
 
-@pytest.mark.parametrize("links", [5, *(pytest.param(links, marks=pytest.mark.slow) for links in (6, 7))])
+@pytest.mark.slow
+@pytest.mark.parametrize("links", [6, 7, 8, 9])
+def test_orbits_add_up_to_all_independent_choices(links):
+    import gear_ranks
+
+    trains = 0
+    for by_rank, orbits, number in gear_ranks.sums_by_tree(links):
+        assert by_rank == orbits
+        trains += number
+    assert trains == count_planetary_gear_trains(links)
+
+
+@pytest.mark.parametrize("links", [5, pytest.param(6, marks=pytest.mark.slow)])
 def test_orbits_add_up_to_all_choices_without_locked_links(links):
     """No subset rule and no symmetry on the one side; orbit and stabiliser on the other."""
     rng = random.Random(links)
