@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import GraphError, SpecError
@@ -17,17 +18,20 @@ if TYPE_CHECKING:
     from graphsynth.structure.gear_trains import PlanetaryGearTrain
 
 
-def train_mechanism(train: PlanetaryGearTrain, input: int, fixed: int, teeth: Teeth) -> Mechanism:
+def train_mechanism(train: PlanetaryGearTrain, inputs: Sequence[int], fixed: int, teeth: Teeth) -> Mechanism:
     """Work of `PlanetaryGearTrain.mechanism`.
 
     The first axis of the fixed link is at the origin; axes around another one lie where the teeth of a pair between
     them say, with module 1, in directions of their own.  Pitch radii of other pairs, such as two planets, follow from
     the distance of their axes: every pair has the module that fits.
     """
-    if input == fixed or not any({input, fixed} <= set(axis) for axis in train.axes):
-        raise GraphError(
-            f"link {input} does not turn about an axis of link {fixed}, which is fixed: choose another input"
-        )
+    if len(set(inputs)) != train.mobility:
+        raise GraphError(f"a train of mobility {train.mobility} takes as many inputs, not {list(inputs)}")
+    for link in inputs:
+        if link == fixed or not any({link, fixed} <= set(axis) for axis in train.axes):
+            raise GraphError(
+                f"link {link} does not turn about an axis of link {fixed}, which is fixed: choose another input"
+            )
     numbers = {pair: _sizes(pair, own) for pair, own in teeth_of(train, teeth).items()}
     ends = {pair[:2]: tuple(_axis(train, gear, pair.carrier) for gear in pair[:2]) for pair in train.gears}
     where = _places(train, fixed, {frozenset(ends[pair]): abs(za + zb) / 2 for pair, (za, zb) in numbers.items()})
@@ -43,7 +47,9 @@ def train_mechanism(train: PlanetaryGearTrain, input: int, fixed: int, teeth: Te
         offset = -cmath.phase(way) * (1 + ra / rb * (-1 if internal else 1))  # teeth meet as the train is drawn
         joints.append(Gear(a, b, (one.real, one.imag), (other.real, other.imag), ra, rb, internal, offset))
     graph = MechanismGraph(train.links, [(joint.a, joint.b, joint.mobility) for joint in joints], frame=fixed)
-    return Mechanism(graph, tuple(joints), (Driver(fixed, input),), pose=((0.0, 0.0, 0.0),) * train.links)
+    return Mechanism(
+        graph, tuple(joints), tuple(Driver(fixed, link) for link in inputs), pose=((0.0, 0.0, 0.0),) * train.links
+    )
 
 
 def _sizes(pair: tuple[int, int], teeth: tuple[object, object]) -> tuple[float, float]:

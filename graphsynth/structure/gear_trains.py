@@ -186,26 +186,29 @@ class PlanetaryGearTrain(ColouredChain):
         """Return the efficiency with losses in the teeth; see `graphsynth.structure.gear_speeds.efficiency`."""
         return efficiency(self, Arrangement(input, output, self._fixed(fixed)), teeth, mesh)
 
-    def mechanism(self, input: int, fixed: int | None = None, *, teeth: Teeth) -> gs.Mechanism:
+    def mechanism(self, input: int | Sequence[int], fixed: int | None = None, *, teeth: Teeth) -> gs.Mechanism:
         """Return it as a planar mechanism that moves: axes placed, pitch radii by the teeth, the input driven.
 
         Axes are placed by the teeth, in directions of their own; every gear pair has the module that fits there.
 
         Parameters
         ----------
-        input, fixed : int
-            The driven link, on an axis of the fixed one (the frame by default).
+        input : int or sequence of int
+            The driven link, or as many as the mobility, each on an axis of the fixed one.
+        fixed : int, optional
+            The fixed link.  Default: the frame.
         teeth : mapping
             As for the speeds, numbers; internal gears, with negative ones, larger than their pinions.
 
         Raises
         ------
         GraphError
-            For an input that does not turn about an axis of the fixed link.
+            For an input that does not turn about an axis of the fixed link, or a wrong number of them.
         SpecError
             For teeth without a number or of an internal gear that is too small; else as for the speeds.
         """
-        found: gs.Mechanism = work("mechanism of gear train")(self, input, self._fixed(fixed), teeth)
+        inputs = input if isinstance(input, Sequence) else [input]
+        found: gs.Mechanism = work("mechanism of gear train")(self, inputs, self._fixed(fixed), teeth)
         return found
 
     def _fixed(self, fixed: int | None) -> int:

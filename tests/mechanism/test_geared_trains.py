@@ -47,6 +47,24 @@ def test_trains_turn_as_their_ratios(links):
     assert compared >= 8
 
 
+@pytest.mark.long
+def test_a_train_of_two_freedoms_has_two_inputs():
+    compared = 0
+    for train in enumerate_planetary_gear_trains(6, 2, framed=True):
+        teeth = {pair[:2]: (20, 31) for pair in train.gears}
+        inputs = [link for link in range(1, 6) if any({0, link} <= set(axis) for axis in train.axes)][:2]
+        try:
+            speeds = train.speeds({0: 0} | dict.fromkeys(inputs, 1), teeth=teeth)
+        except GraphError:  # one of them drives the other
+            continue
+        if len(inputs) == 2:
+            motion = train.mechanism(inputs, teeth=teeth).simulate(np.linspace(0.0, 1.0, 21))
+            angles = (motion.poses[-1] - motion.poses[0])[:, 2]
+            assert angles.tolist() == pytest.approx([float(speeds[link]) for link in range(6)], abs=1e-9)
+            compared += 1
+    assert compared > 5
+
+
 def test_teeth_of_one_module_have_their_radii():
     """Sun 20, planet 20, ring 60: the distance is 20, the radii are half the teeth."""
     mechanism = SIMPLE.mechanism(0, 1, teeth={(0, 3): (20, 20), (1, 3): (-60, 20)})
@@ -61,6 +79,7 @@ def test_bad_teeth_and_inputs_get_one_sentence():
     z = sympy.Symbol("z")
     for call, words in [
         (lambda: SIMPLE.mechanism(3, 1, teeth=good), "link 3 does not turn about an axis of link 1"),
+        (lambda: SIMPLE.mechanism([0, 2], 1, teeth=good), r"mobility 1 takes as many inputs, not \[0, 2\]"),
         (lambda: SIMPLE.mechanism(0, teeth=good), "no link is fixed"),
         (lambda: SIMPLE.mechanism(0, 1, teeth=good | {(1, 3): (-20, 60)}), "must be the larger one"),
         (lambda: SIMPLE.mechanism(0, 1, teeth=good | {(1, 3): (-20, 20)}), "must be the larger one"),
