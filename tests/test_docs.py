@@ -87,7 +87,7 @@ def differ(one, other):
 #: Pages whose examples take about a second or more.
 LONG_PAGES = (
     *("closure-in-space", "probability-of-a-mechanism", "design-a-mechanism", "four-bars-through-points"),
-    *("floating-piston", "design-for-poses", "find-a-curve"),
+    *("floating-piston", "design-for-poses", "find-a-curve", "gear-trains"),
 )
 SLOW_PAGES = (
     *("embody", "point-an-antenna", "jamming-of-any-mechanism", "the-deck-reproduced", "bearing-jamming"),
