@@ -70,7 +70,9 @@ def gear_schematic(
     lines = picture.bars + picture.rims + picture.strokes
     lower = complex(min(line.x0 for line in lines) - 0.9, min(min(line.y0, line.y1) for line in lines) - 0.5)
     upper = complex(max(line.x1 for line in lines) + 0.9, max(max(line.y0, line.y1) for line in lines) + 0.5)
-    sketch = Sketch(lower, upper, min(width, _COLUMN * (upper - lower).real), margin=0.0, title=title)
+    natural = _COLUMN * (upper - lower).real
+    size = min(1.0, width / natural)
+    sketch = Sketch(lower, upper, size * natural, margin=0.0, title=title, symbol=size)
     for axis, (low, high) in picture.spans.items():
         sketch.on(layer="pitch", part=f"axis {'-'.join(map(str, train.axes[axis]))}")
         ends = (complex(x, picture.heights[axis]) for x in (low - _SHAFT - 0.35, high + _SHAFT + 0.35))
@@ -80,18 +82,20 @@ def gear_schematic(
     for line in picture.bars:
         for y in picture.crossed(line):
             sketch.on(layer="block", part=f"bridge of link {line.link}")
-            gap = 5.0 * sketch.pixel * 1j
+            gap = 5.0 * sketch.pixel * size * 1j
             sketch.bar(complex(line.x0, y) - gap, complex(line.x0, y) + gap, "paper", 9.0)
         _draw(sketch, line, "joint")
     for line in picture.rims:
         _draw(sketch, line, "joint")
     for stroke, way in picture.grounds:
         sketch.on(layer="ground", part=f"ground of link {stroke.link}")
-        sketch.hatch(complex(stroke.x0, stroke.y0), complex(stroke.x1, stroke.y0), complex(0, way * sketch.pixel), 4)
+        sketch.hatch(
+            complex(stroke.x0, stroke.y0), complex(stroke.x1, stroke.y0), complex(0, way * sketch.pixel * size), 4
+        )
     for line in picture.named() if numbers else ():
         sketch.on(layer="label", part=f"number {line.link}")
         middle = complex(line.x0, (line.y0 + line.y1) / 2)
-        sketch.label(middle, str(line.link), 8 + 0j, "start", "note", 13.0)
+        sketch.label(middle, str(line.link), 8 * size + 0j, "start", "note", max(7.0, 13.0 * size))
     return sketch
 
 
