@@ -294,6 +294,29 @@ def see_velocities_of_a_template_in_russian_and_dark(person, downloads):
     assert "Подвижность" in text(person, "known")
 
 
+def prove_the_motion(person, downloads):
+    person.press("[data-certify]")
+    person.until("return document.getElementById('proved')", seconds=60)
+    assert "turns fully" in text(person, "proved")
+    person.press("#undo")  # another drawing, nothing proved
+    assert person.script("return document.getElementById('proved')") is None
+
+
+def see_what_the_menus_have(person, downloads):
+    """Nothing is cut off by the window, and nothing is written in the colour of its ground."""
+    seen = person.script(
+        """return [...document.querySelectorAll("details.menu")].map(menu => {
+             menu.open = true;
+             const list = menu.querySelector("div"), box = list.getBoundingClientRect();
+             const paper = getComputedStyle(list).backgroundColor;
+             const inks = [...menu.querySelectorAll("button")].map(own => getComputedStyle(own).color);
+             menu.open = false;
+             return [box.left >= 0 && box.right <= innerWidth, inks.every(ink => ink !== paper)];
+           })"""
+    )
+    assert len(seen) == 4 and all(map(all, seen))
+
+
 TASKS = [
     draw_a_four_bar, make_the_crank_turn_fully, trace_a_point_of_the_coupler, play_and_pause, scrub_to_a_right_angle,
     drag_the_coupler, assemble_it_otherwise, tilt_the_axis_until_it_binds, prove_that_it_binds,
@@ -301,7 +324,7 @@ TASKS = [
     save_it_for_the_library, export_a_drawing_for_cad, take_the_python_for_it, take_a_chain_from_the_list,
     count_the_chains_of_sixteen_links, draw_a_wanted_curve, ask_for_a_body_in_three_poses,
     measure_a_distance, undo_all_and_do_it_again,
-    see_velocities_of_a_template_in_russian_and_dark,
+    see_velocities_of_a_template_in_russian_and_dark, prove_the_motion, see_what_the_menus_have,
 ]  # fmt: skip
 
 

@@ -13,7 +13,7 @@
       this.picks = [];
       this.mode = "draw";       // "draw" changes the drawing, "run" moves the mechanism
       this.pose = null;
-      this.options = { grid: true, snap: true, names: true };
+      this.options = { grid: true, snap: true, names: true, curves: true, velocity: false, acceleration: false, centres: false };
       this.motion = null;       // what moves it, once the kernels are loaded
       this.faulty = [];         // links that are too much
       this.measured = null;

@@ -157,6 +157,7 @@
       if (kind === "tool") toolbar(app);
       if (kind !== "view") describe(app);
       document.body.dataset.mode = app.mode;
+      for (const [name, on] of Object.entries(app.options)) document.querySelector(`[data-do=${name}]`).setAttribute("aria-pressed", String(on));
       for (const element of document.querySelectorAll("[data-mode]")) if (element !== document.body) element.setAttribute("aria-pressed", String(element.dataset.mode === app.mode));
     });
     let later = 0;

@@ -45,16 +45,11 @@
     choice.replaceChildren(...sheet.drivers.map((d, k) =>
       make("option", { value: k, selected: k === motion.driver }, Bench.linkName(sheet, d.link))));
     choice.parentElement.hidden = sheet.drivers.length < 2;
-    for (const name of SHOWN) {
-      const button = document.querySelector(`[data-do=${name}]`);
-      button.setAttribute("aria-pressed", String(Boolean(app.options[name])));
-    }
   }
 
   /** Wire the bar under the drawing. */
   Bench.player = app => {
     const { motion } = app, time = $("time");
-    app.options.curves = true;
     $("play").addEventListener("click", () => motion.toggle());
     time.addEventListener("input", () => {
       let goal = Number(time.value); // before the mode changes, which puts the slider where the driver is

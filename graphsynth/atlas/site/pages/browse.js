@@ -16,7 +16,7 @@
     const sizes = [...new Map(families.map(f => [f.links, 0]))].map(([links]) => [links, families.filter(f => f.links === links).reduce((s, f) => s + f.chains, 0)]);
     const any = option("", "any");
     $("question").innerHTML = html`${[
-      html`<label class="wide">Search<input type="search" name="text" placeholder="name, use, label, key, graph6" autocomplete="off" spellcheck="false"></label>`,
+      html`<label class="wide">Search<input type="search" name="text" placeholder="name, use, label, key …" autocomplete="off" spellcheck="false"></label>`,
       mobilities.length > 1 && select("mobility", "mobility", [any, ...mobilities.map(w => option(w, w))], "mobility"),
       html`<fieldset><legend>Links</legend>${sizes.map(([n, count]) =>
         html`<label class="chip"><input type="checkbox" name="links" value="${n}"><span>${n} <small>${Atlas.count(count)}</small></span></label>`)}</fieldset>`,
