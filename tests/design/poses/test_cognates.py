@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+import importlib.util
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -261,6 +264,35 @@ def test_eight_links():
     given, motion = next(moving(lambda rng: chain(joints, 0, 2, 7, rng)))
     found = cognates(given)
     assert len(found) == 12 and all(worst(one, motion) < 1e-11 for one in found)
+
+
+COUNTS = Path(__file__).parents[3] / "catalog" / "counts"
+
+
+@pytest.mark.long
+def test_every_curve_of_an_eight_bar_has_its_number_of_cognates():
+    with (COUNTS / "cognates-8.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    curves = [(graph.key, str(link)) for graph, link in script().questions(8)]
+    assert [(row["key"], row["link"]) for row in rows] == curves and len(curves) == 266
+    assert all(float(row["apart"]) < 1e-12 and int(row["cognates"]) >= int(row["timed"]) > 0 for row in rows)
+
+
+@pytest.mark.slow
+def test_numbers_of_cognates_do_not_depend_on_the_dimensions():
+    with (COUNTS / "cognates-8.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))[::24]
+    for row in rows:
+        graph, link = gs.MechanismGraph.from_key(row["key"]), int(row["link"])
+        again = script().row(graph, link, 12_345)
+        assert [str(value) for value in again[:-1]] == list(row.values())[:-1] and float(again[-1]) < 1e-11
+
+
+def script():
+    spec = importlib.util.spec_from_file_location("cognates_of_all", COUNTS / "cognates.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def test_what_has_no_cognate_is_told():
