@@ -34,36 +34,36 @@ _LIMIT = 2.0**62
 
 
 @inner
-def _store(key, words, number, layer, shift, value, work):
+def _store(key, words, number, layer, shift, value, keys, states):
     """Add ``value`` to the state ``key[:words]`` of a layer; return its number of states, or -1 when full.
 
-    ``shift`` is where the layer starts: key words in ``work.keys``; sums start at half of that.
+    ``shift`` is where the layer starts: key words in ``keys``; sums start at half of that.
     """
-    capacity = work.states.shape[1]
+    capacity = states.shape[1]
     h = np.uint64(1469598103934665603)
     for i in range(words):
         h = (h ^ key[i]) * np.uint64(0x9E3779B97F4A7C15)
         h ^= h >> np.uint64(29)
     slot = np.int64(h & np.uint64(capacity - 1))
     half = shift >> 1
-    while work.states[lay.STAMP, slot] == layer:
-        at = work.states[lay.SLOT, slot]
+    while states[lay.STAMP, slot] == layer:
+        at = states[lay.SLOT, slot]
         same = True
         for i in range(words):
-            if work.keys[shift + at * words + i] != key[i]:
+            if keys[shift + at * words + i] != key[i]:
                 same = False
                 break
         if same:
-            work.states[lay.SUM, half + at] += value
+            states[lay.SUM, half + at] += value
             return number
         slot = (slot + 1) & (capacity - 1)
     if (number + 1) * words > capacity or 2 * (number + 1) > capacity:
         return -1
-    work.states[lay.STAMP, slot] = layer
-    work.states[lay.SLOT, slot] = number
+    states[lay.STAMP, slot] = layer
+    states[lay.SLOT, slot] = number
     for i in range(words):
-        work.keys[shift + number * words + i] = key[i]
-    work.states[lay.SUM, half + number] = value
+        keys[shift + number * words + i] = key[i]
+    states[lay.SUM, half + number] = value
     return number + 1
 
 
@@ -90,7 +90,7 @@ def count_states(count, sets, tables, work):
     key[needs] = np.uint64(tables.target)
     work.state[1] += 1
     shift = np.int64(0)
-    states = _store(key, words, np.int64(0), work.state[1], shift, np.int64(1), work)
+    states = _store(key, words, np.int64(0), work.state[1], shift, np.int64(1), work.keys, work.states)
     total = np.int64(0)
     for j in range(count):  # from layer to layer by the choices of one variable
         coefs = 2 * j * needs
@@ -139,7 +139,8 @@ def count_states(count, sets, tables, work):
                     total += value * work.entries[lay.COPIES, g] * ways
                     continue
                 key[needs] = np.uint64(index)
-                fresh = _store(key, words, fresh, layer, other, value * work.entries[lay.COPIES, g], work)
+                more = value * work.entries[lay.COPIES, g]
+                fresh = _store(key, words, fresh, layer, other, more, work.keys, work.states)
                 if fresh < 0:
                     return np.int64(NO_ROOM)
         states = fresh

@@ -85,7 +85,7 @@ def _add_cycles(k, mult, count, need, longest, work):
         path[0] = first
         following[0] = first + 1
         depth = 0
-        used = np.int64(1) << first
+        used = np.int64(0)  # of the vertices behind it
         while depth >= 0:
             at = path[depth]
             w = following[depth]
@@ -109,12 +109,12 @@ def _add_cycles(k, mult, count, need, longest, work):
 
 
 @inner
-def cover_of(j, cover, s, work):
+def cover_of(j, cover, s, laid, classes, sets):
     """Return what variable j gives to set s, no critical one, by a label with this cover."""
     given = np.int64(0)
-    vertex, cycle = work.sets[lay.VERTEX, s], work.sets[lay.CYCLE, s]
-    for e in range(work.state[LAID]):
-        if work.classes[lay.VAR, e] != j:
+    vertex, cycle = sets[lay.VERTEX, s], sets[lay.CYCLE, s]
+    for e in range(laid):
+        if classes[lay.VAR, e] != j:
             continue
         if vertex == lay.JOINTED:
             given += (cycle >> e) & cover & 1
@@ -124,9 +124,9 @@ def cover_of(j, cover, s, work):
             given += ((cycle >> e) & 1) * (cover >> 2)
         if vertex < 0:
             continue
-        turned = work.classes[lay.FLIP, e]
-        if work.classes[lay.U, e] == vertex:
+        turned = classes[lay.FLIP, e]
+        if classes[lay.U, e] == vertex:
             given += (cover >> turned) & 1
-        elif work.classes[lay.V, e] == vertex:
+        elif classes[lay.V, e] == vertex:
             given += (cover >> (1 - turned)) & 1
     return min(given, np.int64(lay.BYTE))

@@ -243,18 +243,17 @@ def _emit(k, symmetry, tables, work, rows, n):
 
 
 @inner
-def _step(depth, plain, needs, gain, cover, most, work):
+def _step(depth, plain, needs, gain, cover, most, keys, lanes, covers):
     """Let the variable at ``depth`` give up ``gain``; return whether every set can still be served.
 
     ``cover``: what its label gives to vertices and cycles, whose needs come behind ``plain`` words of critical sets.
 
     What the sets need after the step goes to the next row of ``keys``, so nothing has to be taken back.
     """
-    keys, lanes = work.keys, work.lanes
     cap = np.uint64(min(most, lay.BYTE)) * lay.ONES | lay.TOP
     alive = lay.TOP
     for i in range(plain, needs):
-        raised = (keys[depth * needs + i] | lay.TOP) - work.covers[(depth * lay.COVERS + cover) * needs + i]
+        raised = (keys[depth * needs + i] | lay.TOP) - covers[(depth * lay.COVERS + cover) * needs + i]
         keep = raised & lay.TOP
         need = raised & (keep - (keep >> np.uint64(7)))
         alive &= (lanes[(2 * depth + 1) * needs + i] | lay.TOP) - need
@@ -275,6 +274,7 @@ def _search(k, symmetry, tables, work, rows, n):
     # taken out of the tuples once: inside the loops that would cost more than the search itself
     st, classes, variables, pairs = work.state, work.classes, work.variables, work.pairs
     ahead, plain = work.tables, st[PLAIN]
+    keys, lanes, covers = work.keys, work.lanes, work.covers
     labels, kinds, resources, guard = tables.labels, tables.kinds, tables.resources, tables.guard
     fold_class = st[WITNESS] - st[KEPT] if symmetry else np.int64(-1)
     needs, parts, last = st[WORDS], st[PARTS], st[COUNT] - 1
@@ -300,7 +300,8 @@ def _search(k, symmetry, tables, work, rows, n):
             if usable:
                 gain = np.uint64(classes[lay.HEAVIEST, rep] - labels[lay.WEIGHT, label])
                 cover = labels[lay.LABEL_COVER, label]
-                usable = _step(depth, plain, needs, gain, cover, ahead[lay.GAINS, depth + 1, index], work)
+                most = ahead[lay.GAINS, depth + 1, index]
+                usable = _step(depth, plain, needs, gain, cover, most, keys, lanes, covers)
             if usable and parts > 1 and depth + 1 == min(PREFIX, last + 1):
                 st[MET] += 1
                 usable = st[MET] % parts == st[PART]

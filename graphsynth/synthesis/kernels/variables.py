@@ -253,7 +253,7 @@ def lay_lanes(count, sets, words, work):
         for s in range(8 * work.state[PLAIN], sets):
             most = 0
             for cover in range(work.state[LAID_COVERS]):
-                given = cover_of(j, cover, s, work)
+                given = cover_of(j, cover, s, work.state[LAID], work.classes, work.sets)
                 place = (j * lay.COVERS + cover) * words + s // 8
                 if s % 8 == 0:
                     work.covers[place] = np.uint64(0)
