@@ -166,8 +166,9 @@ def _kept_choice(pairs: list[bytes], move: list[int], gears: int, random: Random
         ways.append([rest[k] + (rest[k - size] if k >= size else 0) for k in range(gears + 1)])
     chosen: list[int] = []
     for cycle, rest in zip(cycles, ways[-2::-1]):
-        wanted = gears - len(chosen)
-        if random.randrange(rest[wanted] + (more := rest[wanted - len(cycle)] if wanted >= len(cycle) else 0)) < more:
+        wanted, size = gears - len(chosen), len(cycle)
+        taking = rest[wanted - size] if wanted >= size else 0
+        if random.randrange(rest[wanted] + taking) < taking:
             chosen += cycle
     return chosen
 
@@ -182,7 +183,10 @@ def _moves_freely(links: int, tree: MechanismGraph, pairs: list[bytes]) -> bool:
 
 
 def _move(links: int, tree: int, gears: int, roles: int, target: int) -> tuple[int, int, list[int]]:
-    """Return the order of the group of a tree, the number of pairs of a symmetry and what it keeps, and pair's one."""
+    """Return the order of the group of a tree, how many pairs of a symmetry and what it keeps, and a symmetry.
+
+    It is that of the pair with the given number; of a negative one nothing is returned but the numbers.
+    """
     (weigh_moves,) = named("graphsynth.synthesis.kernels.gears", "weigh_moves")
     move = np.zeros(links, np.int64)
     order, total = weigh_moves(links, _matrices(links)[tree], gears, roles, _moves(links), target, move)

@@ -35,8 +35,8 @@ def sample(problem: EnumerationProblem, k: int, seed: int) -> list[MechanismGrap
     Raises `InfeasibleSpecError` if there is nothing to draw from.
     """
     k, seed = whole(k, "k", 0, 10**9), whole(seed, "seed", -(10**100), 10**100)  # None would draw others every time
-    if problem.symmetry or any(family.levels for family in problem.families):
-        raise SpecError("sampling with a required symmetry or wanted levels is not supported: list them and choose")
+    if problem.symmetry or problem.wishes or any(family.levels for family in problem.families):
+        raise SpecError("sampling with a required symmetry, wanted levels or wishes is not supported: list and choose")
     urns = [urn for made in problem.one_by_one for urn in made.urns()]
     for family in problem.families:
         graphs = len(family.graphs)

@@ -118,6 +118,15 @@ def test_a_bar_that_must_cross_passes_over(monkeypatch):
     assert crossed > 20
 
 
+def test_links_without_gears_are_drawn():
+    for train in (
+        PlanetaryGearTrain.from_axes(2, [(0, 1)], [], frame=0),
+        PlanetaryGearTrain.from_axes(4, [(0, 1, 2), (2, 3)], [], frame=2),
+        PlanetaryGearTrain.from_axes(5, [(0, 1, 4), (1, 2), (2, 3)], [(0, 2)]),
+    ):
+        checked(train)
+
+
 def test_a_ring_lies_around_its_pinion():
     teeth = {(0, 4): (28, 18), (4, 5): (18, 30), (1, 5): (36, 30), (5, 2): (30, -72)}
     lines, _ = lines_of(gear_schematic(RAVIGNEAUX, teeth=teeth))
