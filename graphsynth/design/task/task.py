@@ -105,7 +105,7 @@ class DesignTask(Shown):
     plates : sequence of (float, float, float)
         Links with three holes that are there and shall be used: distances of the first from the second, of the second
         from the third, of the third from the first.  Each hole takes a joint or the named point of a path or of poses;
-        either side may be up.
+        either side may be up, and the link may have more joints than these.
     length_ratio : float
         Longest over shortest of these distances; those of points from the joints of their link count as long ones.
     transmission : float or str

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -144,15 +145,15 @@ def test_words_that_do_not_fit_are_refused() -> None:
 
 @pytest.mark.slow
 def test_a_given_plate_is_used() -> None:
-    """A lever with its third joint on the line of the others, found among the distances of joints of moving links."""
+    """A lever with its third hole on the line of the others, found among the joints and points of a moving link."""
     path = PathTarget.segment((0, 0), (4, 0), count=8)
     found = design(DesignTask(targets=[path], links=[6], plates=[(2.0, 1.0, 3.0)]), count=1)
     assert found.accepted
     mechanism, sides = found[0].mechanism, []
     for link in {*range(6)} - {mechanism.frame}:
         own = [joint.at_a if joint.a == link else joint.at_b for joint in mechanism.joints if link in joint.pair]
-        if len(own) == 3:
-            sides.append(sorted(math.dist(own[k], own[k - 1]) for k in range(3)))
+        own += [point.at for point in mechanism.points.values() if point.link == link]
+        sides += [sorted(math.dist(three[k], three[k - 1]) for k in range(3)) for three in combinations(own, 3)]
     assert min(np.abs(np.array(own) - [1.0, 2.0, 3.0]).max() for own in sides) < 3e-3
 
 
