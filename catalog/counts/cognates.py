@@ -3,9 +3,10 @@
     python catalog/counts/cognates.py 8 [FILE]
 
 For each chain of mobility 1 with so many links, each link as frame, and each link whose points draw more than circles
-(one of each orbit): the number of mechanisms of the same chain that draw the same curve, the given one among them; how
-many of them have its timing; how many are families; and how far the points lie apart at most, over the size, when all
-are simulated.  Dimensions are random, one choice for each mechanism.  Rows that are in the file are not made again.
+(one of each orbit, numbered as in the key): the number of mechanisms of the same chain that draw the same curve, the
+given one among them; how many of them are families; and how far the points lie apart at most,
+over the size, when all are simulated.  Dimensions are random, one choice for each mechanism.  Rows that are in the file
+are not made again.
 """
 
 import csv
@@ -21,7 +22,7 @@ from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import TracePoint
 
-FIELDS = ("key", "link", "degree", "cognates", "timed", "families", "apart")
+FIELDS = ("key", "link", "degree", "cognates", "families", "apart")
 #: Inputs from the pose in which all stand.
 STEPS = np.linspace(0.0, 0.002, 5)
 
@@ -29,7 +30,7 @@ STEPS = np.linspace(0.0, 0.002, 5)
 def questions(links: int) -> Iterator[tuple[gs.MechanismGraph, int]]:
     """Yield every mechanism with one link of each orbit whose points draw more than circles."""
     for chain in gs.enumerate_chains(links):
-        for mechanism in chain.inversions():
+        for mechanism in (own.canonical() for own in chain.inversions()):
             for orbit in mechanism.orbits:
                 if mechanism.frame not in orbit and gs.coupler_curve_degree(mechanism, orbit[0]) > 2:
                     yield mechanism, orbit[0]
@@ -54,9 +55,8 @@ def row(graph: gs.MechanismGraph, link: int, seed: int) -> tuple[object, ...]:
     found = cognates(given)
     curve = motion.point("P").position
     apart = [np.abs(one.mechanism.simulate(one.inputs(motion)).point("P").position - curve).max() for one in found]
-    timed, families = sum(one.timed for one in found), sum(one.freedom > 0 for one in found)
-    degree = gs.coupler_curve_degree(graph, link)
-    return graph.key, link, degree, len(found), timed, families, f"{max(apart):.1e}"
+    families, degree = sum(one.freedom > 0 for one in found), gs.coupler_curve_degree(graph, link)
+    return graph.key, link, degree, len(found), families, f"{max(apart):.1e}"
 
 
 def main() -> None:
