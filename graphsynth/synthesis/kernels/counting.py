@@ -13,7 +13,7 @@ import numpy as np
 from graphsynth.core.compilation import kernel
 from graphsynth.synthesis.kernels import layout as lay
 from graphsynth.synthesis.kernels.contracted import automorphisms
-from graphsynth.synthesis.kernels.covers import PLAIN, cover_of
+from graphsynth.synthesis.kernels.covers import LAID, PLAIN, cover_of
 from graphsynth.synthesis.kernels.layout import glue, inner
 from graphsynth.synthesis.kernels.variables import (
     build_variables,
@@ -398,7 +398,9 @@ def decode_fixed(count, m, sets, number, tables, work, row):
                 s = work.rows[lay.SET, q]
                 work.sets[lay.LEFT, s] -= work.rows[lay.COEF, q] * work.entries[lay.GAIN, g]
             for s in range(8 * work.state[PLAIN], sets):
-                work.sets[lay.LEFT, s] -= cover_of(j, work.entries[lay.COVER, g], s, work)
+                work.sets[lay.LEFT, s] -= cover_of(
+                    j, work.entries[lay.COVER, g], s, work.state[LAID], work.classes, work.sets
+                )
             break
     for s in range(sets):
         if work.sets[lay.LEFT, s] > 0:
