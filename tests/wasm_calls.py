@@ -43,6 +43,9 @@ class Remote:
         remote = self
 
         class Handler(BaseHTTPRequestHandler):
+            # one connection, and answers in one piece: small chunks would wait for each other
+            protocol_version, wbufsize, disable_nagle_algorithm = "HTTP/1.1", -1, True
+
             def log_message(self, format: str, *args: Any) -> None: ...
 
             def _answer(self, body: bytes, kind: str = "application/octet-stream") -> None:

@@ -47,6 +47,7 @@
 
   /** The relatives of a chain as sketches. */
   Bench.showRelatives = async (app, chain) => {
+    if (app.work.busy) app.work.stop();
     const { smaller, larger } = Bench.relatives(app, chain), all = [...smaller, ...larger];
     $("kin").showModal();
     $("kinLess").hidden = !smaller.length;

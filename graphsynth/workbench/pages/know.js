@@ -70,10 +70,11 @@
     const { engine, driver } = motion, data = Bench.written(app.sheet), turns = swept.full && swept.turns < Infinity ? swept.turns : 0;
     const asked = { pose: Array.from(engine.pose), driver, from: swept.inputs[0], to: swept.inputs[swept.inputs.length - 1], turns };
     if (app.work.busy) app.work.stop();
-    app.proof = { swept };
+    const own = app.proof = { swept, sheet: app.sheet };
     app.changed("rest");
     app.say("said.proving", { share: 0 });
     const found = await Bench.job(app, ["proof.wasm"], "prove", [data, asked], share => app.say("said.proving", { share: Math.round(100 * share) }));
+    if (app.proof !== own) return;
     app.proof = null;
     if (found && !found.known) Bench.showPython(Binding.program(data, [], ["print(graphsynth.certify(motion).statement)\n"]), "python.certify", "prove.py");
     if (found && found.known) app.proof = { swept, boxes: found.boxes, good: found.high > found.low, told: proved(motion, found, turns) };
@@ -114,6 +115,8 @@
   /** The section "Known". */
   Bench.showKnown = (app, place) => {
     const { motion } = app, engine = motion && motion.current();
+    // a proof of what is no longer drawn is given up
+    if (app.proof && app.proof.sheet && app.proof.sheet !== app.sheet) { app.proof = null; app.work.stop(); }
     app.faulty = [];
     place.closest("section").hidden = !app.labels && !motion;
     const data = Bench.written(app.sheet), keyed = () => (app.labels ? Bench.chainKey(app.labels, data) : null);
