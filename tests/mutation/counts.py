@@ -40,8 +40,9 @@ MODULES = [*(ENGINE / f"{name}.py" for name in NAMES), *(ENGINE / "kernels" / f"
 BESIDE = {"weigh_block", "_visited", "_least", "_stays", "labellings", "_ways", "_known_ways", "_costs", "weight",
           "make_work", "open_fixed", "decode_fixed", "_nth_label", "expand_text", "_put_number", "_put_plain",
           "by_vertices", "_stream", "_lay_pairs", "_is_ordered", "_smallest_sets_first", "refine",
-          "is_counted_together"}  # fmt: skip
+          "is_counted_together", "_search_order", "identity_sums"}  # fmt: skip
 SECONDS = 20
+LEVELS: list[dict[int, Any]] = [{-1: 1}, {3: 2}, {2: (3, None)}]
 SAMPLED = ["1CAvElhAw", "1CAvIkEjQ", "1CAvQWghQ"]  # by the same draws always
 
 
@@ -50,13 +51,13 @@ def _questions() -> list[tuple[str, Callable[[], Any], Any]]:
     import graphsynth as gs
 
     four = MechanismGraph.from_text("Cl")
-    wish = gs.Wishes
+    wish, eight = gs.Wishes, StructuralSpec(W=1, links=8)
 
     def keys(graphs: Any) -> int:
         return len({graph.key for graph in graphs})
 
     def mechanisms(**more: Any) -> Any:
-        return gs.enumerate_mechanisms(StructuralSpec(W=1, links=8), **more)
+        return gs.enumerate_mechanisms(eight, **more)
 
     return [
         ("chains", lambda: [gs.count_chains(n) for n in (4, 6, 8, 10)], [1, 2, 16, 230]),
@@ -68,14 +69,19 @@ def _questions() -> list[tuple[str, Callable[[], Any], Any]]:
         ("listed, three freedoms", lambda: keys(gs.enumerate_chains(8, 3, fractionated=True)), 7),
         ("four freedoms", lambda: gs.count_chains(11, 4, fractionated=True), 189),
         ("higher pairs", lambda: gs.count_chains(6, joints_by_mobility={2: 2}), 52),
+        ("higher pairs only", lambda: gs.count_chains(3, 3, joints_by_mobility={2: 3}), 1),
+        ("levels", lambda: [gs.count_mechanisms(eight.replace(levels=at)) for at in LEVELS], [28, 23, 62]),
         ("space", lambda: [gs.count_chains(n, 1, space=2) for n in (5, 6)], [3, 13]),
         ("mechanisms", lambda: [gs.count_mechanisms(StructuralSpec(W=1, links=n)) for n in (6, 8, 10)], [5, 71, 1834]),
         ("listed mechanisms", lambda: keys(mechanisms()), 71),
         ("symmetric", lambda: [keys(gs.enumerate_chains(10, symmetry=p)) for p in (2, 3, 5)], [143, 2, 0]),
+        ("symmetric six-bars", lambda: gs.count_mechanisms(StructuralSpec(W=1, links=6), symmetry=2), 4),
+        ("given joints", lambda: gs.count_chains(6, joints_by_mobility={1: 7}), 2),
         ("symmetric mechanisms", lambda: [sum(1 for _ in mechanisms(symmetry=p)) for p in (2, 3)], [39, 1]),
         ("trusses", lambda: [gs.count_baranov_trusses(n) for n in (3, 5, 7, 9)], [1, 1, 3, 28]),
         ("groups", lambda: [keys(gs.enumerate_assur_groups(n)) for n in (2, 4, 6, 8)], [1, 2, 10, 173]),
         ("sliders", lambda: [gs.count_slider_chains(6, k) for k in (1, 2, 3)], [6, 13, 10]),
+        ("loops that turn", lambda: [gs.count_slider_chains(8, k) for k in (3, 4)], [555, 510]),
         ("rings", lambda: [gs.count_slider_chains(4, 2, sliding_links=yes) for yes in (False, True)], [1, 2]),
         ("sliding loops", lambda: [gs.count_slider_chains(8, k, sliding_loops=True) for k in (1, 3)], [84, 574]),
         ("sliding links", lambda: keys(gs.enumerate_slider_chains(6, 3, sliding_links=True)), 20),
