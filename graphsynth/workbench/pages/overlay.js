@@ -6,20 +6,23 @@
   /** Where a row of `pointMotion` has what arrows show. */
   const FIRST = { velocity: 2, acceleration: 4 };
 
-  /** Points whose paths are shown: [id, number of the link, place]. */
-  Bench.tracedPoints = sheet => Object.entries(sheet.points).filter(([, point]) => point.trace).map(([id, point]) => {
+  /** Points on links: [id, number of the link, place]. */
+  const placed = points => sheet => Object.entries(sheet.points).filter(points).map(([id, point]) => {
     const links = Bench.linksAt(sheet, id), link = links.find(own => own !== Bench.GROUND) || Bench.GROUND;
     return [id, Bench.linkNumber(sheet, link), [point.x, point.y]];
   });
+  /** Points whose paths are shown. */
+  Bench.tracedPoints = placed(([, point]) => point.trace);
+  const allPoints = placed(() => true);
 
   /** Places of a point over the sweep. */
   Bench.pathOver = (motion, k, at) => motion.engine.pointMotion(k, at, motion.sweep()).map(([x, y]) => [x, y]);
 
-  /** The box around the drawing as it stands and the paths of its traced points. */
+  /** The box around the drawing as it stands and as it moves. */
   Bench.boxWithPaths = app => {
     const box = Bench.box(app.posed()), { motion, sheet } = app, swept = box && motion && motion.driven ? motion.sweep() : null;
     if (!swept) return box;
-    const places = Bench.tracedPoints(sheet).flatMap(([, k, at]) => Bench.pathOver(motion, k, at));
+    const places = allPoints(sheet).flatMap(([, k, at]) => Bench.pathOver(motion, k, at));
     for (const [x, y] of places.filter(place => place.every(Number.isFinite))) {
       [box[0], box[1], box[2], box[3]] = [Math.min(box[0], x), Math.min(box[1], y), Math.max(box[2], x), Math.max(box[3], y)];
     }
