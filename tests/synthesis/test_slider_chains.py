@@ -10,6 +10,7 @@ import brute_force as bf
 import nauty
 import networkx as nx
 import pytest
+from coloured import keeps_rules
 
 from graphsynth import Goals, SliderChain, count_slider_chains, enumerate_chains, enumerate_slider_chains
 from graphsynth.cli.main import main
@@ -27,23 +28,6 @@ def plain_chains(links, mobility):
         for g in bf.graphs(links, joints)
         if nx.is_biconnected(g) and bf.worst_subset(links, [(a, b, 1) for a, b in g.edges], 3) >= 1
     )
-
-
-def keeps_rules(g, sliders, sliding_links, sliding_loops, cylinders):
-    sliding = {frozenset(pair) for pair in sliders}
-    for link in g:
-        own = [frozenset((link, other)) in sliding for other in g[link]]
-        if not sliding_links and all(own):
-            return False
-    for a, b in sliders if cylinders else ():
-        for link, other in ((a, b), (b, a)):
-            if g.degree(link) != 2 or any(frozenset((link, w)) in sliding for w in g[link] if w != other):
-                return False
-    for loop in nx.simple_cycles(g) if not sliding_loops else ():
-        joints = [frozenset(pair) for pair in zip(loop, [*loop[1:], loop[0]])]
-        if sum(joint not in sliding for joint in joints) < 2:
-            return False
-    return True
 
 
 def classes(links, mobility, number, framed, **rules):
