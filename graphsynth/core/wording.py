@@ -21,7 +21,7 @@ def plain(text: str) -> str:
 def nearest(word: str, words: Iterable[str]) -> str:
     """Return ``"; did you mean 'x'?"`` for the nearest of ``words``, or nothing.
 
-    A word with a unit too many or too few is nearest.
+    A word with a unit too many is nearest.
 
     >>> nearest("inputs_deg", ["inputs", "outputs_deg"])
     "; did you mean 'inputs'?"
@@ -29,7 +29,7 @@ def nearest(word: str, words: Iterable[str]) -> str:
     import difflib
 
     word, words = word[:60], list(words)
-    close = [own for own in words if word.startswith(f"{own}_") or own.startswith(f"{word}_")]
+    close = [own for own in words if word.startswith(f"{own}_")]
     close = close or difflib.get_close_matches(word, words, n=1, cutoff=0.5)
     return f"; did you mean {close[0]!r}?" if close else ""
 
