@@ -54,9 +54,8 @@ class Hazards:
         moving = [link for link in range(self.sheets) if link != self.frame]
         yield from (pair for pair in combinations(moving, 2) if pair not in self.jointed | {*self.plan.touching})
         pins = list(enumerate(self.plan.pins, self.sheets))
-        for p, pin in pins:
-            clear = (*pin.sheets, *pin.passes, *self.plan.through(pin))
-            yield from ((link, p) for link in moving if link not in clear)
+        clear = {p: (*pin.sheets, *pin.passes, *self.plan.through(pin)) for p, pin in pins}
+        yield from ((link, p) for link in moving for p in clear if link not in clear[p])
         yield from ((p, q) for (p, _), (q, _) in combinations(pins, 2))
 
     @property
