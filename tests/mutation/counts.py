@@ -50,6 +50,7 @@ def _questions() -> list[tuple[str, Callable[[], Any], Any]]:
     """Name, question and answer; the answers are published or those of trying everything (``tests/synthesis``)."""
     import graphsynth as gs
 
+    trains, ways = gs.count_planetary_gear_trains, ("any", "coaxial")
     four = MechanismGraph.from_text("Cl")
     wish, eight = gs.Wishes, StructuralSpec(W=1, links=8)
 
@@ -96,7 +97,9 @@ def _questions() -> list[tuple[str, Callable[[], Any], Any]]:
         ("jointed", lambda: gs.count_chains(10, wishes=wish(jointed=[(4, 4)], apart=[(3, 3)])), 14),
         ("not jointed", lambda: keys(gs.enumerate_chains(10, wishes=wish(apart=[(3, 4)]))), 83),
         ("holds", lambda: gs.count_chains(8, wishes=wish(without=[four])), 1),
-        ("gear trains", lambda: [gs.count_planetary_gear_trains(n) for n in (5, 6)], [13, 81]),
+        ("gear trains", lambda: [trains(n) for n in (5, 6)], [13, 81]),
+        ("rotation graphs", lambda: [trains(n, w, rotation=True) for n, w in ((5, 1), (6, 1), (6, 2))], [6, 27, 2]),
+        ("roles of trains", lambda: [trains(5, framed=True), *(trains(5, drive=d) for d in ways)], [50, 109, 37]),
         ("all identities", _together, [16, 230]),
         ("splits", _splits, [1, 4, 17, 118]),
         ("grown", _grown, [3, 13, 24, 38, 23, 16, 87]),
