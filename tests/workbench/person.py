@@ -40,8 +40,13 @@ class Person:
     def said(self):
         return self.script("return document.getElementById('said').textContent")
 
+    def look(self):
+        """Wait until the page has drawn what was done last, as a person does."""
+        self.script("return new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
     def pixels(self, x, y):
         """Where a place of the drawing is in the window."""
+        self.look()
         return self.script(
             "const b = document.getElementById('sheet').getBoundingClientRect(), p = Bench.app.view.px(arguments[0]);"
             "return [b.left + p[0], b.top + p[1]]",
@@ -81,12 +86,13 @@ class Person:
             for place in way[1:]:
                 self.touch("touchMove", place)
             self.touch("touchEnd")
-            return
-        self.mouse("mouseMoved", x, y, 0)
-        self.mouse("mousePressed", x, y, modifiers=modifiers)
-        for place in way[1:]:
-            self.mouse("mouseMoved", *place, modifiers=modifiers)
-        self.mouse("mouseReleased", u, v, modifiers=modifiers)
+        else:
+            self.mouse("mouseMoved", x, y, 0)
+            self.mouse("mousePressed", x, y, modifiers=modifiers)
+            for place in way[1:]:
+                self.mouse("mouseMoved", *place, modifiers=modifiers)
+            self.mouse("mouseReleased", u, v, modifiers=modifiers)
+        self.look()
 
     def click(self, x, y, modifiers=0):
         px = self.pixels(x, y)

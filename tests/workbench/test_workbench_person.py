@@ -29,6 +29,7 @@ def mechanism(person):
 
 
 def text(person, place):
+    person.look()
     return person.script("return document.getElementById(arguments[0]).innerText", place)
 
 
