@@ -17,7 +17,7 @@ from graphsynth.kinematics.certify import certify, certify_four_bar
 from graphsynth.kinematics.certify.equations import MechanismSystem
 from graphsynth.kinematics.engine.result import Motion
 from graphsynth.mechanism.constraints import jacobian, residual
-from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver, Harmonic, Linear, Polynomial, Table
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
@@ -53,6 +53,14 @@ def triad(crank: float = 0.3) -> Mechanism:
         Revolute(2, 5, (0.05, 0.5), (1.3, 0.0)), Revolute(0, 5, (1.0, 2.2)),
     ]  # fmt: skip
     return Mechanism(TRIAD, joints, [Driver(0, 1)])
+
+
+def cammed() -> Mechanism:
+    """A cam with a given profile on the driver, its roller on a rocker."""
+    cam = Cam(1, 2, (0.1, 0.0), (2.6, 0.0), 0.3, 1.2, ((0.25, 0.1), (0.05, -0.02)))
+    graph = MechanismGraph(3, [(0, 1), (0, 2), (1, 2, 2)], frame=0)
+    pose = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (3.0, 0.0, 2.6))
+    return Mechanism(graph, [Revolute(0, 1), Revolute(0, 2, (3.0, 0.0)), cam], [Driver(0, 1)], pose=pose)
 
 
 def rocker_pin(lengths: tuple[float, float, float, float], u: float, side: int) -> mp.mpc:
@@ -149,6 +157,25 @@ def five_bar() -> Mechanism:
         Revolute(3, 4, at_b=(0.5, 0.0)), Revolute(0, 4, (3.0, 0.0)), Gear(1, 4, radius_a=2.0, radius_b=3.0),
     ]  # fmt: skip
     return Mechanism(FIVE, joints, [Driver(0, 1)])
+
+
+def test_a_cam_with_a_profile_over_a_turn() -> None:
+    """Its rocker is within the stated radius of the exact angle (50 digits, from the law of the radius itself)."""
+    motion = simulate(cammed(), np.linspace(0.0, math.tau, 49))
+    proof = certify(motion)
+    assert proof.certified and proof.closed and not certify(simulate(cammed(), np.linspace(0.0, 3.0, 25))).closed
+    with mp.workdps(50):
+        for k in (0, 7, 20, 33, 48):
+            u = mp.mpf(float(motion.inputs[k]))
+
+            def excess(angle: mp.mpf, u: mp.mpf = u) -> mp.mpf:
+                d = 3 + mp.mpf(2.6) * mp.expj(angle) - mp.mpf(0.1) * mp.expj(u)
+                psi = mp.arg(d) - u - mp.mpf(0.3)
+                waves = mp.mpf(0.25) * mp.cos(psi) + mp.mpf(0.1) * mp.sin(psi)
+                return abs(d) - (mp.mpf(1.2) + waves + mp.mpf(0.05) * mp.cos(2 * psi) - mp.mpf(0.02) * mp.sin(2 * psi))
+
+            sample = mp.mpf(float(motion.poses[k, 2, 2]))
+            assert abs(mp.findroot(excess, sample) - sample) <= proof.angle_radius[k]
 
 
 def test_a_geared_five_bar_closes_after_three_turns_and_not_before() -> None:
@@ -311,7 +338,7 @@ SLIDING = [
     Revolute(0, 1), Revolute(1, 2, (0.4, 0.1)), Prismatic(3, 2, (0.2, 0.3), (0.1, 0.2), 0.1, 0.7),
     Revolute(0, 3, (1.0, 0.0)),
 ]  # fmt: skip
-MECHANISMS += [Mechanism(CYCLE, SLIDING, [Driver(3, 2)]), Mechanism(CYCLE, SLIDING, [Driver(2, 3)])]
+MECHANISMS += [Mechanism(CYCLE, SLIDING, [Driver(3, 2)]), Mechanism(CYCLE, SLIDING, [Driver(2, 3)]), cammed()]
 
 
 @pytest.mark.parametrize("index", range(len(MECHANISMS)))

@@ -19,9 +19,7 @@ from graphsynth.design.parts.wheels import check
 from graphsynth.kinematics.certify.poses import Enclosures, enclosures
 from graphsynth.kinematics.engine.result import Motion
 from graphsynth.kinematics.simulation import simulate
-from graphsynth.mechanism.joints import Cam, JointGeometry, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.model import Mechanism
-from graphsynth.structure.graph import MechanismGraph
+from graphsynth.mechanism.joints import PinSlot, Prismatic
 
 #: Boxes wider than this (over Lc, radians) are made narrower by more samples, of which there are at most so many.
 _WIDE, _SAMPLES = 1e-4, 20_000
@@ -115,7 +113,6 @@ def _stacked(hazards: Hazards, tube: Tube | None) -> tuple[int, ...] | None:
 
 def _tube(motion: Motion, unit: float, max_boxes: int, seconds: float) -> tuple[Tube | None, str]:
     """Return proved poses over the whole motion in millimetres, or why there are none."""
-    links, motion = motion.mechanism.graph.links, _with_bars(motion)
     try:
         found = enclosures(motion, max_boxes=max_boxes, seconds=seconds)
         finer = None if found.reason else _finer(motion, found)
@@ -126,34 +123,7 @@ def _tube(motion: Motion, unit: float, max_boxes: int, seconds: float) -> tuple[
     if found.reason:
         return None, found.reason
     lengths = np.array([unit, unit, 1.0])
-    return Tube(
-        found.u_mid, found.u_rad, *(array[:, :links] * lengths for array in (found.x, found.V, found.radius))
-    ), ""
-
-
-def _with_bars(motion: Motion) -> Motion:
-    """Return the motion with a bar in place of every circular cam: from the cam's centre to that of its roller."""
-    own, links = motion.mechanism, motion.mechanism.graph.links
-    cams = [joint for joint in own.joints if isinstance(joint, Cam) and not joint.harmonics]
-    if not cams or not motion.completed:
-        return motion
-    joints: list[JointGeometry] = [joint for joint in own.joints if joint not in cams]
-    pose = [*motion.poses[0]]
-    for bar, cam in enumerate(cams, links):
-        joints += [Revolute(cam.a, bar, cam.at_a), Revolute(cam.b, bar, cam.at_b, (cam.radius, 0.0))]
-        a, b = (
-            corners(Solid(link, _point(at, 1.0)), motion.poses[:1])[0, 0]
-            for link, at in ((cam.a, cam.at_a), (cam.b, cam.at_b))
-        )
-        pose.append(np.array([a.real, a.imag, np.angle(b - a)]))
-    graph = MechanismGraph(links + len(cams), [(j.a, j.b, j.mobility) for j in joints], frame=own.frame)
-    found = simulate(Mechanism(graph, tuple(joints), own.drivers), motion.inputs, start=np.array(pose), events=False)
-    same = found.completed and np.abs(found.poses[:, :links] - motion.poses).max() <= _SAME * _size(motion)
-    return found if same else motion
-
-
-def _size(motion: Motion) -> float:
-    return 1.0 + float(np.abs(motion.poses[0]).max())
+    return Tube(found.u_mid, found.u_rad, *(array * lengths for array in (found.x, found.V, found.radius))), ""
 
 
 def _finer(motion: Motion, found: Enclosures) -> Motion | None:
@@ -172,7 +142,7 @@ def _finer(motion: Motion, found: Enclosures) -> Motion | None:
     counts = np.bincount(owner, weights=pieces, minlength=len(inputs) - 1).astype(int)
     runs = [np.linspace(a, b, max(n, 1) + 1)[:-1] for a, b, n in zip(inputs[:-1], inputs[1:], counts)]
     finer = simulate(motion.mechanism, np.append(np.concatenate(runs), inputs[-1]), start=motion.poses[0], events=False)
-    same = np.abs(finer.poses[0] - motion.poses[0]).max() <= _SAME * _size(motion)
+    same = np.abs(finer.poses[0] - motion.poses[0]).max() <= _SAME * (1.0 + np.abs(motion.poses[0]).max())
     return finer if finer.completed and same else None
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations
+from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,8 @@ from graphsynth.design.parts.plan import PartsPlan
 
 Array = NDArray[np.float64]
 Pair = tuple[int, int]
+#: What is known about the parts of a body, what tells most about the whole first.
+_WORST = ("hit", "undecided", "free")
 
 
 class Collision(NamedTuple):
@@ -39,12 +41,15 @@ class Hazards:
 
     def __init__(self, plan: PartsPlan, frame: int, poses: Array, inputs: Array) -> None:
         self.plan, self.frame, self.sheets = plan, frame, len(plan.outlines)
-        self.bodies = [Solid(link, outline) for link, outline in zip(plan.links, plan.outlines)]
-        self.bodies += [Solid(pin.link, Rounded((pin.at,), plan.sizes.spacer)) for pin in plan.pins]
+        self.bodies = [
+            [Solid(link, part) for part in getattr(outline, "sectors", ()) or (outline,)]
+            for link, outline in zip(plan.links, plan.outlines)
+        ]
+        self.bodies += [[Solid(pin.link, Rounded((pin.at,), plan.sizes.spacer))] for pin in plan.pins]
         self.jointed = {pair for pin in plan.pins for pair in combinations(sorted(pin.sheets), 2)}
         self.known: dict[Pair, Found] = {}
         for one, other in self._pairs():
-            found = gaps(self.bodies[one], self.bodies[other], poses)
+            found = np.min([gaps(a, b, poses) for a, b in self._solids(one, other)], axis=0)
             k = int(found.argmin())
             status = "hit" if found[k] < plan.sizes.clearance else "sampled"
             self.known[one, other] = Found(status, float(found[k]), float(inputs[k]))
@@ -57,6 +62,10 @@ class Hazards:
         clear = {p: (*pin.sheets, *pin.passes, *self.plan.through(pin)) for p, pin in pins}
         yield from ((link, p) for link in moving for p in clear if link not in clear[p])
         yield from ((p, q) for (p, _), (q, _) in combinations(pins, 2))
+
+    def _solids(self, one: int, other: int) -> Iterator[tuple[Solid, Solid]]:
+        """All pairs of what two bodies consist of."""
+        return product(self.bodies[one], self.bodies[other])
 
     @property
     def kept_apart(self) -> list[Pair]:
@@ -104,10 +113,9 @@ class Hazards:
         failed = False
         for pair in self.relied(layers):
             if self.known[pair].status == "sampled":
-                one, other = (self.bodies[k] for k in pair)
-                found = proved_gap(one, other, tube, self.plan.sizes.clearance)
-                self.known[pair] = found
-                failed |= found.status != "free"
+                found = [proved_gap(a, b, tube, self.plan.sizes.clearance) for a, b in self._solids(*pair)]
+                self.known[pair] = min(found, key=lambda one: (_WORST.index(one.status), one.gap))
+                failed |= self.known[pair].status != "free"
         return failed
 
     def collision(self, pair: Pair) -> Collision:

@@ -30,8 +30,10 @@ _FEWEST, _RATIO, _FLANK = 17, 200, 8
 #: Fewest teeth of a ring, all involute, and by how many at least it has more than its wheel: else tips meet on the way
 #: in and out of the mesh.
 _RING, _MORE = 34, 9
-#: Points of a cam, more where it has many harmonics; directions in which it is touched by what holds it.
-_POINTS, _WAVES, _TOUCHED = 360, 24, 24
+#: Points of a cam, more where it has many harmonics; sides of a polygon about it; sectors of one that is hollow.
+_POINTS, _WAVES, _SIDES, _SECTORS = 720, 48, 48, 36
+#: Corners left out by `Rounded.around`, which stand out by 1e-9 of the diameter or less, one after the other.
+_MERGED = 1e-6
 #: Distances of centres that differ by less, of their size, are what they should be.
 _SAME = 1e-6
 
@@ -47,11 +49,14 @@ class Cut(Rounded):
 
     edge: tuple[complex, ...] = ()
     pitch: float = 0.0  #: radius of a circle to engrave
+    sectors: tuple[Rounded, ...] = ()  #: of a hollow cam: what must not collide
 
     def moved(self, turn: complex, shift: complex) -> Cut:
         """Return it turned about the origin by a unit vector, then shifted."""
         held = super().moved(turn, shift)
-        return Cut(held.hull, held.radius, tuple(z * turn + shift for z in self.edge), self.pitch)
+        edge = tuple(z * turn + shift for z in self.edge)
+        sectors = tuple(own.moved(turn, shift) for own in self.sectors)
+        return Cut(held.hull, held.radius, edge, self.pitch, sectors)
 
     @cached_property
     def corners(self) -> tuple[Corner, ...]:
@@ -131,24 +136,50 @@ def wheel(count: int, pitch: float, centre: complex, first: float, ring: bool = 
 
 
 def cam(joint: Cam, unit: float, roller: float) -> Cut:
-    """Return the disk that a roller touches, in millimetres."""
-    psi = np.linspace(0.0, math.tau, max(_POINTS, _WAVES * len(joint.harmonics)), endpoint=False)
-    rho, first, second = unit * np.array([joint.pitch_radius(float(u)) for u in psi]).T
+    """Return the disk that a roller touches, in millimetres, and what holds it (theory/parts 5)."""
+    count = max(_POINTS, _WAVES * len(joint.harmonics))
+    psi: NDArray[np.float64] = np.linspace(0.0, math.tau, count, endpoint=False)
+    rho, first, second = waves = unit * np.array([joint.pitch_radius(float(u)) for u in psi]).T
     bend = (rho**2 + 2.0 * first**2 - rho * second) / (rho**2 + first**2) ** 1.5
     if bend.max() * roller >= 1.0:
         raise GeometryError(
             f"the pitch curve of cam {joint.a}-{joint.b} has a radius of curvature of {1.0 / bend.max():.3g} mm, "
             f"and its roller one of {roller:.3g}, which would undercut it; make the pin smaller, or the unit larger"
         )
-    turn = np.exp(1j * (psi + joint.angle_a))
+    turn, centre = np.exp(1j * (psi + joint.angle_a)), complex(*joint.at_a) * unit
     way = (first + 1j * rho) * turn
-    edge = rho * turn + 1j * roller * way / np.abs(way) + complex(*joint.at_a) * unit
-    ends = np.exp(1j * math.tau * np.arange(_TOUCHED) / _TOUCHED)
-    far = (np.conj(ends)[:, None] * edge).real.max(axis=1)  # lines that touch it: their corners hold it
-    step = math.tau / _TOUCHED
-    held = ends * (far + 1j * (np.roll(far, -1) - far * math.cos(step)) / math.sin(step))
-    around = Rounded.around(held.tolist(), 0.0)
-    return Cut(around.hull, around.radius, tuple(edge.tolist()))
+    edge = rho * turn + 1j * roller * way / np.abs(way) + centre
+    beyond = _beyond_chords(joint, unit, waves, roller)
+    hollow = bool(bend.min() < 0.0)
+    runs = np.array_split(np.arange(count), _SECTORS) if hollow else []
+    fans = [np.append(edge[np.arange(run[0], run[-1] + 2) % count], centre) for run in runs]
+    around, sectors = _held(edge, beyond), tuple(_held(fan, beyond, 4 * _SIDES) for fan in fans)
+    return Cut(around.hull, around.radius, tuple(edge.tolist()), sectors=sectors)
+
+
+def _beyond_chords(joint: Cam, unit: float, waves: NDArray[np.float64], roller: float) -> float:
+    """Bound how far a cam reaches beyond the chords between its points, where radius and derivatives are known.
+
+    Over a step h the tangent, which is along the chord somewhere, turns by W h at most, and the curve is nowhere
+    further than h / 2 from an end of the chord: at most ``h^2 W G / 2`` beyond it, G the speed by the angle.
+    """
+    step = math.tau / waves.shape[1]
+    size = unit * np.hypot(*np.reshape(joint.harmonics, (-1, 2)).T)
+    more = [step**2 / 8.0 * float(size @ np.arange(1, len(size) + 1) ** float(k)) for k in (2, 3, 4)]
+    rho, first, second = np.abs(waves).max(axis=1) + more
+    least = max(float(waves[0].min()) - more[0], 0.0)
+    with np.errstate(divide="ignore"):
+        turning = (rho**2 + 2.0 * first**2 + rho * second) / np.square(least)
+    return float(0.5 * step**2 * turning * (rho + first + roller * turning))
+
+
+def _held(points: Complex, beyond: float, sides: int = _SIDES) -> Rounded:
+    """Return a polygon of so many sides or less that holds points and what is as near to their hull."""
+    ends = np.exp(1j * math.tau * np.arange(sides) / sides)
+    far = (np.conj(ends)[:, None] * points).real.max(axis=1)  # lines that touch: where neighbours meet are its corners
+    step = math.tau / sides
+    corners = ends * (far + 1j * (np.roll(far, -1) - far * math.cos(step)) / math.sin(step))
+    return Rounded.around(corners.tolist(), beyond + _MERGED * float(far.max()))
 
 
 def pair(joint: Gear | Cam, unit: float, pose: NDArray[np.float64], roller: float) -> tuple[Wheel, Wheel]:

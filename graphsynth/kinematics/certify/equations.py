@@ -17,7 +17,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.intervals.balls import Balls, argument, exact, root, stack, tau_times, unit
 from graphsynth.mechanism.constraints import characteristic_length
 from graphsynth.mechanism.equations import Gradient, Number, Plane, Seen, derivatives
-from graphsynth.mechanism.joints import Cam, JointGeometry, Prismatic, Revolute
+from graphsynth.mechanism.joints import JointGeometry, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver, Harmonic, Law, Linear, Polynomial
 from graphsynth.mechanism.model import Mechanism
 
@@ -101,13 +101,10 @@ class _Place:
 class MechanismSystem:
     """Equations of a mechanism as a `MovingSystem` of the Krawczyk test.
 
-    `GeometryError` for a cam, and if equations and unknowns differ in number (one driver per freedom is needed).
+    `GeometryError` if equations and unknowns differ in number (one driver per freedom is needed).
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
-        cam = next((joint for joint in mechanism.joints if isinstance(joint, Cam)), None)
-        if cam is not None:
-            raise GeometryError(f"joint {cam.a}-{cam.b} is a cam: there are no certificates for cams, only estimates")
         self.mechanism = mechanism
         self.frame = mechanism.frame
         self.moving = [link for link in range(mechanism.graph.links) if link != self.frame]

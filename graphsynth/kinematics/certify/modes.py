@@ -38,7 +38,7 @@ class ModesCertificate:
     position_radius, angle_radius : ndarray, shape (n,)
         How near: distance of the origin of every link (length) and angle (radians); NaN where nothing is proved.
     most : int or None
-        No mechanism of this structure has more isolated assembly modes; None where that is not known (sliders, gears).
+        No mechanism of this structure has more isolated assembly modes; None where not known (sliders, gears, cams).
     """
 
     modes: tuple[AssemblyMode, ...]
@@ -86,7 +86,7 @@ def certify_modes(mechanism: Mechanism, input: float | str | None = None) -> Mod
     Raises
     ------
     GeometryError
-        As `assembly_modes`; a cam.
+        As `assembly_modes`.
 
     Notes
     -----

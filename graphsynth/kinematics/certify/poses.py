@@ -81,7 +81,7 @@ def certify(
     Parameters
     ----------
     motion : Motion
-        Of any planar mechanism (R, P, pin-slot, gears; groups of any class), with as many drivers as freedoms.  Its
+        Of any planar mechanism (R, P, pin-slot, gears, cams; any groups), with as many drivers as freedoms.  Its
         dimensions and inputs are taken as exact numbers.
     between : bool, optional
         Prove the branch between the samples as well, and its closing after a full turn.
@@ -96,7 +96,7 @@ def certify(
     Raises
     ------
     GeometryError
-        If the drivers do not fit the mobility, or there is a cam.
+        If the drivers do not fit the mobility.
 
     Notes
     -----
