@@ -51,6 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if arguments is None:  # at once: after some interruptions of imports Python itself would end by SIGINT
                 with suppress(OSError):
                     sys.stdout.flush()
+                if used := sys.modules.get("multiprocessing.util"):  # names of semaphores outlive the process
+                    used._run_finalizers(0)
                 os._exit(status)
         finally:
             settle(sys.stderr)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path as File
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graphsynth.design.parts.outline import Rounded
 from graphsynth.design.parts.result import Parts
@@ -13,8 +15,14 @@ from graphsynth.drawing.methods import Drawing
 from graphsynth.drawing.shapes import Path, Placement, Point, Style, placement
 from graphsynth.drawing.sketch import Sketch
 
+Outline = NDArray[Any]
+Loops = list[Outline]  #: of a sheet, or a label
+
 #: Colours of layers, from below.
 _COLOURS = ("fill", "a", "c", "d", "b", "soft")
+#: Ends of a part beside which its label may lie, the best first; corners of a label.
+_WAYS = tuple(np.exp(1j * np.pi / 4.0 * np.array([0, 1, -1, 4, 3, -3, 2, -2])).tolist())
+_CORNERS = np.array([-1 - 1j, 1 - 1j, 1 + 1j, -1 + 1j])
 #: Arcs become chords at most this part of the picture from them.
 _FINE = 2e-4
 #: The apart view is seen from this height: y and z on the page.
@@ -82,12 +90,14 @@ def _apart(parts: Parts, width: float) -> Sketch:
 
     lifted = {link: [[seen(z, parts.layers[link]) for z in loop] for loop in own] for link, own in flat.items()}
     sketch = _box([z for own in lifted.values() for z in own[0]], width, "Parts drawn apart, layer by layer")
+    axes: list[Loops] = []
     for layer in range(parts.count + 1):
         for k, pin in enumerate(parts.plan.pins):  # axes behind the sheets of this layer
             low, top = parts.span(k)
             if low < layer <= top:
                 at = place(pin.link, pin.at)
                 line = (seen(at, layer - 1), seen(at, layer))
+                axes.append([line[0] + (line[1] - line[0]) * (_CORNERS.imag > 0) + 2.0 * sketch.pixel * _CORNERS.real])
                 sketch.shapes.append(Path((line,), Style("ink", 1.0, dash=(4.0, 3.0)), layer="bar", part=f"pin-{k}"))
         for link, own in lifted.items():
             if parts.layers[link] == layer:
@@ -95,10 +105,51 @@ def _apart(parts: Parts, width: float) -> Sketch:
                 sketch.shapes.append(
                     Path(tuple(map(tuple, own)), style, closed=True, layer="bar", part=f"link-{parts.plan.label(link)}")
                 )
-    for link, own in lifted.items():
-        rightmost = max(own[0], key=lambda z: z.real)
-        sketch.on(layer="label").label(rightmost, parts.plan.label(link), 11 + 0j, size=13.0)
+    names = [parts.plan.label(link) for link in lifted]
+    sheets = [[np.array(loop) for loop in own] for own in lifted.values()]
+    for name, at in zip(names, _beside(sheets, names, axes, sketch)):
+        sketch.on(layer="label").label(at, name, size=13.0)
     return sketch
+
+
+def _beside(sheets: list[Loops], names: list[str], axes: list[Loops], sketch: Sketch) -> list[Point]:
+    """Where labels are read as those of their sheets: beside an end that no later one hides, else on it; all clear."""
+    found: list[Point] = []
+    taken, margin = list(axes), sketch.margin * sketch.pixel
+    for k, ((own, *_), name) in enumerate(zip(sheets, names)):
+        half = complex(4.2 * len(name) + 1.0, 7.0) * sketch.pixel  # of the text
+        away = half + (6.0 + 4.0j) * sketch.pixel
+        box = (
+            1.2 * (half.real * np.linspace(-1.0, 1.0, 9)[:, None] + 1j * half.imag * np.linspace(-1.0, 1.0, 7)).ravel()
+        )
+        later, tried, costs = sheets[k + 1 :], [], []
+        for way in _WAYS:
+            end = own[(own * way.conjugate()).real.argmax()]
+            tried.append(complex(end + way.real * away.real + 1j * way.imag * away.imag))
+            costs.append(_covered(end, later) + _covered(tried[-1] + box, sheets[:k] + later + taken))
+        for part in (0.0, 0.5):
+            for corner in own[:: len(own) // 12 + 1]:
+                tried.append(complex(own.mean() + part * (corner - own.mean())))
+                on = _covered(tried[-1] + box, sheets[k : k + 1])
+                costs.append(1.3 - on + _covered(tried[-1] + box, later + taken))
+        at = np.array(tried)
+        out = ((at - half).real < sketch.lower.real - margin) | ((at + half).real > sketch.upper.real + margin)
+        found.append(tried[int((costs + 1.0 * out).argmin())])
+        taken.append([found[-1] + half.real * _CORNERS.real + 1j * half.imag * _CORNERS.imag])
+    return found
+
+
+def _covered(points: Outline | Point, sheets: list[Loops]) -> float:
+    """Shares of points that lie in sheets, added up; a sheet is what an odd number of its loops is around."""
+    total, points = 0.0, np.atleast_1d(points)
+    for loops in sheets:
+        inside = np.zeros(len(points), dtype=bool)
+        for loop in loops:
+            p, q = loop - points[:, None], np.roll(loop, -1) - points[:, None]
+            crosses = (p.imag > 0.0) != (q.imag > 0.0)
+            inside ^= (crosses & (((p.conj() * q).imag > 0.0) == (q.imag > p.imag))).sum(axis=1) % 2 == 1
+        total += float(inside.mean())
+    return total
 
 
 def _box(points: list[Point], width: float, title: str) -> Sketch:
