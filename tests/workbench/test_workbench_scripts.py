@@ -203,6 +203,22 @@ def test_numbers_with_units(scripts):
     assert found[6:] == [None, None, 100, None]
 
 
+def test_lengths_are_read_with_the_units_that_are_shown_in_every_language(scripts):
+    """80 mm, as the page writes it in English and in Russian, is 80 mm, in a drawing in mm or in inches."""
+    found = scripts(
+        """return Bench.languages().map(name => {
+             Bench.speak(name);
+             const shown = Bench.UNITS.map(Bench.unitName);
+             const read = unit => shown.map(own => Bench.parseLength(`8 ${own}`, unit));
+             return [shown, read("mm"), read("in"), Bench.unitName("°")];
+           })"""
+    )
+    assert [own[0] for own in found] == [["mm", "cm", "m", "in"], ["мм", "см", "м", "дюйм"]]
+    for _, metric, inches, angle in found:
+        assert metric == pytest.approx([8, 80, 8000, 203.2]) and inches == pytest.approx([x / 25.4 for x in metric])
+        assert angle == "°"
+
+
 def test_places_snap_to_points_then_angles_then_the_grid(scripts):
     found = scripts(
         """const p = {x: 3.02, y: 2.9}, point = {x: 3.1, y: 3};
@@ -234,7 +250,9 @@ def test_every_word_is_asked_for_and_every_word_asked_for_is_there():
     names = page_file("order.txt").split()
     text = page_file("index.html") + "".join(page_file(f"{name}.js") for name in names)
     known = languages()["en"]
-    groups = "tool hint template name pair mode do language said fault.file event know chain chains jam target passing"
+    groups = (
+        "tool hint template name pair mode do language said fault.file event know chain chains jam target passing unit"
+    )
     built = [f"{group}." for group in groups.split()]
     for key in known:
         assert f'"{key}"' in text or f"'{key}'" in text or any(key.startswith(start) for start in built), key

@@ -51,7 +51,7 @@
     if (!(high - low > 1e-9 * Math.max(1e-9, Math.abs(high)))) { low -= 1; high += 1; }
     const first = swept.inputs[0], last = swept.inputs[swept.inputs.length - 1];
     const x = input => LEFT + ((input - first) / (last - first)) * (WIDE - LEFT - 6), y = value => HIGH - BOTTOM - ((value - low) / (high - low)) * (HIGH - BOTTOM - TOP);
-    const root = svg("svg", { class: "chart", viewBox: `0 0 ${WIDE} ${HIGH}`, role: "img", "aria-label": Bench.word("chart.label", { name, low: Bench.shown(low, 4), high: Bench.shown(high, 4), unit }) });
+    const root = svg("svg", { class: "chart", viewBox: `0 0 ${WIDE} ${HIGH}`, role: "img", "aria-label": Bench.word("chart.label", { name, low: Bench.shown(low, 4), high: Bench.shown(high, 4), unit: Bench.unitName(unit) }) });
     for (const at of ticks(low, high, 4)) {
       root.append(svg("path", { class: "rule", d: `M${LEFT} ${y(at)}H${WIDE - 6}` }), svg("text", { class: "tick left", x: LEFT - 4, y: y(at) + 4 }, Bench.shown(at, 4)));
     }

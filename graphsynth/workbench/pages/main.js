@@ -82,7 +82,7 @@
     language.onchange = () => { Bench.speak(language.value); remembered("workbench-language", language.value); speak(app); };
     theme.value = document.documentElement.dataset.theme || "auto";
     theme.onchange = () => { document.documentElement.dataset.theme = theme.value; remembered("workbench-theme", theme.value); };
-    unit.replaceChildren(...Bench.UNITS.map(name => make("option", { value: name }, name)));
+    unit.replaceChildren(...Bench.UNITS.map(name => make("option", { value: name }, Bench.unitName(name))));
     unit.onchange = () => app.take({ ...app.sheet, unit: unit.value });
   }
 

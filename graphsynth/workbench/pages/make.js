@@ -27,7 +27,7 @@
         input.value = value;
       }
     });
-    return make("label", { class: "field" }, make("span", {}, Bench.word(key)), input, unit ? make("i", {}, unit) : null);
+    return make("label", { class: "field" }, make("span", {}, Bench.word(key)), input, unit ? make("i", {}, Bench.unitName(unit)) : null);
   };
 
   Bench.check = (key, on, take) => {

@@ -170,6 +170,6 @@
   /** A driver coordinate as it is shown: degrees, or a length. */
   Bench.shownInput = (motion, input) => {
     const tidy = value => Bench.shown(Math.round(value * 1e9) / 1e9, 4); // nothing for a zero that is left by rounding
-    return motion.turns ? `${tidy((input * 180) / Math.PI)}°` : `${tidy(input)} ${motion.app.sheet.unit}`;
+    return motion.turns ? `${tidy((input * 180) / Math.PI)}°` : `${tidy(input)} ${Bench.unitName(motion.app.sheet.unit)}`;
   };
 })();

@@ -39,7 +39,7 @@
     if (!app.background) { Bench.do.picture(app); return; }
     const dialog = document.getElementById("scale"), input = document.getElementById("distance");
     input.value = Bench.shown(Math.hypot(picks[1].x - picks[0].x, picks[1].y - picks[0].y)).replace("−", "-");
-    document.getElementById("distanceUnit").textContent = app.sheet.unit;
+    document.getElementById("distanceUnit").textContent = Bench.unitName(app.sheet.unit);
     dialog.showModal();
     input.select();
     dialog.onclose = () => {

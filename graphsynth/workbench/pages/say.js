@@ -21,6 +21,9 @@ var Bench = globalThis.Bench = globalThis.Bench || {};
     return text.replace(/\{(\w+)\}/g, (all, name) => (Object.hasOwn(values, name) ? String(values[name]) : all));
   };
 
+  /** A unit as it is written in the reader's language; what is no length ("°") as it is. */
+  Bench.unitName = unit => (Bench.UNITS.includes(unit) ? Bench.word(`unit.${unit}`) : unit);
+
   /** What a user can mend: the key of a sentence and its values. */
   Bench.Fault = class extends Error {
     constructor(key, values = {}) {

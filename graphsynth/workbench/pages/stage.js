@@ -155,7 +155,7 @@
     }
     sayMeasure([p, q]) {
       const length = Bench.shown(Math.hypot(q.x - p.x, q.y - p.y)), turn = (Math.atan2(q.y - p.y, q.x - p.x) * 180) / Math.PI;
-      this.app.say("said.measured", { length, unit: this.app.sheet.unit, angle: Bench.shown(turn, 4) });
+      this.app.say("said.measured", { length, unit: Bench.unitName(this.app.sheet.unit), angle: Bench.shown(turn, 4) });
     }
 
     /** Choose and move: a point, a link, all that is chosen; a rectangle from an empty place. */
@@ -324,7 +324,7 @@
     }
     dimension(p, q) {
       const [x, y] = this.view.px([(p.x + q.x) / 2, (p.y + q.y) / 2]), turn = (Math.atan2(q.y - p.y, q.x - p.x) * 180) / Math.PI;
-      const values = { length: Bench.shown(Math.hypot(q.x - p.x, q.y - p.y), 5), unit: this.app.sheet.unit, angle: Bench.shown(turn, 4) };
+      const values = { length: Bench.shown(Math.hypot(q.x - p.x, q.y - p.y), 5), unit: Bench.unitName(this.app.sheet.unit), angle: Bench.shown(turn, 4) };
       return Bench.svg("text", { class: "dimension", x, y: y - 10 }, Bench.word("show.dimension", values));
     }
   };

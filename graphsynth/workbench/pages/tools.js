@@ -118,7 +118,7 @@
 
   /** A length as a person writes it ("12", "1.5 in", "3,2 cm"), in the unit of the drawing; NaN for anything else. */
   Bench.parseLength = (text, unit) => {
-    const found = /^\s*([+-−]?\d*[.,]?\d*(?:e[+-]?\d+)?)\s*(mm|cm|m|in|мм|см|м|дюйм)?\s*$/i.exec(text);
+    const found = /^\s*([+−-]?\d*[.,]?\d*(?:e[+-]?\d+)?)\s*(mm|cm|m|in|мм|см|м|дюйм)?\s*$/i.exec(text);
     if (!found || !/\d/.test(found[1])) return NaN;
     const names = { мм: "mm", см: "cm", м: "m", дюйм: "in" }, size = { mm: 1, cm: 10, m: 1000, in: 25.4 };
     const own = (found[2] || unit).toLowerCase(), value = Number(found[1].replace(",", ".").replace("−", "-"));
