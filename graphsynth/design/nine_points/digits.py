@@ -13,7 +13,7 @@ from graphsynth.intervals.reading import precision
 #: Binary digits; a step of time for derivatives, of which half of them are lost.
 _BITS, _EPS = 256, 2.0**-120
 #: Largest first correction of a step, what Newton's method shall reach, first step, least one, most steps.
-_MOST, _REACHED, _FIRST, _LEAST, _STEPS = 1e-4, 1e-40, 1e-2, 1e-25, 400
+_MOST, _REACHED, _FIRST, _LEAST, _STEPS = 1e-4, 1e-40, 1e-2, 1e-25, 4000
 _NEWTON = 7
 
 

@@ -27,7 +27,7 @@ _ROUNDS = 3
 #: Random detours for roots that are lost, relative; how many may be lost for another try, or one in fifty.
 _DETOURS, _FEW = (3e-3, 1e-2, 3e-2) * 3, 8
 #: The most lost paths that are followed with many digits, a second or two each.
-_MOST_DIGITS = 4
+_MOST_DIGITS = 8
 
 
 @dataclass(frozen=True, eq=False)

@@ -328,6 +328,11 @@ class LinkTarget(Target):
         if self.pivot is not None:
             object.__setattr__(self, "pivot", place("pivot", self.pivot))
 
+    @property
+    def size(self) -> float:
+        """How far a slider goes; 0 where that is not said."""
+        return 0.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class FunctionTarget(LinkTarget, TimedTarget):
@@ -361,6 +366,11 @@ class FunctionTarget(LinkTarget, TimedTarget):
     def unknowns(self) -> int:
         """One for the zero of the outputs, one for a start of its own."""
         return 1 + super().unknowns
+
+    @property
+    def size(self) -> float:
+        """How far a slider goes; 0 of a link that turns."""
+        return float(np.ptp(self.outputs)) if self.slides else 0.0
 
     @classmethod
     def of(
@@ -461,3 +471,8 @@ class SwingTarget(LinkTarget):
     def unknowns(self) -> int:
         """One for the beginning of the slow stroke."""
         return int(self.time_ratio is not None)
+
+    @property
+    def size(self) -> float:
+        """How far a slider goes, at least if that is said; 0 of a link that turns."""
+        return (self.least or (self.most if math.isfinite(self.most) else 0.0)) if self.slides else 0.0

@@ -280,10 +280,18 @@ class DesignTask(Shown):
 
     @property
     def size(self) -> float:
-        """Length by which the task is measured: of its largest path, else the distance of given pivots, else 1."""
+        """Length by which the task is measured: of its largest path, or the next that it names.
+
+        The largest distance of given pivots or stroke of a slider; a given link or the stroke of the drive; half of
+        the box; 1 of a task that knows no length.
+        """
         sizes = [target.size for target in self.targets if isinstance(target, PathTarget | PosesTarget)]
         apart = [math.dist(p, q) for p, q in combinations(self.given_pivots, 2)]
-        return max(sizes, default=0.0) or max(apart, default=0.0) or 1.0
+        apart += [target.size for target in self.targets if isinstance(target, LinkTarget)]
+        given = [self.crank or 0.0, *self.bars, *(side for plate in self.plates for side in plate)]
+        given += [self.stroke[1]] if self.linear and self.stroke else []
+        box = (0.5 * min(self.box[2] - self.box[0], self.box[3] - self.box[1]),) if self.box else ()
+        return next((found for some in (sizes, apart, given, box) if (found := max(some, default=0.0))), 1.0)
 
     @property
     def sized(self) -> bool:

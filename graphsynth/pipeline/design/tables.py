@@ -155,7 +155,7 @@ class FunctionTable:
 
 @dataclass(frozen=True, slots=True)
 class DwellTable:
-    """A link stands still for a part of the input; the tolerance says how still."""
+    """A link stands still for a part of the input; the tolerance says how still; ``within``, a length: it slides."""
 
     span: float
     start: float | None = None

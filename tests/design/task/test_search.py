@@ -489,6 +489,40 @@ def test_a_task_without_lengths_has_no_copies_of_another_size() -> None:
         assert all(np.abs(np.log(one / other)).max() > 0.05 for other in shapes[:k])
 
 
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e4])
+def test_a_task_is_measured_by_the_lengths_it_names(unit: float) -> None:
+    """Strokes of sliders, given links, the stroke of a drive or the box: a task in other units is the same task."""
+    turns = SwingTarget(least="40 deg", most="50 deg")
+    ram = [SwingTarget(least=60 * unit, most=90 * unit, slides=True), DwellTarget(span="50 deg", slides=True)]
+    rises = FunctionTarget(inputs=(0.0, 0.5, 1.0), outputs=(-7 * unit, 2 * unit, 3 * unit), slides=True)
+    tasks = [
+        (DesignTask(targets=ram, sliders=1), 60.0),
+        (DesignTask(targets=[SwingTarget(most=90 * unit, slides=True)], sliders=1, crank=5 * unit), 90.0),
+        (DesignTask(targets=[rises], sliders=1, pivots=[(0, 0), (4 * unit, 0)]), 10.0),
+        (DesignTask(targets=[turns], bars=[2 * unit, 3 * unit]), 3.0),
+        (DesignTask(targets=[turns], links=[6], plates=[(2 * unit, 3 * unit, 4 * unit)]), 4.0),
+        (DesignTask(targets=[turns], drive="cylinder", stroke=(2 * unit, 3 * unit)), 3.0),
+        (DesignTask(targets=[turns], box=(0, 0, 8 * unit, 6 * unit)), 3.0),
+    ]
+    for task, size in tasks:
+        assert task.size == pytest.approx(size * unit, rel=1e-12)
+        assert task.lengths == pytest.approx((0.1 * min(size, 4.0 if task.pivots else size) * unit, 6.0 * size * unit))
+    assert DesignTask(targets=[turns]).size == 1.0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("unit", [0.05, 20.0])
+def test_a_ram_rests_at_any_size(unit: float) -> None:
+    """A press of 60 to 90 units whose ram stands still for 50 degrees: in metres or inches as in millimetres."""
+    stroke = SwingTarget(least=60 * unit, most=90 * unit, slides=True, link="ram", tolerance=0.5 * unit)
+    rest = DwellTarget(span="50 deg", slides=True, link="ram", tolerance=0.5 * unit)
+    found = design(DesignTask(targets=[stroke, rest], links=[6], sliders=1), count=1, seconds=100)
+    assert found.accepted and found[0].errors[1] <= 0.5 * unit
+    moved = gs.simulate(found[0].mechanism, np.linspace(0.0, 2.0 * np.pi, 1441))
+    ram = moved.poses[:, found[0].carriers["ram"], :2] @ [1.0, 1.0j]
+    assert 59.5 * unit <= np.abs(ram[:, None] - ram[None, ::8]).max() <= 90.5 * unit
+
+
 @pytest.mark.slow
 def test_a_search_rests_when_it_finds_no_other_answer() -> None:
     """The best four-bar for a logarithm is one; within twice its error there is no other shape."""
