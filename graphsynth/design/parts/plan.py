@@ -26,7 +26,7 @@ from graphsynth.mechanism.model import Mechanism
 
 #: Points of a link nearer than this times its size are one point.
 _SAME = 1e-9
-#: A pin by default: this part of the largest link, at most that part of the shortest way between two holes.
+#: A pin by default: this part of the largest link or wheel, at most that part of the shortest way between two holes.
 _OF_LARGEST, _OF_SHORTEST = 40.0, 4.0
 #: Pins by default are made smaller by these factors until the holes fit.
 _SMALLER = (1.0, 0.8, 0.64, 0.5, 0.4, 0.32, 0.25)
@@ -420,12 +420,14 @@ def _ways(
     traced: Sequence[tuple[int, complex]],
     unit: float,
 ) -> tuple[float, float]:
-    """Largest and smallest way between two points of a link."""
+    """Largest and smallest way between two points of a link; wheels and cams are as large as their diameters."""
     points = [(link, at) for places, _ in meeting for link, at in places.items()] + list(traced)
     ways = [abs(p - q) for (a, p), (b, q) in combinations(points, 2) if a == b and not _near(p, q)]
     if not ways:
         raise GeometryError("no link has two points, so there is no size to go by; give a mechanism with links")
-    return max(ways), min(ways)
+    wide = [2.0 * unit * r for j in mechanism.joints if isinstance(j, Gear) for r in (j.radius_a, j.radius_b)]
+    wide += [2.0 * unit * joint.radius for joint in mechanism.joints if isinstance(joint, Cam)]
+    return max(ways + wide), min(ways)
 
 
 def _near_holes(holes: Sequence[Sequence[tuple[Rounded, str]]], sizes: Sizes) -> str:

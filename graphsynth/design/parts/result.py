@@ -217,13 +217,22 @@ class Parts(Shown):
     @property
     def statement(self) -> str:
         """The result in one sentence."""
+        pairs = " and ".join(self._touching)
+        return self._proved + (f"; {pairs} touch by design, which is not part of it" if pairs else "")
+
+    @property
+    def _touching(self) -> list[str]:
+        """Pairs of wheels that mesh, of cams and rollers."""
+        return ["-".join(map(self.plan.label, pair)) for pair in self.plan.touching]
+
+    @property
+    def _proved(self) -> str:
+        """What is said about gaps."""
         gap = (
             "no two parts share a layer"
             if np.isinf(self.gap)
             else f"at least {self.gap:.3g} mm between parts of a layer"
         )
-        touching = [" and ".join(map(self.plan.label, pair)) for pair in self.plan.touching]
-        gap += "".join(f"; {pair} touch by design, which is not part of it" for pair in touching)
         if self.certified:
             return f"certified: nothing collides over the whole motion, {gap}"
         return f"estimated at {int(self.motion.assembled.sum())} samples: nothing collides, {gap}; {self.reason}"
@@ -237,7 +246,7 @@ class Parts(Shown):
         undecided = [str(found) for found in self.collisions if found.status == "undecided"]
         rows = [
             ("links by layer", ", ".join(by_layer)),
-            ("collisions", self.statement),
+            ("collisions", self._proved),
             (
                 "sizes, mm",
                 f"sheet {s.thickness:g}, pin {s.pin:g}, hole {s.hole:g}, wall {s.wall:g}, clearance {s.clearance:g}",
@@ -248,7 +257,10 @@ class Parts(Shown):
             ),
             ("mass", f"{sum(row.number * row.mass for row in self.bill):.3g} g of plywood and beech"),
         ]
-        for sheet in range(self.motion.mechanism.graph.links, len(self.layers)):
+        links = self.motion.mechanism.graph.links
+        if self._touching:
+            rows.insert(2, ("not proved", f"{', '.join(self._touching)}: they touch by design"))
+        for sheet in reversed(range(links, len(self.layers))):
             if told := self.plan.wheel(sheet):
                 rows.insert(1, (self.plan.label(sheet), told))
                 continue
@@ -256,7 +268,7 @@ class Parts(Shown):
             rows.insert(1, ("two sheets", f"link {self.plan.links[sheet]}, joined by the pin of joint {joined}"))
         if undecided:
             rows.append(("undecided", "; ".join(undecided)))
-        return f"Parts of {self.motion.mechanism.graph.links} links in {self.count} layers above the frame", rows
+        return f"Parts of {links} links in {self.count} layers above the frame", rows
 
     def _picture(self) -> str:
         return self.draw().svg

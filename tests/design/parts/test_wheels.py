@@ -116,6 +116,8 @@ def test_a_train_with_a_ring_is_built():
     told = {made.plan.label(k): made.plan.wheel(k).split(",")[:2] for k in range(4, 8)}
     assert told["0w"] == ["ring", " 68 teeth"] and told["1w"] == ["wheel", " 34 teeth"]
     assert [told[k][1] for k in ("2w", "2w2")] == [" 17 teeth"] * 2
+    assert made.sizes.pin == 2.0 * 4.0 * 30.0 / 40.0  # a fortieth of the ring, the largest part
+    assert "0w-2w, 1w-2w2: they touch by design" in str(made)
     ring = next(k for k in range(4, 8) if made.plan.label(k) == "0w")
     shaft = next(pin for pin in made.plan.pins if pin.kind == "shaft")
     assert made.plan.through(shaft) == [ring] and min(made.layers[k] for k in (1, 3)) > made.layers[ring]
