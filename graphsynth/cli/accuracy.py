@@ -25,7 +25,7 @@ def run(options: argparse.Namespace) -> int:
             f"{scene.place}: no numerical method is known for module = {scene.mechanism.module!r}; other packages add "
             "some through the entry points graphsynth.evidence"
         )
-    folder = options.out or Path("graphsynth-out") / f"{scene.name}-accuracy"
+    folder = options.output or Path("graphsynth-out") / f"{scene.name}-accuracy"
     folder.mkdir(parents=True, exist_ok=True)
     try:  # refused now, not after a minute of measurements
         TemporaryFile(dir=folder).close()

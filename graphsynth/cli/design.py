@@ -32,7 +32,7 @@ def run(options: argparse.Namespace) -> int:
     kept = ("records", "tables", "mechanisms")
     products = (*scene.outputs.products, *(name for name in kept if name not in scene.outputs.products))
     scene = replace(scene, outputs=replace(scene.outputs, products=products))
-    folder = options.out or Path("graphsynth-out") / scene.name
+    folder = options.output or Path("graphsynth-out") / scene.name
     if options.go_on:
         last = sorted(str(file.resolve()) for file in folder.glob("mechanism-*.toml"))
         scene = replace(scene, mechanism=replace(scene.mechanism, begin=(*scene.mechanism.begin, *last)))

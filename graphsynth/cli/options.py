@@ -131,7 +131,7 @@ _VERBS: dict[str, tuple[str, *tuple[Option, ...]]] = {
     "parts": (
         "Make parts of a dimensioned mechanism: layers without collisions, drawings to cut, bill of parts.",
         _option("MECHANISM", "a dimensioned mechanism (.toml, .json), or the name of a classic one", dest="mechanism"),
-        _option("--out FOLDER", "folder for the files (default parts)", Path, default=Path("parts")),
+        _option("-o --output --out FOLDER", "folder for the files (default parts)", Path, default=Path("parts")),
         _option("--unit MM", "millimetres of one unit of length (default 1)", float, default=1.0),
         _option(
             "--range", "inputs, radians or lengths (default: all it reaches)", type=float, nargs=2, metavar=("A", "B")
@@ -142,7 +142,7 @@ _VERBS: dict[str, tuple[str, *tuple[Option, ...]]] = {
     "run": (
         "Run a scene: from the question to a report.",
         _SCENE,
-        _option("--out DIR", "report folder (default graphsynth-out/SCENE)", Path),
+        _option("-o --output --out DIR", "report folder (default graphsynth-out/SCENE)", Path),
         _option("--workers K", "processes (default: all cores for a stream)", workers),
         _option("--fresh", "start anew, do not go on with an interrupted run in DIR"),
         _option("--explain", "print what ran and why, what did not, imports, time and memory"),
@@ -150,7 +150,7 @@ _VERBS: dict[str, tuple[str, *tuple[Option, ...]]] = {
     "design": (
         "Find mechanisms that do a task: ranked answers, a report, a file of each mechanism.",
         _option("TASK", "name of a shipped scene of module 'design', or a TOML file", dest="scene"),
-        _option("--out DIR", "report folder (default graphsynth-out/TASK)", Path),
+        _option("-o --output --out DIR", "report folder (default graphsynth-out/TASK)", Path),
         _option("--seconds S", "time limit of the search (default: as the task says)", float),
         _option("--go-on", "begin with the mechanisms of the last report in DIR"),
         _option("--workers K", "worker processes (default: all cores)", workers),
@@ -158,7 +158,7 @@ _VERBS: dict[str, tuple[str, *tuple[Option, ...]]] = {
     "accuracy": (
         "Measure error against run time of the methods in a scene.",
         _SCENE,
-        _option("--out DIR", "report folder (default graphsynth-out/SCENE-accuracy)", Path),
+        _option("-o --output --out DIR", "report folder (default graphsynth-out/SCENE-accuracy)", Path),
         _option("--rounds N", "timed runs of each row (default 3)", int, default=3),
         _option("--quick", "fewer and easier settings, to try the command"),
     ),
@@ -179,7 +179,7 @@ _VERBS: dict[str, tuple[str, *tuple[Option, ...]]] = {
             action="append",
             default=[],
         ),
-        _option("--out DIR", "write stress.html and stress.csv there", Path),
+        _option("-o --output --out DIR", "write stress.html and stress.csv there", Path),
         _option("--fast", "leave out cases that take more than about two seconds"),
         _option("--list", "list the cases, run none"),
     ),

@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     if made.sizes.pin < _SMALL:
         longest = max(row.length for row in made.bill)
         console.note(f"the longest part is {longest:.3g} mm: --unit says how many millimetres one unit of length is")
-    files = made.write(options.out, forms=options.form or ("svg", "csv"))
+    files = made.write(options.output, forms=options.form or ("svg", "csv"))
     if options.json:
         console.put_json(
             {
@@ -49,5 +49,5 @@ def run(options: argparse.Namespace) -> int:
         )
         return 0
     console.put(repr(made))
-    console.put(f"written to {options.out}: {', '.join(file.name for file in files)}")
+    console.put(f"written to {options.output}: {', '.join(file.name for file in files)}")
     return 0

@@ -16,7 +16,7 @@ def run(options: argparse.Namespace) -> int:
     from graphsynth.pipeline.store import JOURNAL
 
     scene = load_scene(options.scene)
-    folder = options.out or Path("graphsynth-out") / scene.name
+    folder = options.output or Path("graphsynth-out") / scene.name
     workers = console.workers_for(options.workers, has_stream(scene))
     try:
         with console.counting() as progress, processes(workers) as executor:

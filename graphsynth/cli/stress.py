@@ -20,8 +20,8 @@ def run(options: argparse.Namespace) -> int:
 
     if options.list:
         return _list(options)
-    if options.out:
-        options.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be written is refused now, not at the end
+    if options.output:
+        options.output.mkdir(parents=True, exist_ok=True)  # a folder that cannot be written is refused now, not at the end
     with console.counting() as bar:
 
         def told(case: Case, number: int, total: int) -> None:
@@ -30,10 +30,10 @@ def run(options: argparse.Namespace) -> int:
 
         report = run_stress(_names(options), slow=not options.fast, files=options.cases, progress=told)
     files: list[str] = []
-    if options.out:
+    if options.output:
         from graphsynth.evidence.stress.page import write_report
 
-        files = list(map(str, write_report(report, options.out)))
+        files = list(map(str, write_report(report, options.output)))
     if options.json:
         console.put_json({**report.summary(), "files": files})
     else:

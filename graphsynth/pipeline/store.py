@@ -171,7 +171,7 @@ def mark_reported(path: Path) -> None:
 
 
 #: What to do where a report folder cannot be written.
-REMEDY = "choose another folder with --out"
+REMEDY = "choose another folder with -o"
 
 
 def write_whole(path: Path, data: bytes) -> None:

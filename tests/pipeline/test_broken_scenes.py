@@ -282,4 +282,4 @@ def test_what_is_no_file(what: str, tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_an_unreadable_folder_for_the_report(tmp_path: Path, capsys: pytest.CaptureFixture[str], springs: Path) -> None:
     (tmp_path / "taken").write_text("x", encoding="utf-8")
     assert main(["run", str(springs), "--out", str(tmp_path / "taken")]) == 2
-    assert "choose another folder with --out" in capsys.readouterr().err
+    assert "choose another folder with -o" in capsys.readouterr().err
