@@ -21,7 +21,7 @@ def run(options: argparse.Namespace) -> int:
     if options.list:
         return _list(options)
     if options.output:
-        options.output.mkdir(parents=True, exist_ok=True)  # a folder that cannot be written is refused now, not at the end
+        options.output.mkdir(parents=True, exist_ok=True)  # what cannot be written is refused now, not at the end
     with console.counting() as bar:
 
         def told(case: Case, number: int, total: int) -> None:
