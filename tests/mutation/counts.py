@@ -79,6 +79,31 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
             yield from _codes(one)
 
 
+class _Fork:
+    """A copy of this process for what stands in the body; what it says is there afterwards, or None."""
+
+    said: Any = None
+
+    def __enter__(self) -> _Fork:
+        self._reading, self._writing = os.pipe()
+        self._process = os.fork()
+        self.child = self._process == 0
+        return self
+
+    def say(self, what: Any) -> None:
+        with os.fdopen(self._writing, "w") as answer:
+            json.dump(what, answer)
+
+    def __exit__(self, *error: object) -> None:
+        if self.child:
+            os._exit(0)
+        os.close(self._writing)
+        with os.fdopen(self._reading) as answer:
+            said = answer.read()
+        os.waitpid(self._process, 0)
+        self.said = json.loads(said) if said else None
+
+
 class Engine:
     """The modules as they are imported, and the questions with their usual seconds."""
 
@@ -92,28 +117,50 @@ class Engine:
                 key = one.__code__.co_filename, one.__code__.co_qualname
                 self.functions.setdefault(key, []).append(one)
         self.usual: dict[str, float] = {}
+        self.runs: dict[str, set[tuple[str, str]]] = {}
         self.by: dict[tuple[str, str], Counter[str]] = {}
 
-    def change(self, path: Path, source: str) -> None:
-        """Give the functions of a module the code of another source."""
+    def change(self, path: Path, source: str) -> set[tuple[str, str]]:
+        """Give the functions of a module the code of another source, and return which ones differ."""
+        found = set()
         for code in _codes(compile(source, str(path), "exec")):
             for function in self.functions.get((str(path), code.co_qualname), ()):
                 if function.__code__ != code:
                     function.__code__ = code
+                    found.add((str(path), code.co_qualname))
+        return found
 
-    def questions(self, path: Path, change: Change | None) -> list[questions.Question]:
-        """Return the questions, first those that noticed changes of the same function."""
+    def see_what_runs(self) -> None:
+        """Ask each question in a fork of its own, where nothing is kept of others, and note which functions run."""
+
+        def note(frame: Any, event: str, what: Any) -> None:
+            if event == "call" and frame.f_code.co_filename in files:
+                ran.add((frame.f_code.co_filename, frame.f_code.co_qualname))
+
+        files = {file for file, _ in self.functions}
+        for name, question, _ in (*questions.of_the_engine(), *questions.of_the_second_count()):
+            ran: set[tuple[str, str]] = set()
+            with _Fork() as fork:
+                if fork.child:
+                    sys.setprofile(note)
+                    question()
+                    sys.setprofile(None)
+                    fork.say([*ran])
+            self.runs.setdefault(name, set()).update(map(tuple, fork.said))
+
+    def questions(self, path: Path, change: Change | None, changed: set[tuple[str, str]]) -> list[questions.Question]:
+        """Return the questions that run what is changed, first those that noticed changes of the same function."""
         asked = questions.of_the_second_count() if path == SECOND else questions.of_the_engine()
+        asked = [one for one in asked if not change or self.runs[one[0]] & changed]
         best = self.by.get((path.stem, change.function), Counter()) if change else Counter()
         return sorted(asked, key=lambda one: -best[one[0]] / (0.1 + self.usual.get(one[0], 0.0)))
 
     def answer(self, path: Path, change: Change | None) -> dict[str, float] | str:
         """Return the first question that is answered wrongly, or the seconds that each took."""
         source = path.read_text("utf-8")
-        if change:
-            self.change(path, change.applied(source))
+        changed = self.change(path, change.applied(source)) if change else set()
         seconds = {}
-        for name, question, right in self.questions(path, change):
+        for name, question, right in self.questions(path, change, changed):
             begin = time.process_time()
             signal.setitimer(signal.ITIMER_PROF, 1 + 4 * self.usual.get(name, 4.0))
             try:
@@ -130,21 +177,14 @@ class Engine:
 
     def judge(self, path: Path, change: Change | None) -> Row:
         """Ask the questions of one change in a fork."""
-        begin, (reading, writing) = time.monotonic(), os.pipe()
-        if (child := os.fork()) == 0:
-            try:
+        begin = time.monotonic()
+        with _Fork() as fork:
+            if fork.child:
                 resource.setrlimit(resource.RLIMIT_CPU, (120, 120))
                 resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
                 signal.signal(signal.SIGPROF, _stop)
-                with os.fdopen(writing, "w") as answer:
-                    json.dump(self.answer(path, change), answer)
-            finally:
-                os._exit(0)
-        os.close(writing)
-        with os.fdopen(reading) as answer:
-            said = answer.read()
-        os.waitpid(child, 0)
-        by = json.loads(said) if said else "no answer"
+                fork.say(self.answer(path, change))
+        by = "no answer" if fork.said is None else fork.said
         if isinstance(by, dict):
             self.usual = by if change is None else self.usual
             by = ""
@@ -197,6 +237,7 @@ def main() -> int:
         if wrong := engine.judge(path, None)["by"]:
             print(f"the code as it is answers wrongly: {wrong}")
             return 1
+    engine.see_what_runs()
     found = [(path, c) for path in MODULES if path.stem in options.modules for c in changes(path.read_text("utf-8"))]
     found = [one for one in found if one[1].function not in BESIDE]
     drawn = found if options.all else random.Random(options.seed).sample(found, min(options.count, len(found)))

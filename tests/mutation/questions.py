@@ -115,10 +115,10 @@ def of_the_second_count() -> list[Question]:
         return [second.with_fractionated(n, mobility) for n in links]
 
     return [
-        ("chains", lambda: [second.chains(n) for n in (4, 6, 8)], [1, 2, 16]),
+        ("second chains", lambda: [second.chains(n) for n in (4, 6, 8)], [1, 2, 16]),
         ("Laman graphs", lambda: [second.chains(n, 2) for n in (3, 4, 5, 6, 7)], [1, 1, 3, 13, 70]),
         ("links told apart", lambda: [second.labelled_chains(n) for n in (4, 6)], [3, 360]),
-        ("fractionated", lambda: fractionated(2, 5, 7, 9), [1, 4, 40]),
-        ("three freedoms", lambda: fractionated(3, 6, 8), [1, 7]),
+        ("second fractionated", lambda: fractionated(2, 5, 7, 9), [1, 4, 40]),
+        ("second three freedoms", lambda: fractionated(3, 6, 8), [1, 7]),
         ("no joints", lambda: fractionated(1, 7), [0]),
     ]
