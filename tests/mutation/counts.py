@@ -29,13 +29,12 @@ from typing import Any
 
 os.environ["NUMBA_DISABLE_JIT"] = "1"  # before numba is imported
 
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "tests/synthesis"))
-
 import questions
 from run import _line, known
 from sites import Change, changes
 
+ROOT = Path(__file__).parents[2]
+sys.path.append(str(ROOT / "tests/synthesis"))  # the second count and what is found by trying everything
 ENGINE = ROOT / "graphsynth/synthesis"
 NAMES = ("edge_labels", "families", "fractionated", "geared_trees", "rigid_blocks", "totals", "wishes")
 KERNELS = ("colouring", "contracted", "counting", "covers", "expanding", "gears")

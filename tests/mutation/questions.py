@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from graphsynth import MechanismGraph, StructuralSpec
 
-__all__ = ["of_the_engine"]
+__all__ = ["Question", "of_the_engine", "of_the_second_count"]
 
 Question = tuple[str, Callable[[], Any], Any]
 LEVELS: list[dict[int, Any]] = [{-1: 1}, {3: 2}, {2: (3, None)}]
@@ -70,6 +72,8 @@ def of_the_engine() -> list[Question]:
         ("gear trains", lambda: [trains(n) for n in (5, 6)], [13, 81]),
         ("rotation graphs", lambda: [trains(n, w, rotation=True) for n, w in ((5, 1), (6, 1), (6, 2))], [6, 27, 2]),
         ("roles of trains", lambda: [trains(5, framed=True), *(trains(5, drive=d) for d in ways)], [50, 109, 37]),
+        ("drawn trains", _drawn_trains, True),
+        ("drawn choices", _drawn_choices, True),
         ("all identities", _together, [16, 230]),
         ("splits", _splits, [1, 4, 17, 118]),
         ("grown", _grown, [3, 13, 24, 38, 23, 16, 87]),
@@ -105,6 +109,43 @@ def _grown() -> list[int]:
         growth = make_growth(2000)
         symmetric += grow(k, graphs, len(graphs), loops, 4, 5, 8, True, growth, out, sizes, sums)
     return [*sums[3:9].tolist(), symmetric]
+
+
+def _drawn_trains() -> bool:
+    """Tell whether symmetries of trees are drawn as often as they keep gear pairs and roles, by trying everything."""
+    from gear_symmetries import weights
+
+    from graphsynth.synthesis.geared_trees import _move, trees_of_axes
+
+    for links, gears, roles in ((4, 2, 0), (4, 1, 1), (4, 1, 2), (4, 2, 3), (5, 3, 0), (5, 2, 2)):
+        for at, tree in enumerate(trees_of_axes(links)):
+            order, total, _ = _move(links, at, gears, roles, -1)
+            wanted = weights(tree, gears, roles)
+            if total != sum(wanted.values()) or (total and order != tree.automorphism_order):
+                return False
+            if links == 4 and Counter(tuple(_move(4, at, gears, roles, t)[2]) for t in range(total)) != wanted:
+                return False
+    return True
+
+
+def _drawn_choices() -> bool:
+    """Tell whether choices of gear pairs that a symmetry keeps are equally likely, by every way to draw them."""
+    from functools import partial
+
+    from gear_symmetries import every_draw, kept_choices, weights
+
+    from graphsynth.synthesis.geared_trees import _kept_choice, _possible_pairs, trees_of_axes
+
+    for tree in trees_of_axes(4):
+        pairs = _possible_pairs(tree)
+        for move in weights(tree, 2, 0):
+            chances: Counter[frozenset[frozenset[int]]] = Counter()
+            for places, chance in every_draw(partial(_kept_choice, pairs, move, 2)):
+                chances[frozenset(frozenset(pairs[at][:2]) for at in places)] += chance  # type: ignore[assignment]
+            wanted = kept_choices(tree, 2, move)
+            if chances != {chosen: Fraction(1, len(wanted)) for chosen in wanted}:
+                return False
+    return True
 
 
 def of_the_second_count() -> list[Question]:
