@@ -157,15 +157,9 @@ def test_points_in_special_position_are_not_called_complete():
 @pytest.mark.slow
 @pytest.mark.parametrize(("points", "pivots", "expected"), [(9, 0, 1442), (7, 1, 243), (5, 2, 36)])
 def test_hundred_random_tasks(plant, points, pivots, expected):
-    """Every planted linkage is found, a quarter of them in order on one branch, a quarter of extreme proportions.
-
-    Of nine points a triple with pivots very far away is lost in a few tasks, which then are not called complete.
-    """
-    whole = 0
+    """Every planted linkage is found, a quarter of them in order on one branch, a quarter of extreme proportions."""
     for seed in range(100, 200):
         linkage = plant(seed, points, in_order=seed % 4 == 0, extreme=seed % 4 == 1)
         found = four_bars_through(linkage.points, linkage.pivots[:pivots])
-        assert found.complete == (found.certified == expected) and linkage.among(found.linkages)
+        assert found.complete and found.certified == expected and linkage.among(found.linkages)
         assert seed % 4 or linkage.among(found.without_defects)
-        whole += found.complete
-    assert whole >= (90 if points == 9 else 100)
