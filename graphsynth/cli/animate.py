@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
-from graphsynth.cli.show import check_place, read_graph
+from graphsynth.cli.show import check_place, read_graph, read_special
 from graphsynth.core.errors import FormatError, GraphsynthError, SpecError
 from graphsynth.core.wholefiles import replacing
 
@@ -107,16 +107,21 @@ def moved(mechanism: Mechanism, reach: list[float] | None) -> Motion:
 def _from_graph(options: argparse.Namespace) -> _Found:
     """Find dimensions for a graph; the best found is shown even where nothing was accepted."""
     from graphsynth.kinematics.dimensional import embody
+    from graphsynth.structure.slider_chains import SliderChain
 
     if options.range is not None:
         raise SpecError("--range belongs to a dimensioned mechanism; a graph gets dimensions for a full rotation")
-    graph = read_graph(options.mechanism, options.line)
-    found = embody(graph, seed=options.seed, driver=_on_frame(graph, options.driver))
+    chain = read_special(options.mechanism, options.line)
+    if chain is not None and not isinstance(chain, SliderChain):
+        raise SpecError(f"{options.mechanism}: dimensions are found for chains of simple joints, not for this kind")
+    graph = chain.graph if chain else read_graph(options.mechanism, options.line)
+    slides = dict.fromkeys(chain.sliders, "P") if chain else None
+    found = embody(graph, seed=options.seed, driver=_on_frame(graph, options.driver), joints=slides)
     if found.motion is None or found.mechanism is None:
         raise GraphsynthError(f"{found.statement}; try another --seed or --driver")
     facts: dict[str, Any] = {
-        "key": graph.key,
-        "text": found.graph.to_text(),
+        "key": (chain or graph).key,
+        "text": (chain or found.graph).to_text(),
         "accepted": found.accepted,
         "seed": found.seed,
         "evaluations": found.evaluations,
@@ -125,7 +130,7 @@ def _from_graph(options: argparse.Namespace) -> _Found:
     if found.figures is not None:
         names = ("transmission_angle", "singularity_distance", "length_ratio")
         facts |= {name: _number(getattr(found.figures, name)) for name in names}
-    return _Found(found.motion, graph.to_text(), found.statement, facts)
+    return _Found(found.motion, (chain or graph).to_text(), found.statement, facts)
 
 
 def _on_frame(graph: MechanismGraph, links: list[int] | None) -> list[tuple[int, int]] | None:

@@ -11,7 +11,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from graphsynth.cli import console
-from graphsynth.cli.question import problem_of
+from graphsynth.cli.question import problem_of, special_of
 from graphsynth.core.errors import GraphsynthError, SpecError, TooLargeError
 
 if TYPE_CHECKING:
@@ -35,6 +35,10 @@ def run(options: argparse.Namespace) -> int:
     begin = time.perf_counter()
     entry = _other_format(options.output) if options.output else None
     problem = problem_of(options)
+    if options.sample is not None:
+        from graphsynth.synthesis.sampling import sampled
+
+        problem = sampled(problem, options.sample, options.seed)
     if problem.reason:
         console.note(f"nothing to list: {problem.reason}")
     items = problem.work_items(listing=True)
@@ -44,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
             for data in blocks:
                 sys.stdout.buffer.write(data)
             return 0
-        if entry is not None and (options.multiple_joints or options.sliders):
+        if entry is not None and special_of(options):
             raise SpecError(f"{options.output.suffix} has no place for such joints: use .txt or .jsonl")
         if entry is not None and (options.resume or options.json):
             raise SpecError(

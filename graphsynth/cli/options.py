@@ -78,6 +78,8 @@ _VERBS: dict[str, tuple[str, *tuple[Option, ...]]] = {
         _option("-o --output FILE", ".g6 or .txt: text form; .jsonl: JSON lines", Path),
         _option("--resume", "go on with an interrupted FILE"),
         _option("--force", "replace FILE; list even what may not fit the disk"),
+        _option("--sample K", "K of them at random instead, each as likely as any other", int),
+        _option("--seed S", "of the sample (default 0)", int, default=0),
     ),
     "show": (
         "Describe one chain or mechanism.",

@@ -106,19 +106,9 @@ def _problem(options: argparse.Namespace, *, counted: bool) -> EnumerationProble
             raise SpecError(f"Pi = {space} must be a whole number from 2 to 6")
         links = options.truss if options.assur is None else options.assur + 1
         return EnumerationProblem.trusses(links, int(space), options.assur is not None)
-    if options.gear_trains or options.rotation_graphs or options.drive:
-        more = options.symmetry or options.spec or options.set or options.fractionated
-        size = given.get("N", ""), given.get("W", "1")
-        if more or not options.gear_trains or set(given) - {"N", "W"} or not all(map(str.isdecimal, size)):
-            raise SpecError(
-                "--gear-trains takes --links N, --mobility W, --frame, --drive and --rotation-graphs, and nothing else "
-                "of a question"
-            )
-        roles = {"rotation": options.rotation_graphs, "framed": options.frame, "drive": options.drive}
-        return EnumerationProblem.gear_trains(int(size[0]), int(size[1]), **roles)
-    slides = options.cylinders or options.sliding_links or options.sliding_loops
-    if options.multiple_joints is not None or options.sliders is not None or slides:
-        return _with_special_joints(options, given)
+    special = special_of(options)
+    if special:
+        return _with_special_joints(options, given, special)
     if options.frame or options.spec or options.set or set(given) - _OF_CHAINS:
         spec = spec_of(options)
         if spec.bounds("W") == (None, None) and "p" not in spec.ranges:
@@ -136,31 +126,44 @@ def _problem(options: argparse.Namespace, *, counted: bool) -> EnumerationProble
     return EnumerationProblem.chains(*numbers, counted=counted)
 
 
-def _with_special_joints(options: argparse.Namespace, given: dict[str, str]) -> EnumerationProblem:
-    """Return the question of chains with multiple or prismatic joints."""
+def special_of(options: argparse.Namespace) -> str:
+    """Return the option that asks for other joints or gears, also where only what goes with it is given."""
+    asked = {
+        "multiple-joints": options.multiple_joints is not None,
+        "sliders": options.sliders is not None or options.cylinders or options.sliding_links or options.sliding_loops,
+        "gear-trains": options.gear_trains or options.rotation_graphs or options.drive,
+    }
+    names = [name for name, wanted in asked.items() if wanted]
+    if len(names) > 1:
+        raise SpecError(f"--{names[0]} and --{names[1]} ask for different things: give one of them")
+    return "".join(names)
+
+
+def _with_special_joints(options: argparse.Namespace, given: dict[str, str], name: str) -> EnumerationProblem:
+    """Return the question of chains with multiple or prismatic joints, or of gear trains."""
     from graphsynth.synthesis.problem import EnumerationProblem
 
-    name, number = ("multiple-joints", options.multiple_joints)
-    slides = options.cylinders, options.sliding_links, options.sliding_loops
-    if number is None:
-        name, number = "sliders", options.sliders
-    elif options.sliders is not None or any(slides):
-        raise SpecError("--multiple-joints and --sliders ask for different things: give one of them")
     others = sorted(set(given) - {"N", "W"})
     if others or options.spec or options.set or options.fractionated or options.symmetry or "N" not in given:
         raise SpecError(
             f"--{name} takes --links, --mobility and --frame, and needs --links (given besides: "
             f"{', '.join(others) or 'more'}): leave the rest out"
         )
-    any_number = number == "any" and name != "sliders"
-    for text in (given["N"], given.get("W", "1"), "1" if any_number else number or ""):
+    numbers = {"multiple-joints": options.multiple_joints, "sliders": options.sliders}
+    number = numbers.get(name, "1" if options.gear_trains else None)
+    if number is None:
+        raise SpecError(f"what is asked besides goes with --{name}{' K' * (name == 'sliders')}: give that, too")
+    any_number = number == "any" and name == "multiple-joints"
+    for text in (given["N"], given.get("W", "1"), "1" if any_number else number):
         if not text.isdecimal():
             raise SpecError(f"{text or 'nothing'} must be a whole number for chains with --{name}")
     links, mobility = int(given["N"]), int(given.get("W", "1"))
     if name == "sliders":
-        cylinders, links_slide, loops_slide = slides
-        loose = links_slide, loops_slide, cylinders, options.frame
+        loose = options.sliding_links, options.sliding_loops, options.cylinders, options.frame
         return EnumerationProblem.sliders(links, int(number), mobility, *loose)
+    if name == "gear-trains":
+        roles = {"rotation": options.rotation_graphs, "framed": options.frame, "drive": options.drive}
+        return EnumerationProblem.gear_trains(links, mobility, **roles)
     multiple = None if any_number else int(number)
     return EnumerationProblem.multiple_joints(links, mobility, multiple, framed=options.frame)
 

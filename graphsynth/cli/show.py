@@ -13,7 +13,10 @@ from graphsynth.core.errors import FormatError, GraphError, GraphsynthError, Spe
 from graphsynth.core.wholefiles import replacing
 
 if TYPE_CHECKING:
+    from graphsynth.structure.gear_trains import PlanetaryGearTrain
     from graphsynth.structure.graph import MechanismGraph
+    from graphsynth.structure.multiple_joints import MultipleJointChain
+    from graphsynth.structure.slider_chains import SliderChain
 
 #: Links up to which assembly modes and degrees of curves are told, which takes a second there.
 _COUNTED = 16
@@ -23,8 +26,8 @@ PICTURES = (".svg", ".png", ".pdf", ".tikz", ".tex", ".dxf")
 
 def run(options: argparse.Namespace) -> int:
     """Describe one graph, and draw it if asked."""
-    if re.search(r"^1m[0-9]| m[0-9]{1,3}$|^1[gp]\.| [GP]:", options.graph):
-        return _with_special_joints(options)
+    if chain := read_special(options.graph, options.line):
+        return _with_special_joints(chain, options)
     graph = read_graph(options.graph, options.line)
     if options.output:
         from graphsynth.formats.registry import FORMATS, write
@@ -48,17 +51,28 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _with_special_joints(options: argparse.Namespace) -> int:
-    """Describe and draw a chain with multiple or prismatic joints, or a planetary gear train."""
+def read_special(text: str, line: int = 1) -> PlanetaryGearTrain | MultipleJointChain | SliderChain | None:
+    """Read a chain with multiple or prismatic joints, or a gear train, as `read_graph` does; None for other graphs."""
+    row = _row(text, line)[0]
+    text = row[9:].partition('"')[0] if row.startswith('{"key": "') else row
+    if not re.search(r"^1m[0-9]| m[0-9]{1,3}$|^1[gp]\.| [GP]:", text):
+        return None
     from graphsynth.structure.gear_trains import PlanetaryGearTrain
     from graphsynth.structure.multiple_joints import MultipleJointChain
     from graphsynth.structure.slider_chains import SliderChain
 
-    text = options.graph
     kinds: dict[str, type[PlanetaryGearTrain | SliderChain]] = {"g": PlanetaryGearTrain, "p": SliderChain}
     letter = next((letter for letter in kinds if text.startswith(f"1{letter}.") or f" {letter.upper()}:" in text), "m")
     kind = kinds.get(letter, MultipleJointChain)
-    chain = kind.from_text(text) if " " in text else kind.from_key(text)
+    return kind.from_text(text) if " " in text else kind.from_key(text)
+
+
+def _with_special_joints(
+    chain: PlanetaryGearTrain | MultipleJointChain | SliderChain, options: argparse.Namespace
+) -> int:
+    """Describe and draw a chain with multiple or prismatic joints, or a planetary gear train."""
+    from graphsynth.structure.gear_trains import PlanetaryGearTrain
+
     geared = isinstance(chain, PlanetaryGearTrain)
     if options.output:
         check_place(options.output, PICTURES)
@@ -100,24 +114,14 @@ def read_graph(text: str, line: int = 1) -> MechanismGraph:
     """
     from graphsynth.structure.graph import MechanismGraph
 
-    path = Path(text)
-    if len(text) < 1000 and path.is_file():
-        from graphsynth.formats.registry import FORMATS, LINE_MAX, read
+    if _is_whole(text):
+        from graphsynth.formats.registry import read
 
-        if any(path.suffix.lower() in entry.suffixes for entry in FORMATS.values() if not entry.line):
-            item = read(path, number=line)
-            return item if isinstance(item, MechanismGraph) else item.graph
-        count = 0
-        with path.open("rb") as file:
-            while row := file.readline(LINE_MAX + 1):
-                count += 1
-                if len(row) > LINE_MAX:
-                    raise FormatError(
-                        f"more than {LINE_MAX} bytes on one line; no graph is so long", f"{text} line {count}"
-                    )
-                if count == line:
-                    return _one(row.decode(errors="replace").strip(), f"{text} line {line}")
-        raise FormatError(f"line {line} does not exist, the file has {count}: choose another --line", text)
+        item = read(text, number=line)
+        return item if isinstance(item, MechanismGraph) else item.graph
+    row, place = _row(text, line)
+    if place:
+        return _one(row, place)
     if text.startswith("1") and " " not in text:
         return MechanismGraph.from_key(text)
     try:
@@ -126,6 +130,34 @@ def read_graph(text: str, line: int = 1) -> MechanismGraph:
         if set(text) & {"/", "."}:  # never part of a key or a text form
             raise FormatError("there is no such file, nor is this a key or the text form of a graph", text) from None
         raise FormatError(f"no such file, and no text form of a graph: {error}", text) from None
+
+
+def _is_whole(text: str) -> bool:
+    """Tell whether a text names a file that is no file of lines."""
+    if len(text) >= 1000 or not Path(text).is_file():
+        return False
+    from graphsynth.formats.registry import FORMATS
+
+    return any(Path(text).suffix.lower() in entry.suffixes for entry in FORMATS.values() if not entry.line)
+
+
+def _row(text: str, line: int) -> tuple[str, str]:
+    """Return a line of the file of lines that a text names, and where it stands; of another text, the text alone."""
+    if len(text) >= 1000 or not Path(text).is_file() or _is_whole(text):
+        return text, ""
+    from graphsynth.formats.registry import LINE_MAX
+
+    count = 0
+    with Path(text).open("rb") as file:
+        while row := file.readline(LINE_MAX + 1):
+            count += 1
+            if len(row) > LINE_MAX:
+                raise FormatError(
+                    f"more than {LINE_MAX} bytes on one line; no graph is so long", f"{text} line {count}"
+                )
+            if count == line:
+                return row.decode(errors="replace").strip(), f"{text} line {line}"
+    raise FormatError(f"line {line} does not exist, the file has {count}: choose another --line", text)
 
 
 def _one(text: str, place: str) -> MechanismGraph:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import combinations
+from operator import or_
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import FormatError
@@ -121,6 +122,47 @@ class MultipleJointChain:
     def loops(self) -> int:
         """Number of independent loops."""
         return self.incidence.loops
+
+    @property
+    def degrees(self) -> tuple[int, ...]:
+        """Number of joints on each link."""
+        return self.incidence.degrees[: self.links]
+
+    @property
+    def neighbours(self) -> tuple[int, ...]:
+        """For each link the bit mask of the links that share a joint with it."""
+        on = [sum(1 << link for link in joint) for joint in self.joints]
+        return tuple(reduce(or_, (mask for mask in on if mask >> a & 1), 0) & ~(1 << a) for a in range(self.links))
+
+    @property
+    def girth(self) -> int | None:
+        """Number of joints of the shortest loop, or None for a chain without loops."""
+        pairs = [(link, joint) for joint, ends in enumerate(self.joints, self.links) for link in ends]
+        around = MechanismGraph(self.links + len(self.joints), pairs).girth  # links and joints, one after the other
+        return around and around // 2
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether the graph of links and multiple joints can be drawn without crossings."""
+        return self.incidence.is_planar
+
+    @property
+    def mobility_type(self) -> str:
+        """How the mobility is shared out, ``"total"``, ``"partial"`` or ``"fractionated"``, as `MechanismGraph` tells.
+
+        All sets of links are tried, each of which has two joints with others of the set.
+        """
+        import numpy as np
+
+        if self.incidence.is_fractionated:
+            return "fractionated"
+        sets = np.arange(1, 1 << self.links)
+        has = sets[:, None] >> np.arange(self.links) & 1
+        holds = np.array([[link in joint for joint in self.joints] for link in range(self.links)], np.int64)
+        on = has @ holds  # links of a set on a joint
+        closed = (((on > 1) @ holds.T > 1) | (has == 0)).all(axis=1)
+        free = 3 * (has.sum(axis=1) - 1) - 2 * np.maximum(on - 1, 0).sum(axis=1)
+        return "partial" if (free[closed] < self.mobility).any() else "total"
 
     @cached_property
     def labelling(self) -> Labelling:

@@ -182,13 +182,14 @@ def sample_chains(
     space: int = 3,
     joints_by_mobility: Mapping[int, int] | None = None,
     fractionated: bool = False,
+    wishes: Wishes | None = None,
 ) -> list[MechanismGraph]:
     """Draw k of what ``enumerate_chains`` yields, independently and exactly uniformly, without a list.
 
     Parameters
     ----------
-    links, mobility, space, joints_by_mobility, fractionated
-        As for `enumerate_chains`; fractionated chains are listed, to be drawn.
+    links, mobility, space, joints_by_mobility, fractionated, wishes
+        As for `enumerate_chains`; fractionated chains are listed, to be drawn; what is not as wished is drawn again.
     k, seed : int
         As for `sample_mechanisms`.
 
@@ -201,6 +202,8 @@ def sample_chains(
     ------
     InfeasibleSpecError
         If there is nothing to draw from; else as for `enumerate_chains`.
+    SpecError
+        If ten thousand draws in a row are not as wished; else as for `enumerate_chains`.
 
     Examples
     --------
@@ -209,7 +212,8 @@ def sample_chains(
     """
     from graphsynth.synthesis.sampling import sample
 
-    return sample(EnumerationProblem.chains(links, mobility, space, joints_by_mobility, fractionated, None), k, seed)
+    asked = links, mobility, space, joints_by_mobility, fractionated, None
+    return sample(EnumerationProblem.chains(*asked).wishing(wishes), k, seed)
 
 
 def enumerate_mechanisms(
@@ -282,7 +286,9 @@ def count_mechanisms(
     return counted(EnumerationProblem.mechanisms(spec, symmetry).wishing(wishes), executor)
 
 
-def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) -> list[MechanismGraph]:
+def sample_mechanisms(
+    spec: StructuralSpec | LinkAssortment, k: int, seed: int, *, wishes: Wishes | None = None
+) -> list[MechanismGraph]:
     """Draw k mechanisms independently and exactly uniformly from all that answer a structural question.
 
     Parameters
@@ -293,6 +299,8 @@ def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) 
         Number of draws (with replacement).
     seed : int
         Seed of ``random.Random``; the same seed gives the same draws.
+    wishes : Wishes, optional
+        As for `enumerate_chains`; what is not as wished is drawn again.
 
     Returns
     -------
@@ -302,7 +310,8 @@ def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) 
     Raises
     ------
     SpecError
-        For a number of draws or a seed that is none; else as for `enumerate_mechanisms`.
+        For a number of draws or a seed that is none, or ten thousand draws in a row that are not as wished; else as for
+        `enumerate_mechanisms`.
 
     Examples
     --------
@@ -312,7 +321,7 @@ def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) 
     """
     from graphsynth.synthesis.sampling import sample
 
-    return sample(EnumerationProblem.mechanisms(spec, None), k, seed)
+    return sample(EnumerationProblem.mechanisms(spec, None).wishing(wishes), k, seed)
 
 
 def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | None = None) -> Graphs[MechanismGraph]:

@@ -76,7 +76,7 @@ class Chunk:
             data = block.tobytes()
             for at in range(0, len(data), size):
                 graph = make(links, data[at : at + size], frame, space)
-                if self.wishes is None or self.wishes.fit(graph, self.family.higher):
+                if self.wishes is None or self.wishes.fit(self.chain(graph)):
                     yield graph
 
     def chain(self, graph: MechanismGraph) -> MechanismGraph | MultipleJointChain | SliderChain:

@@ -76,7 +76,7 @@ class OneByOne(Made):
         for graph in self._all():
             if self.symmetry and graph.automorphism_order % self.symmetry:  # Cauchy: p divides the order of the group
                 continue
-            if self._fits(graph) and (self.wishes is None or self.wishes.fit(graph, self.higher)):
+            if self._fits(graph) and (self.wishes is None or self.wishes.fit(self.chain(graph))):
                 yield graph
 
     def chain(self, graph: MechanismGraph) -> MechanismGraph | SliderChain:

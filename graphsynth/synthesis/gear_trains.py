@@ -6,7 +6,7 @@ from concurrent.futures import Executor
 
 from graphsynth.structure.gear_trains import PlanetaryGearTrain
 from graphsynth.synthesis.api import Graphs
-from graphsynth.synthesis.problem import EnumerationProblem, counted, graphs
+from graphsynth.synthesis.problem import EnumerationProblem, counted, listed
 
 
 def enumerate_planetary_gear_trains(
@@ -63,8 +63,7 @@ def enumerate_planetary_gear_trains(
     ['C~ G:1-3,2-3', 'C} G:1-2,1-3', 'C} G:0-3,1-2']
     """
     problem = EnumerationProblem.gear_trains(links, mobility, rotation=rotation, framed=framed, drive=drive)
-    items = problem.work_items(listing=True)
-    return Graphs(problem.title, lambda: map(PlanetaryGearTrain, graphs(items, executor)))
+    return Graphs(problem.title, lambda: listed(problem, executor))
 
 
 def count_planetary_gear_trains(
@@ -137,4 +136,4 @@ def sample_planetary_gear_trains(
     from graphsynth.synthesis.sampling import sample
 
     problem = EnumerationProblem.gear_trains(links, mobility, rotation=rotation, framed=framed, drive=drive)
-    return list(map(PlanetaryGearTrain, sample(problem, k, seed)))
+    return sample(problem, k, seed)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from concurrent.futures import Executor
 
 from graphsynth.structure.multiple_joints import MultipleJointChain
 from graphsynth.synthesis.api import Graphs
-from graphsynth.synthesis.problem import EnumerationProblem, counted, graphs
+from graphsynth.synthesis.problem import EnumerationProblem, counted, listed
+from graphsynth.synthesis.wishes import Wishes
 
 
 def enumerate_multiple_joint_chains(
@@ -16,6 +16,7 @@ def enumerate_multiple_joint_chains(
     *,
     multiple: int | None = None,
     framed: bool = False,
+    wishes: Wishes | None = None,
     executor: Executor | None = None,
 ) -> Graphs[MultipleJointChain]:
     """Enumerate planar chains with multiple joints: every one, each once, none with a rigid sub-chain (exact).
@@ -33,6 +34,8 @@ def enumerate_multiple_joint_chains(
         Number of multiple joints.  Default: all chains with one or more.
     framed : bool
         Choose a frame in all ways that differ: mechanisms instead of chains.
+    wishes : Wishes, optional
+        What the chains are to be like as a whole, as for `enumerate_chains`.
     executor : concurrent.futures.Executor, optional
         Who does the work; the result is the same for any.  Default: this process.
 
@@ -57,13 +60,8 @@ def enumerate_multiple_joint_chains(
     >>> [chain.joints[-1] for chain in enumerate_multiple_joint_chains(6, multiple=1)]
     [(1, 3, 5)]
     """
-    problem = EnumerationProblem.multiple_joints(links, mobility, multiple, framed=framed)
-    items = problem.work_items(listing=True)
-
-    def make() -> Iterator[MultipleJointChain]:
-        return (MultipleJointChain(graph, graph.links - int(links)) for graph in graphs(items, executor))
-
-    return Graphs(f"chains with multiple joints, {problem.title}", make)
+    problem = EnumerationProblem.multiple_joints(links, mobility, multiple, framed=framed).wishing(wishes)
+    return Graphs(f"chains with multiple joints, {problem.title}", lambda: listed(problem, executor))
 
 
 def count_multiple_joint_chains(
@@ -72,14 +70,15 @@ def count_multiple_joint_chains(
     *,
     multiple: int | None = None,
     framed: bool = False,
+    wishes: Wishes | None = None,
     executor: Executor | None = None,
 ) -> int:
     """Count what ``enumerate_multiple_joint_chains`` yields, without making the chains (exact).
 
     Parameters
     ----------
-    links, mobility, multiple, framed, executor
-        As for `enumerate_multiple_joint_chains`.
+    links, mobility, multiple, framed, wishes, executor
+        As for `enumerate_multiple_joint_chains`; with wishes, chains are made and counted.
 
     Returns
     -------
@@ -90,17 +89,26 @@ def count_multiple_joint_chains(
     >>> [count_multiple_joint_chains(8, multiple=number) for number in (1, 2, 3, 4)]
     [22, 18, 3, 1]
     """
-    return counted(EnumerationProblem.multiple_joints(links, mobility, multiple, framed=framed), executor)
+    return counted(
+        EnumerationProblem.multiple_joints(links, mobility, multiple, framed=framed).wishing(wishes), executor
+    )
 
 
 def sample_multiple_joint_chains(
-    links: int, mobility: int = 1, *, k: int, seed: int, multiple: int | None = None, framed: bool = False
+    links: int,
+    mobility: int = 1,
+    *,
+    k: int,
+    seed: int,
+    multiple: int | None = None,
+    framed: bool = False,
+    wishes: Wishes | None = None,
 ) -> list[MultipleJointChain]:
     """Draw k of what ``enumerate_multiple_joint_chains`` yields, independently and exactly uniformly, without a list.
 
     Parameters
     ----------
-    links, mobility, multiple, framed
+    links, mobility, multiple, framed, wishes
         As for `enumerate_multiple_joint_chains`.
     k, seed : int
         As for `sample_mechanisms`.
@@ -122,5 +130,4 @@ def sample_multiple_joint_chains(
     """
     from graphsynth.synthesis.sampling import sample
 
-    drawn = sample(EnumerationProblem.multiple_joints(links, mobility, multiple, framed=framed), k, seed)
-    return [MultipleJointChain(graph, graph.links - int(links)) for graph in drawn]
+    return sample(EnumerationProblem.multiple_joints(links, mobility, multiple, framed=framed).wishing(wishes), k, seed)

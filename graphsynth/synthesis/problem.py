@@ -11,7 +11,7 @@ from functools import lru_cache
 from hashlib import sha256
 from itertools import chain
 from operator import methodcaller
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import GraphsynthError, InfeasibleSpecError, SpecError, TooLargeError
 from graphsynth.core.ordered import in_order, processes as processes_of
@@ -90,15 +90,19 @@ class EnumerationProblem:
             return self
         if not isinstance(wishes, Wishes):
             raise SpecError(f"wishes = {shown(wishes)} must be Wishes")
-        if any(family.pins for family in self.families) or not all(isinstance(i, OneByOne) for i in self.one_by_one):
-            raise SpecError(f"{self.title}: wishes are for chains with simple joints: list these, and choose")
-        slides = any(family.rules for family in self.families)
+        if not all(isinstance(item, OneByOne) for item in self.one_by_one):
+            raise SpecError(
+                f"{self.title}: wishes speak of loops and of links by their joints, which the axes of a gear train do "
+                "not have: list the trains, and choose"
+            )
+        others = any(family.pins or family.rules & (NO_SLIDING_LINK | NO_SLIDING_LOOP) for family in self.families)
+        rules = 0 if others else wishes.rules  # the search has no room for needs of two kinds
         return replace(
             self,
             title=f"{self.title} {wishes}".strip(),
-            families=tuple(replace(family, rules=family.rules or wishes.rules) for family in self.families),
+            families=tuple(replace(family, rules=family.rules | rules) for family in self.families),
             one_by_one=tuple(replace(item, wishes=wishes) for item in self.one_by_one if isinstance(item, OneByOne)),
-            wishes=None if wishes.is_searched and not slides else wishes,
+            wishes=None if wishes.is_searched and not others else wishes,
         )
 
     @classmethod
@@ -175,7 +179,8 @@ class EnumerationProblem:
         allowed = {"sliding links": _truth(links_slide, "sliding_links")}
         allowed["sliding loops"] = _truth(loops_slide, "sliding_loops")
         rules = NO_SLIDING_LINK * (not links_slide) + NO_SLIDING_LOOP * (not loops_slide)
-        rules += CYLINDERS * _truth(cylinders, "cylinders")
+        if _truth(cylinders, "cylinders"):
+            rules = CYLINDERS  # a revolute joint at either end of every path: both rules are kept
         title = f"W={mobility} N={links} sliders={number}" + "".join(f" {name}" for name, yes in allowed.items() if yes)
         title += (" cylinders" if cylinders else "") + (" framed" if _truth(framed, "framed") else "")
         joints = chain_joints(links, mobility, 3, {})
@@ -433,8 +438,17 @@ def texts(items: Iterable[WorkItem], executor: Executor | None) -> Iterator[tupl
 
 def graphs(items: Iterable[WorkItem], executor: Executor | None) -> Iterator[MechanismGraph]:
     """Yield the graphs of all work items, in order."""
-    made = map(methodcaller("graphs"), items) if executor is None else in_order(executor, _graphs, items)
-    return chain.from_iterable(made)
+    return chain.from_iterable(_made(items, executor))
+
+
+def listed(problem: EnumerationProblem, executor: Executor | None) -> Iterator[Any]:
+    """Yield what the graphs of a problem stand for, in order: chains with other joints, gear trains."""
+    items = problem.work_items(listing=True)
+    return chain.from_iterable(map(item.chain, made) for item, made in zip(items, _made(items, executor)))
+
+
+def _made(items: Iterable[WorkItem], executor: Executor | None) -> Iterable[Iterable[MechanismGraph]]:
+    return map(methodcaller("graphs"), items) if executor is None else in_order(executor, _graphs, items)
 
 
 def processes(workers: int) -> AbstractContextManager[Executor | None]:

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor
+from typing import TypedDict, Unpack
 
 from graphsynth.core.errors import SpecError
 from graphsynth.structure.slider_chains import SliderChain
 from graphsynth.synthesis.api import Graphs
-from graphsynth.synthesis.problem import EnumerationProblem, counted, graphs
+from graphsynth.synthesis.problem import EnumerationProblem, counted, listed
+from graphsynth.synthesis.wishes import Wishes
+
+
+class _Rules(TypedDict, total=False):
+    sliding_links: bool
+    sliding_loops: bool
+    cylinders: bool
 
 
 def enumerate_slider_chains(
@@ -15,11 +23,10 @@ def enumerate_slider_chains(
     sliders: int,
     mobility: int = 1,
     *,
-    sliding_links: bool = False,
-    sliding_loops: bool = False,
-    cylinders: bool = False,
     framed: bool = False,
+    wishes: Wishes | None = None,
     executor: Executor | None = None,
+    **rules: Unpack[_Rules],
 ) -> Graphs[SliderChain]:
     """Enumerate planar chains with revolute and prismatic joints: every one, each once (exact).
 
@@ -33,17 +40,17 @@ def enumerate_slider_chains(
         Number of prismatic joints, 1 or more.
     mobility : int
         Mobility W >= 1.
-    sliding_links : bool
-        Allow links all of whose joints are prismatic (the two blocks of an elliptic trammel have one of each, the
-        cross of an Oldham coupling has prismatic ones only).
-    sliding_loops : bool
-        Allow loops with fewer than two revolute joints, in which nothing turns.
-    cylinders : bool
-        Every prismatic joint is that of a cylinder: it joins two binary links, each with a revolute joint besides.
     framed : bool
         Choose a frame in all ways that differ: mechanisms instead of chains.
+    wishes : Wishes, optional
+        What the chains are to be like as a whole, as for `enumerate_chains`; all joints count alike.
     executor : concurrent.futures.Executor, optional
         Who does the work; the result is the same for any.  Default: this process.
+    rules : bool
+        ``sliding_links``: allow links all of whose joints are prismatic (the two blocks of an elliptic trammel have one
+        of each, the cross of an Oldham coupling has prismatic ones only).  ``sliding_loops``: allow loops with fewer
+        than two revolute joints, in which nothing turns.  ``cylinders``: every prismatic joint is that of a cylinder:
+        it joins two binary links, each with a revolute joint besides.  All are False by default.
 
     Yields
     ------
@@ -66,10 +73,8 @@ def enumerate_slider_chains(
     >>> [chain.to_text() for chain in enumerate_slider_chains(4, 1, framed=True)]
     ['Cl f0 P:0-3', 'Cl f0 P:2-3']
     """
-    given = links, sliders, mobility, sliding_links, sliding_loops, cylinders, framed
-    problem = EnumerationProblem.sliders(*given)
-    items = problem.work_items(listing=True)
-    return Graphs(f"chains with prismatic joints, {problem.title}", lambda: map(SliderChain, graphs(items, executor)))
+    problem = _problem((links, sliders, mobility), rules, framed, wishes)
+    return Graphs(f"chains with prismatic joints, {problem.title}", lambda: listed(problem, executor))
 
 
 def count_slider_chains(
@@ -77,18 +82,17 @@ def count_slider_chains(
     sliders: int,
     mobility: int = 1,
     *,
-    sliding_links: bool = False,
-    sliding_loops: bool = False,
-    cylinders: bool = False,
     framed: bool = False,
+    wishes: Wishes | None = None,
     executor: Executor | None = None,
+    **rules: Unpack[_Rules],
 ) -> int:
     """Count what ``enumerate_slider_chains`` yields, without making the chains (exact).
 
     Parameters
     ----------
-    links, sliders, mobility, sliding_links, sliding_loops, cylinders, framed, executor
-        As for `enumerate_slider_chains`.
+    links, sliders, mobility, framed, wishes, executor, rules
+        As for `enumerate_slider_chains`; with wishes that the search does not take over, chains are made and counted.
 
     Returns
     -------
@@ -99,23 +103,30 @@ def count_slider_chains(
     >>> [count_slider_chains(8, number, sliding_loops=True) for number in (1, 2, 3)]
     [84, 307, 574]
     """
-    given = links, sliders, mobility, sliding_links, sliding_loops, cylinders, framed
-    return counted(EnumerationProblem.sliders(*given), executor)
+    return counted(_problem((links, sliders, mobility), rules, framed, wishes), executor)
 
 
 def sample_slider_chains(
-    links: int, sliders: int, mobility: int = 1, *, k: int, seed: int, framed: bool = False, **rules: bool
+    links: int,
+    sliders: int,
+    mobility: int = 1,
+    *,
+    k: int,
+    seed: int,
+    framed: bool = False,
+    wishes: Wishes | None = None,
+    **rules: Unpack[_Rules],
 ) -> list[SliderChain]:
     """Draw k of what ``enumerate_slider_chains`` yields, independently and exactly uniformly, without a list.
 
     Parameters
     ----------
-    links, sliders, mobility, framed
+    links, sliders, mobility, framed, wishes
         As for `enumerate_slider_chains`.
     k, seed : int
         As for `sample_mechanisms`.
     rules : bool
-        ``sliding_links``, ``sliding_loops`` and ``cylinders``, as for `enumerate_slider_chains`.
+        As for `enumerate_slider_chains`.
 
     Returns
     -------
@@ -134,9 +145,12 @@ def sample_slider_chains(
     """
     from graphsynth.synthesis.sampling import sample
 
+    return sample(_problem((links, sliders, mobility), rules, framed, wishes), k, seed)
+
+
+def _problem(numbers: tuple[int, int, int], rules: _Rules, framed: bool, wishes: Wishes | None) -> EnumerationProblem:
     names = ("sliding_links", "sliding_loops", "cylinders")
     if unknown := set(rules) - set(names):
         raise SpecError(f"{min(unknown)} is no rule of prismatic joints: the rules are {', '.join(names)}")
-    links_slide, loops_slide, cylinders = (rules.get(name, False) for name in names)
-    given = links, sliders, mobility, links_slide, loops_slide, cylinders, framed
-    return list(map(SliderChain, sample(EnumerationProblem.sliders(*given), k, seed)))
+    given = rules.get("sliding_links", False), rules.get("sliding_loops", False), rules.get("cylinders", False)
+    return EnumerationProblem.sliders(*numbers, *given, framed).wishing(wishes)

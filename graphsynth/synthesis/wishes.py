@@ -1,20 +1,22 @@
 """Wishes besides the numbers of links and joints: what a chain as a whole is to be like.
 
 The length of the shortest loop, and links that share a joint or not, are needs of the search and of counts.  The others
-are asked of each chain as it is listed: no list is kept, but a count makes every chain.
+are asked of each chain as it is listed: no list is kept, but a count makes every chain.  So are all wishes for chains
+with multiple joints, and for those with prismatic joints unless each is a cylinder's.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Literal
 
 from graphsynth.core.errors import SpecError
 from graphsynth.core.wording import shown, whole
-from graphsynth.structure.graph import MechanismGraph
+from graphsynth.structure.graph import Joint, MechanismGraph
+from graphsynth.structure.multiple_joints import MultipleJointChain
 from graphsynth.structure.slider_chains import SliderChain
-from graphsynth.synthesis.edge_labels import SLIDER
 from graphsynth.synthesis.kernels.layout import GIRTH, LONGEST, PAIR, PAIRS
 
 if TYPE_CHECKING:
@@ -22,8 +24,8 @@ if TYPE_CHECKING:
 
 _TYPES = ("total", "partial", "fractionated")
 _MOST_PAIRS = 6  # that the rules of the search have room for
+_ANY_LINK = ("link", "frame")  # a link of a part may be the frame
 
-Higher = tuple[tuple[int, int], ...]
 Role = int | Literal["frame"]
 Pair = tuple[Role, Role]
 
@@ -41,7 +43,7 @@ class Wishes:
         joints, or ``"frame"``.
     contains, without : iterable of MechanismGraph
         Sub-graphs that are prescribed, forbidden: links and joints with their mobilities, other joints may be between
-        the links; a frame has to be the frame.
+        the links; a frame has to be the frame.  Each joint stands for another one of the chain.
     planar : bool, optional
         Whether the graph is to be planar.
     mobility_type : str, optional
@@ -116,10 +118,9 @@ class Wishes:
         others = self.contains or self.without or self.planar is not None or self.mobility_type
         return not others and len(self._searched) == len(self.jointed) + len(self.apart)
 
-    def fit(self, graph: MechanismGraph, higher: Higher = ()) -> bool:
-        """Tell whether a graph is as wished (exact); where joints slide, by ``higher``, the graph of all joints."""
-        if SLIDER in dict(higher):
-            graph = SliderChain(graph).graph
+    def fit(self, chain: MechanismGraph | SliderChain | MultipleJointChain) -> bool:
+        """Tell whether a chain is as wished (exact); where joints slide, the graph of all joints."""
+        graph = chain.graph if isinstance(chain, SliderChain) else chain
         return (
             (self.girth == 3 or (graph.girth or self.girth) >= self.girth)
             and all(_share_a_joint(graph, pair) for pair in self.jointed)
@@ -145,27 +146,37 @@ def _pairs(given: object, name: str) -> tuple[Pair, ...]:
     return tuple(found)
 
 
-def _share_a_joint(graph: MechanismGraph, pair: Pair) -> bool:
-    def plays(link: int, role: Role) -> bool:
-        return link == graph.frame if role == "frame" else graph.degrees[link] == role
+def _share_a_joint(graph: MechanismGraph | MultipleJointChain, pair: Pair) -> bool:
+    def playing(role: Role) -> list[int]:
+        return [
+            link for link in range(graph.links) if role in (graph.degrees[link], *["frame"] * (link == graph.frame))
+        ]
 
-    return any(
-        plays(joint.a, one) and plays(joint.b, other) for joint in graph.joints for one, other in (pair, pair[::-1])
-    )
+    return any(graph.neighbours[a] >> b & 1 for a, b in product(*map(playing, pair)))
 
 
-def _holds(graph: MechanismGraph, part: MechanismGraph) -> bool:
+def _holds(graph: MechanismGraph | MultipleJointChain, part: MechanismGraph) -> bool:
     from networkx.algorithms.isomorphism import GraphMatcher
 
-    def view(one: MechanismGraph) -> Graph:
-        plain = one.to_networkx()
-        plain.add_nodes_from((link, {"fixed": link == one.frame}) for link in range(one.links))
-        return plain
-
+    pins = isinstance(graph, MultipleJointChain)
     matcher = GraphMatcher(
-        view(graph),
-        view(part),
-        node_match=lambda mine, wanted: mine["fixed"] or not wanted["fixed"],
+        _view(graph, pins),
+        _view(part, pins),
+        node_match=lambda mine, wanted: wanted["role"] == mine["role"] or (wanted["role"], mine["role"]) == _ANY_LINK,
         edge_match=lambda mine, wanted: mine["mobility"] == wanted["mobility"],
     )
     return bool(matcher.subgraph_is_monomorphic())
+
+
+def _view(graph: MechanismGraph | MultipleJointChain, pins: bool) -> Graph:
+    """Return links as vertices and joints as edges; with multiple joints, both as vertices."""
+    from networkx import Graph
+
+    view = Graph()
+    view.add_nodes_from((link, {"role": "frame" if link == graph.frame else "link"}) for link in range(graph.links))
+    for number, joint in enumerate(graph.joints, graph.links):
+        ends, mobility = (joint[:2], joint.mobility) if isinstance(joint, Joint) else (joint, 1)
+        if pins:
+            view.add_node(number, role="joint")
+        view.add_edges_from([(link, number) for link in ends] if pins else [ends], mobility=mobility)
+    return view

@@ -70,6 +70,32 @@ def test_show_writes_through_matplotlib(
     assert (tmp_path / name).read_bytes().startswith(magic)
 
 
+@pytest.mark.parametrize("asked", ["--sliders 1 --frame", "--multiple-joints any", "--gear-trains"])
+@pytest.mark.parametrize("name", ["a.txt", "a.jsonl"])
+def test_show_reads_lists_of_chains_with_other_joints(
+    asked: str, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, picture = tmp_path / name, tmp_path / "x.svg"
+    assert main(["enumerate", "--links", "6", *asked.split(), "-o", str(path)]) == 0
+    assert main(["enumerate", "--links", "6", *asked.split()]) == 0
+    second = capsys.readouterr().out.splitlines()[1]
+    assert main(["show", str(path), "--line", "2", "-o", str(picture), "--json"]) == 0
+    by_line = capsys.readouterr().out
+    assert main(["show", second, "--json"]) == 0
+    assert json.loads(by_line)["key"] == json.loads(capsys.readouterr().out)["key"]
+    assert "<svg" in picture.read_text()
+    assert main(["show", str(path), "--line", "999"]) == 2
+
+
+def test_animate_moves_sliders_and_refuses_multiple_joints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, kept = tmp_path / "x.svg", tmp_path / "x.toml"
+    assert main(["animate", "Cl f0 P:0-3", "-o", str(path), "--save", str(kept), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["text"] == "Cl f0 P:0-3"
+    assert [joint.kind for joint in Mechanism.from_toml(kept.read_text()).joints].count("P") == 1
+    assert main(["animate", "FCSv? m1", "-o", str(path)]) == 2
+    assert "dimensions are found for chains of simple joints" in capsys.readouterr().err
+
+
 def test_show_falls_back_to_levels_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     spatial = MechanismGraph(4, [(0, 1), (1, 2, 3), (2, 3), (0, 3)], frame=0, space=6).key
     path = tmp_path / "x.svg"

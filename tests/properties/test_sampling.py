@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from itertools import permutations
 
@@ -9,7 +10,11 @@ import pytest
 from scipy.stats import chisquare
 
 from graphsynth import (
+    StructuralSpec,
+    Wishes,
+    enumerate_assur_groups,
     enumerate_chains,
+    enumerate_mechanisms,
     enumerate_multiple_joint_chains,
     enumerate_planetary_gear_trains,
     enumerate_slider_chains,
@@ -18,6 +23,7 @@ from graphsynth import (
     sample_planetary_gear_trains,
     sample_slider_chains,
 )
+from graphsynth.cli.main import main
 from graphsynth.core.errors import InfeasibleSpecError, SpecError
 
 DRAWS = 25
@@ -95,6 +101,46 @@ def test_gear_trains(links, mobility, rest):
     assert_uniform(sample_planetary_gear_trains(links, mobility, k=DRAWS * len(population), seed=8, **rest), population)
 
 
+@pytest.mark.parametrize(
+    "wish",
+    [
+        pytest.param(Wishes(girth=5), marks=pytest.mark.long),
+        Wishes(jointed=[(3, 3)]),
+        pytest.param(Wishes(planar=True), marks=pytest.mark.long),
+    ],
+)
+def test_wishes(wish):
+    """Taken over by the search or drawn again; of cylinders, of which one wish cuts the search."""
+    more = {"cylinders": True, "wishes": wish}
+    population = list(enumerate_slider_chains(9, 2, 2, **more))
+    assert_uniform(sample_slider_chains(9, 2, 2, k=DRAWS * len(population), seed=6, **more), population)
+    population = list(enumerate_multiple_joint_chains(7, 2, wishes=Wishes(jointed=[(2, 3)])))
+    drawn = sample_multiple_joint_chains(7, 2, k=20, seed=2, wishes=Wishes(jointed=[(2, 3)]))
+    assert {chain.key for chain in drawn} <= {chain.key for chain in population}
+
+
+@pytest.mark.parametrize(
+    ("question", "listed"),
+    [
+        ("--links 8 --frame", lambda: enumerate_mechanisms(StructuralSpec(W=1, links=8))),
+        ("--links 6 --sliders 2 --frame", lambda: enumerate_slider_chains(6, 2, framed=True)),
+        ("--links 7 --mobility 2 --multiple-joints any", lambda: enumerate_multiple_joint_chains(7, 2)),
+        ("--links 6 --gear-trains", lambda: enumerate_planetary_gear_trains(6)),
+        ("--assur 6", lambda: enumerate_assur_groups(6)),
+    ],
+)
+def test_the_command_line_draws_from_every_list(question, listed, tmp_path, capsys):
+    asked = ["enumerate", *question.split(), "--sample", "12", "--seed", "3"]
+    assert main(asked) == 0
+    population = list(listed())
+    kind = type(population[0])
+    texts = capsys.readouterr().out.splitlines()
+    assert main([*asked, "-o", str(tmp_path / "drawn.jsonl")]) == 0
+    keys = [json.loads(line)["key"] for line in (tmp_path / "drawn.jsonl").read_text().splitlines()]
+    assert keys == [kind.from_text(text).key for text in texts] and len(keys) == 12
+    assert set(keys) <= {item.key for item in population}
+
+
 @pytest.mark.parametrize("drive", [pytest.param("any", marks=pytest.mark.long), "coaxial"])
 def test_gear_trains_with_input_and_output(drive):
     """Links 0, 1 and 2 keep their names: the least of the trains with the others exchanged stands for a class."""
@@ -110,7 +156,7 @@ def test_gear_trains_with_input_and_output(drive):
     assert chisquare([drawn[one] for one in population]).pvalue > 1e-3
 
 
-def test_a_seed_fixes_the_draws_and_nothing_is_drawn_from_nothing():
+def test_a_seed_fixes_the_draws_and_nothing_is_drawn_from_nothing(monkeypatch):
     assert sample_slider_chains(6, 1, k=4, seed=1) == sample_slider_chains(6, 1, k=4, seed=1)
     assert sample_slider_chains(6, 1, k=9, seed=1) != sample_slider_chains(6, 1, k=9, seed=2)
     assert sample_multiple_joint_chains(6, k=0, seed=1) == []
@@ -120,5 +166,8 @@ def test_a_seed_fixes_the_draws_and_nothing_is_drawn_from_nothing():
         sample_planetary_gear_trains(5, 2, k=1, seed=1)
     with pytest.raises(SpecError, match="sliding is no rule of prismatic joints"):
         sample_slider_chains(6, 1, k=1, seed=1, sliding=True)
+    monkeypatch.setattr("graphsynth.synthesis.sampling._MISSES", 50)
+    with pytest.raises(SpecError, match="none of 50 random ones is as wished"):
+        sample_multiple_joint_chains(6, k=1, seed=1, wishes=Wishes(girth=6))
     with pytest.raises(SpecError, match="seed"):
         sample_multiple_joint_chains(6, k=1, seed=None)

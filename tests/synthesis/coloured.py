@@ -9,7 +9,7 @@ import random
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache
-from itertools import combinations
+from itertools import combinations, product
 
 import brute_force as bf
 import multiple_joints
@@ -166,7 +166,9 @@ def answers(question: Question) -> tuple[set[str], int]:
         lines = multiple_joints.chains(question.links, question.mobility, question.higher)
         if question.framed:
             lines = multiple_joints.with_frames(lines, question.links)
-        return {_key_of_pins(line, question) for line in lines}, 0
+        graphs = (nx.from_graph6_bytes(line.encode()) for line in lines)
+        wanted = (g for g in graphs if fits_pins(g, question.links, 0 if question.framed else None, question.wishes))
+        return {_key_of_pins(g, question) for g in wanted}, 0
     keys, choices = set(), 0
     for frame, joints, moves in _answers(question):
         number = None if frame < 0 else frame
@@ -177,8 +179,46 @@ def answers(question: Question) -> tuple[set[str], int]:
     return keys, choices
 
 
-def _key_of_pins(line: str, question: Question) -> str:
-    graph = nx.from_graph6_bytes(line.encode())
+def fits_pins(g: nx.Graph, links: int, frame: int | None, wishes: Wishes) -> bool:
+    """Wishes read from the graph of links and joints, which may join more links than two."""
+    joints = [set(g[joint]) for joint in range(links, len(g))]
+
+    def jointed(pair: tuple[object, object]) -> bool:
+        one, other = ({v for v in range(links) if role == (g.degree(v) if role != "frame" else "frame" * (v == frame))}
+                      for role in pair)  # fmt: skip
+        return any(a != b for joint in joints for a in joint & one for b in joint & other)
+
+    def holds_part(part: MechanismGraph, chosen: tuple[int, ...], left: list[set[int]]) -> bool:
+        """Place links, and joints with those before, one after the other, each on a joint of its own."""
+        k = len(chosen)
+        return k == part.links or any(
+            holds_part(part, (*chosen, link), [joint for joint in left if joint not in used])
+            for link in set(range(links)) - set(chosen)
+            if part.frame != k or link == frame
+            for used in product(*([j for j in left if {link, chosen[a]} <= j] for a, b, _ in part.joints if b == k))
+            if all(one != other for one, other in combinations(used, 2))
+        )
+
+    def free(s: tuple[int, ...]) -> int:
+        return 3 * (len(s) - 1) - 2 * sum(max(0, len(joint & set(s)) - 1) for joint in joints)
+
+    def kind() -> str:
+        sets = (s for size in range(3, links + 1) for s in combinations(range(links), size))
+        loops = (s for s in sets if all(sum(v in j and len(j & set(s)) > 1 for j in joints) > 1 for v in s))
+        return "partial" if any(free(s) < free(tuple(range(links))) for s in loops) else "total"
+
+    return (
+        nx.girth(g) >= 2 * wishes.girth
+        and all(jointed(pair) for pair in wishes.jointed)
+        and not any(jointed(pair) for pair in wishes.apart)
+        and all(holds_part(part, (), joints) for part in wishes.contains)
+        and not any(holds_part(part, (), joints) for part in wishes.without)
+        and wishes.planar in (None, nx.check_planarity(g)[0])
+        and wishes.mobility_type in (None, kind())
+    )
+
+
+def _key_of_pins(graph: nx.Graph, question: Question) -> str:
     joints = [tuple(sorted(graph[joint])) for joint in range(question.links, len(graph))]
     return MultipleJointChain.from_joints(question.links, joints, frame=0 if question.framed else None).key
 
@@ -220,9 +260,10 @@ def question(number: int, *, large: bool) -> Question:
     links, mobility, most = draw.choice((_LARGE if large else _SMALL)[kind])
     framed = draw.random() < 0.6
     asked = Question(kind, links, mobility, framed)
-    if kind == "multiple":
-        return replace(asked, higher=draw.randint(1, most))
+    more = draw.randint(1, most) if kind == "multiple" else 0
     wishes = _wishes(draw, links, mobility, framed)
+    if kind == "multiple":
+        return replace(asked, higher=more, wishes=wishes)
     if kind == "sliders":
         rules = draw.choice(RULES)
         return replace(asked, higher=draw.randint(1, most), rules=rules, wishes=wishes)

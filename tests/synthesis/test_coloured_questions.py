@@ -12,6 +12,7 @@ from graphsynth import (
     count_chains,
     count_mechanisms,
     count_multiple_joint_chains,
+    count_slider_chains,
     enumerate_chains,
     enumerate_mechanisms,
     enumerate_multiple_joint_chains,
@@ -19,21 +20,20 @@ from graphsynth import (
 )
 from graphsynth.cli.main import main
 from graphsynth.core.errors import SpecError
-from graphsynth.synthesis.problem import EnumerationProblem, counted
+from graphsynth.synthesis.problem import EnumerationProblem
 
 
 def asked(question: Question):
     """Return the list of answers and their number, as graphsynth finds them."""
     numbers = question.links, question.mobility
     if question.kind == "multiple":
-        more = {"multiple": question.higher, "framed": question.framed}
+        more = {"multiple": question.higher, "framed": question.framed, "wishes": question.wishes}
         return list(enumerate_multiple_joint_chains(*numbers, **more)), count_multiple_joint_chains(*numbers, **more)
     if question.kind == "sliders":
         more = dict(zip(("sliding_links", "sliding_loops", "cylinders"), question.rules))
         given = question.links, question.higher, question.mobility
-        chains = enumerate_slider_chains(*given, framed=question.framed, **more)
-        problem = EnumerationProblem.sliders(*given, *question.rules, question.framed).wishing(question.wishes)
-        return [chain for chain in chains if question.wishes.fit(chain.graph)], counted(problem, None)
+        more |= {"framed": question.framed, "wishes": question.wishes}
+        return list(enumerate_slider_chains(*given, **more)), count_slider_chains(*given, **more)
     wanted = {"symmetry": question.symmetry, "wishes": question.wishes}
     if question.framed:
         spec = StructuralSpec(
@@ -119,6 +119,35 @@ def test_wishes_that_are_none(wrong, said):
 def test_chains_that_can_have_no_wishes(capsys):
     with pytest.raises(SpecError, match="must be Wishes"):
         count_chains(6, wishes={"girth": 4})
-    for line in ("--links 6 --multiple-joints 1 --girth 4", "--links 6 --gear-trains --planar no"):
-        assert main(["count", *line.split()]) == 2
-        assert "wishes are for chains with simple joints" in capsys.readouterr().err
+    assert main(["count", "--links", "6", "--gear-trains", "--planar", "no"]) == 2
+    assert "the axes of a gear train do not have" in capsys.readouterr().err
+
+
+def test_wishes_for_cylinders_are_counted_without_a_list():
+    """The search takes them over where every prismatic joint is a cylinder's, by the filter elsewhere."""
+    chains = list(enumerate_slider_chains(9, 2, 2, cylinders=True, framed=True))
+    for wish in (Wishes(girth=5), Wishes(jointed=[(3, 3)]), Wishes(girth=5, apart=[(3, 3)]), Wishes(planar=False)):
+        number = sum(map(wish.fit, chains))
+        assert count_slider_chains(9, 2, 2, cylinders=True, framed=True, wishes=wish) == number < len(chains)
+        searched = EnumerationProblem.sliders(9, 2, 2, False, False, True, True).wishing(wish)
+        assert (searched.wishes is None) == wish.is_searched
+    assert EnumerationProblem.sliders(9, 2, 2, False, False, False, True).wishing(Wishes(girth=5)).wishes
+
+
+@pytest.mark.long
+def test_wishes_for_multiple_joints():
+    """A wish of each kind that tells chains of eight or nine links apart."""
+    told = [
+        (8, 1, True, Wishes(jointed=[("frame", 3)], apart=[(3, 3)])),
+        (8, 1, False, Wishes(jointed=[(2, 4)])),
+        (9, 2, False, Wishes(girth=5)),
+        (9, 2, False, Wishes(mobility_type="total", without=[coloured.FOUR_BAR])),
+        (9, 2, True, Wishes(contains=[coloured.STAR_FRAME, coloured.FIVE_BAR], planar=True)),
+    ]
+    for links, mobility, framed, wish in told:
+        more = {"multiple": 2, "framed": framed, "wishes": wish}
+        expected, _ = coloured.answers(Question("multiple", links, mobility, framed, 2, wishes=wish))
+        found = [chain.key for chain in enumerate_multiple_joint_chains(links, mobility, **more)]
+        assert set(found) == expected and len(found) == len(expected) > 0, wish
+        whole = count_multiple_joint_chains(links, mobility, multiple=2, framed=framed)
+        assert count_multiple_joint_chains(links, mobility, **more) == len(found) < whole, wish
