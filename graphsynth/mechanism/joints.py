@@ -273,7 +273,7 @@ class Cam(PlanarJoint):
         psi = at.plane.argument(at.d) - at.angle_a - self.angle_a
         value, first = psi * 0.0 + self.radius, psi * 0.0
         for k, (c, s) in enumerate(self.harmonics, 1):
-            cosine, sine = at.plane.cos(psi * k), at.plane.sin(psi * k)
+            cosine, sine = at.plane.parts(at.plane.unit(psi * k))
             value = value + cosine * c + sine * s
             first = first + (cosine * s - sine * c) * k
         return value, first

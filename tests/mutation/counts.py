@@ -1,109 +1,61 @@
 """Change the orbit engine a little, many times, and see whether any change gives all the counts it should not.
 
-``python tests/mutation/counts.py --count 200`` draws changes of the modules that make and count labellings and makes
-each in a fork of this process, where the kernels are interpreted: a second or two for each, where compiling takes half
-a minute.  A change is noticed when an answer differs, an error is raised, or the processor time is used up.  What is
-not noticed is listed; ``known.toml`` says which changes alter nothing that can be seen, and ``run.py`` runs the tests
+``python tests/mutation/counts.py --count 200`` draws changes of the modules that make and count labellings, and
+``--all --out FILE`` makes every one, going on where it was stopped.  Each is made in a fork of this process, where the
+kernels are interpreted: a second for each, where compiling takes half a minute.  A change is noticed when an answer of
+``questions.py`` differs, an error is raised, or an answer takes several times its usual processor time.  What is not
+noticed is listed; ``known.toml`` says which changes alter nothing that can be seen, and ``run.py`` runs the tests
 against any one.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib.abc
-import importlib.util
+import gc
+import json
 import os
 import random
 import resource
+import signal
 import sys
 import time
 import warnings
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from types import CodeType, FunctionType
 from typing import Any
 
 os.environ["NUMBA_DISABLE_JIT"] = "1"  # before numba is imported
 
-import numpy as np
+import questions
 from run import _line, known
 from sites import Change, changes
 
-from graphsynth import MechanismGraph, StructuralSpec
-
 ROOT = Path(__file__).parents[2]
+sys.path.append(str(ROOT / "tests/synthesis"))  # the second count and what is found by trying everything
 ENGINE = ROOT / "graphsynth/synthesis"
-NAMES = ("edge_labels", "families", "fractionated", "rigid_blocks", "totals", "wishes")
+NAMES = ("edge_labels", "families", "fractionated", "geared_trees", "rigid_blocks", "totals", "wishes")
 KERNELS = ("colouring", "contracted", "counting", "covers", "expanding", "gears")
 KERNELS += ("growing", "listing", "moving", "splitting", "variables")
-MODULES = [*(ENGINE / f"{name}.py" for name in NAMES), *(ENGINE / "kernels" / f"{name}.py" for name in KERNELS)]
+SECOND = ROOT / "tests/synthesis/rigid_clusters.py"
+MODULES = [*(ENGINE / f"{name}.py" for name in NAMES), *(ENGINE / "kernels" / f"{name}.py" for name in KERNELS), SECOND]
 #: What only estimates work or room, and what is not counted here.
 BESIDE = {"weigh_block", "_visited", "_least", "_stays", "labellings", "_ways", "_known_ways", "_costs", "weight",
           "make_work", "open_fixed", "decode_fixed", "_nth_label", "expand_text", "_put_number", "_put_plain",
           "by_vertices", "_stream", "_lay_pairs", "_is_ordered", "_smallest_sets_first", "refine",
           "is_counted_together", "_search_order", "identity_sums"}  # fmt: skip
-SECONDS = 20
-LEVELS: list[dict[int, Any]] = [{-1: 1}, {3: 2}, {2: (3, None)}]
-SAMPLED = ["1CAvElhAw", "1CAvIkEjQ", "1CAvQWghQ"]  # by the same draws always
+MEMORY = 6 * 2**30
+Row = dict[str, Any]
 
 
-def _questions() -> list[tuple[str, Callable[[], Any], Any]]:
-    """Name, question and answer; the answers are published or those of trying everything (``tests/synthesis``)."""
-    import graphsynth as gs
+class _TooLong(BaseException):
+    """No part of the engine catches it."""
 
-    trains, ways = gs.count_planetary_gear_trains, ("any", "coaxial")
-    four = MechanismGraph.from_text("Cl")
-    wish, eight = gs.Wishes, StructuralSpec(W=1, links=8)
 
-    def keys(graphs: Any) -> int:
-        return len({graph.key for graph in graphs})
-
-    def mechanisms(**more: Any) -> Any:
-        return gs.enumerate_mechanisms(eight, **more)
-
-    return [
-        ("chains", lambda: [gs.count_chains(n) for n in (4, 6, 8, 10)], [1, 2, 16, 230]),
-        ("listed", lambda: [keys(gs.enumerate_chains(n)) for n in (6, 8, 10)], [2, 16, 230]),
-        ("lines", lambda: sum(1 for _ in gs.enumerate_chains(10)), 230),
-        ("two freedoms", lambda: [gs.count_chains(n, 2) for n in (7, 9, 11)], [3, 35, 753]),
-        ("fractionated", lambda: [gs.count_chains(n, 2, fractionated=True) for n in (7, 9, 11)], [4, 40, 839]),
-        ("three freedoms", lambda: gs.count_chains(10, 3, fractionated=True), 98),
-        ("listed, three freedoms", lambda: keys(gs.enumerate_chains(8, 3, fractionated=True)), 7),
-        ("four freedoms", lambda: gs.count_chains(11, 4, fractionated=True), 189),
-        ("higher pairs", lambda: gs.count_chains(6, joints_by_mobility={2: 2}), 52),
-        ("higher pairs only", lambda: gs.count_chains(3, 3, joints_by_mobility={2: 3}), 1),
-        ("levels", lambda: [gs.count_mechanisms(eight.replace(levels=at)) for at in LEVELS], [28, 23, 62]),
-        ("space", lambda: [gs.count_chains(n, 1, space=2) for n in (5, 6)], [3, 13]),
-        ("mechanisms", lambda: [gs.count_mechanisms(StructuralSpec(W=1, links=n)) for n in (6, 8, 10)], [5, 71, 1834]),
-        ("listed mechanisms", lambda: keys(mechanisms()), 71),
-        ("symmetric", lambda: [keys(gs.enumerate_chains(10, symmetry=p)) for p in (2, 3, 5)], [143, 2, 0]),
-        ("symmetric six-bars", lambda: gs.count_mechanisms(StructuralSpec(W=1, links=6), symmetry=2), 4),
-        ("given joints", lambda: gs.count_chains(6, joints_by_mobility={1: 7}), 2),
-        ("symmetric mechanisms", lambda: [sum(1 for _ in mechanisms(symmetry=p)) for p in (2, 3)], [39, 1]),
-        ("trusses", lambda: [gs.count_baranov_trusses(n) for n in (3, 5, 7, 9)], [1, 1, 3, 28]),
-        ("groups", lambda: [keys(gs.enumerate_assur_groups(n)) for n in (2, 4, 6, 8)], [1, 2, 10, 173]),
-        ("sliders", lambda: [gs.count_slider_chains(6, k) for k in (1, 2, 3)], [6, 13, 10]),
-        ("loops that turn", lambda: [gs.count_slider_chains(8, k) for k in (3, 4)], [555, 510]),
-        ("rings", lambda: [gs.count_slider_chains(4, 2, sliding_links=yes) for yes in (False, True)], [1, 2]),
-        ("sliding loops", lambda: [gs.count_slider_chains(8, k, sliding_loops=True) for k in (1, 3)], [84, 574]),
-        ("sliding links", lambda: keys(gs.enumerate_slider_chains(6, 3, sliding_links=True)), 20),
-        ("cylinders", lambda: gs.count_slider_chains(9, 2, 2, cylinders=True, framed=True), 183),
-        ("sampled", lambda: [graph.key for graph in gs.sample_mechanisms(StructuralSpec(W=1, links=8), 3, 1)], SAMPLED),
-        ("listed sliders", lambda: keys(gs.enumerate_slider_chains(6, 2, framed=True)), 56),
-        ("multiple", lambda: [gs.count_multiple_joint_chains(8, multiple=k) for k in (1, 2, 3, 4)], [22, 18, 3, 1]),
-        ("multiple, two freedoms", lambda: gs.count_multiple_joint_chains(9, 2), 174),
-        ("listed multiple", lambda: keys(gs.enumerate_multiple_joint_chains(8, multiple=1, framed=True)), 144),
-        ("girth", lambda: [gs.count_chains(n, wishes=wish(girth=5)) for n in (8, 10)], [1, 10]),
-        ("listed girth", lambda: keys(gs.enumerate_chains(10, wishes=wish(girth=5))), 10),
-        ("jointed", lambda: gs.count_chains(10, wishes=wish(jointed=[(4, 4)], apart=[(3, 3)])), 14),
-        ("not jointed", lambda: keys(gs.enumerate_chains(10, wishes=wish(apart=[(3, 4)]))), 83),
-        ("holds", lambda: gs.count_chains(8, wishes=wish(without=[four])), 1),
-        ("gear trains", lambda: [trains(n) for n in (5, 6)], [13, 81]),
-        ("rotation graphs", lambda: [trains(n, w, rotation=True) for n, w in ((5, 1), (6, 1), (6, 2))], [6, 27, 2]),
-        ("roles of trains", lambda: [trains(5, framed=True), *(trains(5, drive=d) for d in ways)], [50, 109, 37]),
-        ("all identities", _together, [16, 230]),
-        ("splits", _splits, [1, 4, 17, 118]),
-        ("grown", _grown, [3, 13, 24, 38, 23, 16, 87]),
-    ]  # fmt: skip
+def _stop(number: int, frame: Any) -> None:
+    raise _TooLong
 
 
 def _interpret() -> None:
@@ -114,83 +66,157 @@ def _interpret() -> None:
     intrinsics.lowest_bit = lambda mask: (int(mask) & -int(mask)).bit_length() - 1 if mask else 64
 
 
-def _together() -> list[int]:
-    """Count chains by all identities and the other automorphisms."""
-    from graphsynth.synthesis.families import chain_families
-    from graphsynth.synthesis.totals import _totals
-
-    return [int(sum(part.count() for part in _totals(tuple(chain_families(n, 1, 3, {}, False))))) for n in (8, 10)]
+def _name(path: Path) -> str:
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts) if path.is_relative_to(ENGINE) else path.stem
 
 
-def _splits() -> list[int]:
-    """Count contracted graphs of two to five loops."""
-    from graphsynth.synthesis.contracted import generate
-
-    return [sum(map(len, layers.values())) for layers in generate(5).values()]
-
-
-def _grown() -> list[int]:
-    """Count contracted graphs of five loops, as they grow from those of four, by vertices, and the symmetric ones."""
-    from graphsynth.synthesis.contracted import contracted_graphs
-    from graphsynth.synthesis.kernels.growing import grow, make_growth
-    from graphsynth.synthesis.kernels.layout import MAX_VERTICES
-
-    sums, symmetric = np.zeros(MAX_VERTICES + 1, np.int64), 0
-    out, sizes = np.zeros((256, MAX_VERTICES, MAX_VERTICES), np.uint8), np.zeros(256, np.int64)
-    roots = [(loops, k, contracted_graphs(loops, k)) for loops in range(2, 5) for k in range(2, 2 * loops - 1)]
-    roots.append((5, 2, np.array([[[0, 6], [6, 0]]], np.uint8)))
-    for loops, k, graphs in roots:
-        growth = make_growth(2000)
-        symmetric += grow(k, graphs, len(graphs), loops, 4, 5, 8, True, growth, out, sizes, sums)
-    return [*sums[3:9].tolist(), symmetric]
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    """Yield the code of a source and of all functions in it."""
+    yield code
+    for one in code.co_consts:
+        if isinstance(one, CodeType):
+            yield from _codes(one)
 
 
-class _Changed(importlib.abc.MetaPathFinder, importlib.abc.SourceLoader):
-    """Gives one module the changed source."""
+class _Fork:
+    """A copy of this process for what stands in the body; what it says is there afterwards, or None."""
 
-    def __init__(self, path: Path, source: str) -> None:
-        self.name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
-        self.path, self.source = path, source
+    said: Any = None
 
-    def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> Any:
-        return importlib.util.spec_from_loader(fullname, self, origin=str(self.path)) if fullname == self.name else None
+    def __enter__(self) -> _Fork:
+        self._reading, self._writing = os.pipe()
+        self._process = os.fork()
+        self.child = self._process == 0
+        return self
 
-    def get_filename(self, fullname: str) -> str:
-        return str(self.path)
+    def say(self, what: Any) -> None:
+        with os.fdopen(self._writing, "w") as answer:
+            json.dump(what, answer)
 
-    def get_data(self, path: str) -> bytes:
-        return self.source.encode()
-
-
-def _answer(path: Path, source: str) -> str:
-    """Return the first question that a source answers wrongly, or nothing."""
-    sys.meta_path.insert(0, _Changed(path, source))
-    for name, question, right in _questions():
-        try:
-            if (found := question()) != right:
-                return f"{name}: {found}"
-        except Exception as error:
-            return f"{name}: {type(error).__name__}"
-    return ""
+    def __exit__(self, *error: object) -> None:
+        if self.child:
+            os._exit(0)
+        os.close(self._writing)
+        with os.fdopen(self._reading) as answer:
+            said = answer.read()
+        os.waitpid(self._process, 0)
+        self.said = json.loads(said) if said else None
 
 
-def judge(path: Path, change: Change | None) -> dict[str, Any]:
-    """Ask the questions of one change in a fork."""
-    begin, (reading, writing) = time.monotonic(), os.pipe()
-    if (child := os.fork()) == 0:
-        with os.fdopen(writing, "w") as answer:
-            resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-            source = path.read_text("utf-8")
-            answer.write("said " + _answer(path, source if change is None else change.applied(source)))
-        os._exit(0)
-    os.close(writing)
-    with os.fdopen(reading) as answer:
-        said = answer.read()
-    os.waitpid(child, 0)
-    by = said.removeprefix("said ") if said else "time is up"
-    place = {"module": str(path.relative_to(ROOT)), "status": "killed" if by else "survived", "by": by}
-    fields = {} if change is None else vars(change)
-    return {**fields, **place, "seconds": round(time.monotonic() - begin, 1)}
+class Engine:
+    """The modules as they are imported, and the questions with their usual seconds."""
+
+    def __init__(self, paths: list[Path]) -> None:
+        for path in paths:
+            import_module(_name(path))
+        files = {str(path) for path in paths}
+        self.functions: dict[tuple[str, str], list[FunctionType]] = {}
+        for one in gc.get_objects():
+            if isinstance(one, FunctionType) and one.__code__.co_filename in files:
+                key = one.__code__.co_filename, one.__code__.co_qualname
+                self.functions.setdefault(key, []).append(one)
+        self.usual: dict[str, float] = {}
+        self.runs: dict[str, set[tuple[str, str]]] = {}
+        self.by: dict[tuple[str, str], Counter[str]] = {}
+
+    def change(self, path: Path, source: str) -> set[tuple[str, str]]:
+        """Give the functions of a module the code of another source, and return which ones differ."""
+        found = set()
+        for code in _codes(compile(source, str(path), "exec")):
+            for function in self.functions.get((str(path), code.co_qualname), ()):
+                if function.__code__ != code:
+                    function.__code__ = code
+                    found.add((str(path), code.co_qualname))
+        return found
+
+    def see_what_runs(self) -> None:
+        """Ask each question in a fork of its own, where nothing is kept of others, and note which functions run."""
+
+        def note(frame: Any, event: str, what: Any) -> None:
+            if event == "call" and frame.f_code.co_filename in files:
+                ran.add((frame.f_code.co_filename, frame.f_code.co_qualname))
+
+        files = {file for file, _ in self.functions}
+        for name, question, _ in (*questions.of_the_engine(), *questions.of_the_second_count()):
+            ran: set[tuple[str, str]] = set()
+            with _Fork() as fork:
+                if fork.child:
+                    sys.setprofile(note)
+                    question()
+                    sys.setprofile(None)
+                    fork.say([*ran])
+            self.runs.setdefault(name, set()).update(map(tuple, fork.said))
+
+    def questions(self, path: Path, change: Change | None, changed: set[tuple[str, str]]) -> list[questions.Question]:
+        """Return the questions that run what is changed, first those that noticed changes of the same function."""
+        asked = questions.of_the_second_count() if path == SECOND else questions.of_the_engine()
+        asked = [one for one in asked if not change or self.runs[one[0]] & changed]
+        best = self.by.get((path.stem, change.function), Counter()) if change else Counter()
+        return sorted(asked, key=lambda one: -best[one[0]] / (0.1 + self.usual.get(one[0], 0.0)))
+
+    def answer(self, path: Path, change: Change | None) -> dict[str, float] | str:
+        """Return the first question that is answered wrongly, or the seconds that each took."""
+        source = path.read_text("utf-8")
+        changed = self.change(path, change.applied(source)) if change else set()
+        seconds = {}
+        for name, question, right in self.questions(path, change, changed):
+            begin = time.process_time()
+            signal.setitimer(signal.ITIMER_PROF, 1 + 4 * self.usual.get(name, 4.0))
+            try:
+                if (found := question()) != right:
+                    return f"{name}: {found}"
+            except _TooLong:
+                return f"{name}: time is up"
+            except (Exception, SystemExit) as error:
+                return f"{name}: {type(error).__name__}"
+            finally:
+                signal.setitimer(signal.ITIMER_PROF, 0)
+            seconds[name] = time.process_time() - begin
+        return seconds
+
+    def judge(self, path: Path, change: Change | None) -> Row:
+        """Ask the questions of one change in a fork."""
+        begin = time.monotonic()
+        with _Fork() as fork:
+            if fork.child:
+                resource.setrlimit(resource.RLIMIT_CPU, (120, 120))
+                resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+                signal.signal(signal.SIGPROF, _stop)
+                fork.say(self.answer(path, change))
+        by = "no answer" if fork.said is None else fork.said
+        if isinstance(by, dict):
+            self.usual = by if change is None else self.usual
+            by = ""
+        elif change:
+            self.by.setdefault((path.stem, change.function), Counter())[by.partition(":")[0]] += 1
+        place = {"module": str(path.relative_to(ROOT)), "status": "killed" if by else "survived", "by": by}
+        return {**(vars(change) if change else {}), **place, "seconds": round(time.monotonic() - begin, 1)}
+
+
+def _key(row: Row) -> tuple[Any, ...]:
+    return row["module"], row["function"], row["start"], row["old"], row["new"]
+
+
+def table(rows: list[Row]) -> str:
+    """Say for each module how many changes were made, noticed (and of these by time), and how many alter nothing."""
+    lines = ["| module | changes | noticed | by time | alter nothing | not noticed |", "|---|--:|--:|--:|--:|--:|"]
+    sums: Counter[str] = Counter()
+    for module in sorted({row["module"] for row in rows}):
+        own: Counter[str] = Counter()
+        for row in (row for row in rows if row["module"] == module):
+            lives = row["status"] == "survived"
+            own["all"] += 1
+            own["noticed"] += not lives
+            own["time"] += row["by"].endswith("time is up") or row["by"] == "no answer"
+            own["known"] += lives and bool(known(row))
+        sums += own
+        lines.append(_cells(f"`{Path(module).stem}`", own))
+    return "\n".join([*lines, _cells("all", sums)])
+
+
+def _cells(name: str, own: Counter[str]) -> str:
+    open_ = own["all"] - own["noticed"] - own["known"]
+    return f"| {name} | {own['all']} | {own['noticed']} | {own['time']} | {own['known']} | {open_} |"
 
 
 def main() -> int:
@@ -198,22 +224,39 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--all", action="store_true", help="every change instead of --count of them")
     parser.add_argument("--modules", nargs="+", default=[path.stem for path in MODULES], help="names to draw from")
+    parser.add_argument("--out", type=Path, help="file of a line for each change: those in it are not made again")
+    parser.add_argument("--again", action="store_true", help="make those again that were not noticed and are not known")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     _interpret()
-    if wrong := judge(MODULES[0], None)["by"]:
-        print(f"the code as it is answers wrongly: {wrong}")
-        return 1
+    engine = Engine(MODULES)
+    for path in (SECOND, MODULES[0]):
+        if wrong := engine.judge(path, None)["by"]:
+            print(f"the code as it is answers wrongly: {wrong}")
+            return 1
+    engine.see_what_runs()
     found = [(path, c) for path in MODULES if path.stem in options.modules for c in changes(path.read_text("utf-8"))]
-    drawn = random.Random(options.seed).sample([one for one in found if one[1].function not in BESIDE], options.count)
+    found = [one for one in found if one[1].function not in BESIDE]
+    drawn = found if options.all else random.Random(options.seed).sample(found, min(options.count, len(found)))
+    lines = options.out.read_text("utf-8").splitlines() if options.out and options.out.exists() else []
+    done = {_key(row): row for row in map(json.loads, lines)}
+    if options.again:
+        done = {key: row for key, row in done.items() if row["status"] == "killed" or known(row)}
     rows = []
     for path, change in drawn:
-        rows.append(judge(path, change))
+        row = {**vars(change), "module": str(path.relative_to(ROOT))}
+        if _key(row) in done:
+            rows.append(done[_key(row)])
+            continue
+        rows.append(engine.judge(path, change))
         print(f"{len(rows)}/{len(drawn)} {_line(rows[-1])}", flush=True)
-    lived = [row for row in rows if row["status"] == "survived"]
-    open_ = [row for row in lived if not known(row)]
-    print(f"{len(rows)} changes: {len(rows) - len(lived)} noticed, {len(lived) - len(open_)} alter nothing")
+        if options.out:
+            with options.out.open("a", encoding="utf-8") as out:
+                print(json.dumps(rows[-1]), file=out)
+    print(table(rows))
+    open_ = [row for row in rows if row["status"] == "survived" and not known(row)]
     for row in open_:
         print("unnoticed:", _line(row))
     return bool(open_)

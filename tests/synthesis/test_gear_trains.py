@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import random
 import tomllib
+from collections import Counter
 from fractions import Fraction
+from functools import partial
 from itertools import combinations, islice, permutations
 from pathlib import Path
 
+import gear_symmetries
 import networkx as nx
 import pytest
 import sympy
@@ -24,6 +27,8 @@ from graphsynth import (
 from graphsynth.cli.main import main
 from graphsynth.core.errors import FormatError, GraphError, SpecError, TooLargeError
 from graphsynth.structure.canonical import label_coloured
+from graphsynth.synthesis import geared_trees
+from graphsynth.synthesis.geared_trees import _kept_choice, _move
 
 PUBLISHED = tomllib.loads((Path(__file__).parents[2] / "catalog/counts/published.toml").read_text())["gear_trains"]
 PRIME = 2_147_483_629
@@ -260,6 +265,49 @@ def test_orbits_add_up_to_all_choices_without_locked_links(links):
         far = dict(nx.all_pairs_shortest_path(tree.to_networkx()))
         pairs = [(a, b, far[a][b][1]) for a, b in combinations(range(links), 2) if len(far[a][b]) == 3]
         assert sum(moves_freely(links, chosen, rng) for chosen in combinations(pairs, links - 2)) == orbits
+
+
+@pytest.mark.parametrize(("links", "gears", "roles"), [(4, 2, r) for r in range(4)] + [(5, 3, 0), (5, 3, 2), (5, 2, 1)])
+def test_symmetries_are_drawn_by_the_choices_they_keep(links, gears, roles):
+    """Every number that can be drawn, against all permutations, all sets of gear pairs and all roles."""
+    for at, tree in enumerate(geared_trees.trees_of_axes(links)):
+        weights, (order, total, _) = gear_symmetries.weights(tree, gears, roles), _move(links, at, gears, roles, -1)
+        assert total == sum(weights.values())
+        assert total == 0 or order == tree.automorphism_order
+        assert Counter(tuple(_move(links, at, gears, roles, target)[2]) for target in range(total)) == weights
+
+
+@pytest.mark.parametrize(("links", "gears"), [(4, 2), (5, 2)])
+def test_choices_that_a_symmetry_keeps_are_equally_likely(links, gears):
+    for tree in geared_trees.trees_of_axes(links):
+        pairs = geared_trees._possible_pairs(tree)
+        for move in gear_symmetries.weights(tree, gears, 0):
+            chances = Counter()
+            for places, chance in gear_symmetries.every_draw(partial(_kept_choice, pairs, move, gears)):
+                chances[frozenset(frozenset(pairs[at][:2]) for at in places)] += chance
+            wanted = gear_symmetries.kept_choices(tree, gears, move)
+            assert chances == {chosen: Fraction(1, len(wanted)) for chosen in wanted}
+
+
+@pytest.mark.parametrize(
+    ("links", "asked"),
+    [(4, {}), (4, {"roles": 2}), (4, {"rotation": True}), pytest.param(5, {"mobility": 2}, marks=pytest.mark.slow)],
+)
+def test_every_train_of_a_tree_is_equally_likely(links, asked):
+    """A tree is drawn by its orbits, locked ones included, so each train has one over their number, exactly."""
+    asked = {"rotation": False, "mobility": 1, "roles": 0, **asked}
+    found = 0
+    for at in range(len(geared_trees.trees_of_axes(links))):
+        for orbits, draw in geared_trees.GearedTrees(links, at, at + 1, **asked).urns():
+            chances = Counter()
+            for graph, chance in gear_symmetries.every_draw(draw):
+                if graph is not None:
+                    key = role_key(PlanetaryGearTrain(graph)) if asked["roles"] else graph.key
+                    chances[key] += chance
+            assert set(chances.values()) <= {Fraction(1, orbits)}
+            found += len(chances)
+    more = {"drive": "any"} if asked["roles"] else {"rotation": asked["rotation"]}
+    assert found == count_planetary_gear_trains(links, asked["mobility"], **more)
 
 
 @pytest.mark.parametrize("links", [4, 5, 6])
