@@ -29,6 +29,8 @@ _HALF = 0.36  #: height of half a digit, in units of the size
 _WIDTH = 600.0  #: of the sheet
 #: What can be written.
 FORMS = ("svg", "dxf", "stl", "step", "csv")
+#: The package that some of them need, and its extra.
+_PACKAGES = {"dxf": ("ezdxf", "dxf"), "stl": ("ezdxf", "dxf"), "step": ("build123d", "step")}
 
 
 def write_parts(
@@ -64,6 +66,8 @@ def write_parts(
     for form in forms:
         if form not in FORMS:
             raise GraphsynthError(f"parts are not written as {form!r}; choose from {', '.join(FORMS)}")
+        if form in _PACKAGES:  # before anything is written
+            need(*_PACKAGES[form], form.upper())
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     files: list[Path] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from matplotlib.path import Path
 
 import graphsynth as gs
 from graphsynth import Driver, Mechanism, MechanismGraph
-from graphsynth.core.errors import GeometryError
+from graphsynth.core.errors import GeometryError, MissingExtraError
 from graphsynth.mechanism.joints import Cam, Gear, Revolute
 
 from .moving import carried
@@ -153,6 +154,14 @@ def test_files_hold_the_teeth(tmp_path):
     lines = [len(line) for line in drawing.modelspace().query("LWPOLYLINE[layer=='OUTLINE']")]
     assert sorted(lines)[-2:] == [17 * 18, 34 * 18]  # both reach below their base circles
     assert (tmp_path / "cut.svg").read_text("utf-8").count("<circle") == 2  # pitch circles
+
+
+def test_nothing_is_written_where_a_package_is_missing(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "build123d", None)
+    made = gs.parts(gs.simulate(geared(), np.linspace(0.0, 6.0, 9)), unit=60.0, prove=False)
+    with pytest.raises(MissingExtraError, match="STEP needs build123d"):
+        made.write(tmp_path / "out", forms=("svg", "step"))
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
