@@ -29,8 +29,6 @@ _HALF = 0.36  #: height of half a digit, in units of the size
 _WIDTH = 600.0  #: of the sheet
 #: What can be written.
 FORMS = ("svg", "dxf", "stl", "step", "csv")
-#: The package that some of them need, and its extra.
-_PACKAGES = {"dxf": ("ezdxf", "dxf"), "stl": ("ezdxf", "dxf"), "step": ("build123d", "step")}
 
 
 def write_parts(
@@ -66,8 +64,6 @@ def write_parts(
     for form in forms:
         if form not in FORMS:
             raise GraphsynthError(f"parts are not written as {form!r}; choose from {', '.join(FORMS)}")
-        if form in _PACKAGES:  # before anything is written
-            need(*_PACKAGES[form], form.upper())
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     files: list[Path] = []
@@ -77,23 +73,23 @@ def write_parts(
             fresh.write_bytes(content.encode() if isinstance(content, str) else content)
         files.append(place / name)
 
+    for link in range(len(parts.layers)):  # what needs an extra comes first: without it nothing is written
+        if "step" in forms:
+            with replacing(place / f"link-{parts.plan.label(link)}.step") as fresh:
+                write_step(parts, link, fresh)
+            files.append(place / f"link-{parts.plan.label(link)}.step")
+        if "stl" in forms:
+            write(f"link-{parts.plan.label(link)}.stl", link_stl(parts, link))
+    if "dxf" in forms:
+        with replacing(place / "cut.dxf") as fresh:
+            cut_dxf(parts).saveas(os.fspath(fresh))
+        files.append(place / "cut.dxf")
     if picture:
         write("parts.svg", picture)
     if "csv" in forms:
         write("bill.csv", bill_csv(parts))
     if "svg" in forms:
         write("cut.svg", cut_svg(parts))
-    if "dxf" in forms:
-        with replacing(place / "cut.dxf") as fresh:
-            cut_dxf(parts).saveas(os.fspath(fresh))
-        files.append(place / "cut.dxf")
-    for link in range(len(parts.layers)):
-        if "stl" in forms:
-            write(f"link-{parts.plan.label(link)}.stl", link_stl(parts, link))
-        if "step" in forms:
-            with replacing(place / f"link-{parts.plan.label(link)}.step") as fresh:
-                write_step(parts, link, fresh)
-            files.append(place / f"link-{parts.plan.label(link)}.step")
     return files
 
 

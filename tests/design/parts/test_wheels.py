@@ -160,8 +160,8 @@ def test_nothing_is_written_where_a_package_is_missing(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "build123d", None)
     made = gs.parts(gs.simulate(geared(), np.linspace(0.0, 6.0, 9)), unit=60.0, prove=False)
     with pytest.raises(MissingExtraError, match="STEP needs build123d"):
-        made.write(tmp_path / "out", forms=("svg", "step"))
-    assert not (tmp_path / "out").exists()
+        made.write(tmp_path / "out", forms=("svg", "stl", "step"))
+    assert not list((tmp_path / "out").iterdir())
 
 
 @pytest.mark.parametrize(
