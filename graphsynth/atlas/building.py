@@ -78,9 +78,9 @@ class Writer:
         structures = self._of_structures(rows)
         many = self.connection.executemany
         many(
-            "INSERT INTO chains VALUES (?, ?, ?, NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO chains VALUES (?, ?, ?, NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
             (
-                (at, family_id, *own[:2], mobility, *own[2:9], shapes[own[11]][1], *own[9:11], shapes[own[11]][0])
+                (at, family_id, *own[:2], mobility, *own[2:9], shapes[own[12]][1], *own[9:12], shapes[own[12]][0])
                 for at, own in enumerate(rows.chains, start)
             ),
         )

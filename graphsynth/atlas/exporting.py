@@ -25,7 +25,8 @@ TABLES = {
     "groups": 'SELECT rank AS "group", key, links, "order", class, modes FROM temp.ranked_groups ORDER BY rank',
     "chains": (
         "SELECT c.key, c.label, c.graph6, c.mobility, c.links, c.joints, c.loops, c.assortment, c.automorphisms, "
-        "c.link_orbits, c.inversions, c.planar, c.girth, c.fractionated, h.vertices AS contracted_vertices, "
+        "c.link_orbits, c.inversions, c.planar, c.girth, c.fractionated, c.mobility_type, "
+        "h.vertices AS contracted_vertices, "
         f"h.edges AS contracted FROM chains c JOIN contracted h USING (contracted_id) ORDER BY {_CHAIN}"
     ),
     "dyads": f"SELECT c.key, d.parent_key FROM chains c JOIN dyads d USING (chain_id) ORDER BY {_CHAIN}, d.parent_key",

@@ -43,7 +43,7 @@ class Rows:
     """Rows of some chains for the store, without the numbers that only the store can give."""
 
     #: ``(key, graph6, links, joints, loops, assortment, automorphisms, link_orbits, inversions, girth, fractionated,
-    #: contracted)``; ``contracted`` is a place in the next
+    #: mobility_type, contracted)``; ``contracted`` is a place in the next
     chains: list[tuple[Any, ...]] = field(default_factory=list)
     contracted: dict[tuple[int, str], int] = field(default_factory=dict)  # (vertices, edges) to their place
     #: list of (chain, key of the parent): chains as indices into ``chains``, here and below
@@ -132,6 +132,14 @@ def _columns(block: Block) -> Iterator[Iterable[Any]]:
     yield [len(set(orbit)) for orbit in orbits]
     yield block.girth.tolist()
     yield (block.cuts != 0).astype(int).tolist()
+    yield [_mobility_type(pairs, n) for pairs in block.joints.tolist()]
+
+
+def _mobility_type(joints: Sequence[Sequence[int]], links: int) -> str:
+    from graphsynth.structure.graph import MechanismGraph
+
+    graph = MechanismGraph(links, [(a, b) for a, b in joints])
+    return "total" if graph.mobility == 1 else graph.mobility_type
 
 
 def assortments(block: Block) -> list[str]:

@@ -166,7 +166,7 @@ def _read(shard: sqlite3.Connection, first: int, count: int) -> Rows:
     contracted: dict[int, int] = {}
     for *chain, number in shard.execute(
         "SELECT key, graph6, links, joints, loops, assortment, automorphisms, link_orbits, inversions, girth, "
-        "fractionated, contracted_id FROM chains WHERE chain_id BETWEEN ? AND ? ORDER BY chain_id",
+        "fractionated, mobility_type, contracted_id FROM chains WHERE chain_id BETWEEN ? AND ? ORDER BY chain_id",
         (first, last),
     ):
         if number not in contracted:

@@ -125,7 +125,22 @@ class Reference:
             "planar": int(networkx.check_planarity(graph)[0]),
             "girth": 0 if girth == float("inf") else girth,
             "fractionated": int(any(True for _ in networkx.articulation_points(graph))),
+            "mobility_type": self.mobility_type(),
         }
+
+    def mobility_type(self) -> str:
+        """Tell it by all sets of links each of which has two joints with others of the set."""
+        import networkx
+
+        if any(True for _ in networkx.articulation_points(self.graph)):
+            return "fractionated"
+        sizes, sets = _sizes(self.links), np.arange(1 << self.links)
+        closed = sets > 0
+        for link in range(self.links):
+            near = sum(1 << other for other in self.graph[link])
+            closed &= (sizes[sets & near] >= 2) | (sets >> link & 1 == 0)
+        least = (3 * (sizes - 1) - 2 * self.edges_inside)[closed].min()
+        return "partial" if least < 3 * (self.links - 1) - 2 * self.graph.number_of_edges() else "total"
 
     def orbits(self) -> list[tuple[int, ...]]:
         """Return the orbits of links, by smallest link."""

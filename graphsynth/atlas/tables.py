@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 #: In the header of every catalogue file ("GSyn"), so that another SQLite file is not taken for one.
 APPLICATION_ID = 0x4753796E
-SCHEMA_VERSION = 5
+SCHEMA_VERSION = 6
 #: Edges of a contracted graph; none for a ring.
 EDGES = re.compile(r"(\d{1,2}-\d{1,2}(x\d{1,2})?( (?!$)|$))*", re.ASCII)
 
@@ -83,6 +83,7 @@ CREATE TABLE chains (
   planar INTEGER NOT NULL CHECK ({_FLAG.format("planar")}),
   girth INTEGER NOT NULL CHECK (girth BETWEEN 0 AND links),
   fractionated INTEGER NOT NULL CHECK ({_FLAG.format("fractionated")}),
+  mobility_type TEXT NOT NULL CHECK (mobility_type IN ('total', 'partial', 'fractionated')),
   contracted_id INTEGER NOT NULL REFERENCES contracted) STRICT;
 -- removing a dyad of two binary links from the chain leaves the parent
 CREATE TABLE dyads (

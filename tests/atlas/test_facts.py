@@ -37,7 +37,7 @@ def test_facts_are_those_of_the_graph_class(links, mobility):
             chain.key, graph.graph6(), links, len(graph.joints), graph.loops,
             "-".join(str(graph.assortment.get(a, 0)) for a in degrees), chain.automorphism_order,
             " ".join(",".join(map(str, orbit)) for orbit in sorted(graph.orbits)), len(chain.inversions()),
-            chain.girth, int(chain.is_fractionated),
+            chain.girth, int(chain.is_fractionated), chain.mobility_type,
         )  # fmt: skip
         for frame in sorted(orbit[0] for orbit in graph.orbits):
             levels = graph.with_frame(frame).levels

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tomllib
 from collections import Counter
+from itertools import combinations
 from pathlib import Path
 
 import networkx as nx
@@ -42,8 +43,20 @@ def facts(text):
         "planar": int(nx.check_planarity(graph)[0]),
         "girth": nx.girth(graph),
         "fractionated": int(bool(list(nx.articulation_points(graph)))),
+        "mobility_type": type_of_mobility(graph),
         "link_orbits": " ".join(",".join(map(str, orbit)) for orbit in sorted(map(sorted, orbits))),
     }
+
+
+def type_of_mobility(graph):
+    """Tell it by the mobility of every induced sub-chain whose links have two joints in it."""
+    if list(nx.articulation_points(graph)):
+        return "fractionated"
+    free = 3 * (len(graph) - 1) - 2 * graph.size()
+    sets = (chosen for size in range(3, len(graph)) for chosen in combinations(graph, size))
+    parts = (part for part in map(graph.subgraph, sets) if min(degree for _, degree in part.degree()) > 1)
+    smaller = any(3 * (len(part) - 1) - 2 * part.size() < free for part in parts) if free > 1 else False
+    return "partial" if smaller else "total"
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +65,7 @@ def known(shipped):
 
 
 FILTERS = ["links", "joints", "mobility", "loops", "assortment", "automorphisms", "inversions", "planar", "girth",
-           "fractionated", "link_orbits"]  # fmt: skip
+           "fractionated", "mobility_type", "link_orbits"]  # fmt: skip
 
 
 @pytest.mark.long

@@ -41,6 +41,7 @@ WRONG = {
     "chains.graph6": "UPDATE chains SET graph6 = (SELECT graph6 FROM chains WHERE chain_id = 8) WHERE chain_id = 9",
     "chains.assortment": "UPDATE chains SET assortment = '4-4-0' WHERE chain_id = 9",
     "chains.link_orbits": "UPDATE chains SET link_orbits = '0,1,2,3,4,5,6,7' WHERE chain_id = 9",
+    "chains.mobility_type": "UPDATE chains SET mobility_type = 'partial' WHERE chain_id = 9",
     "chains.contracted_id": "UPDATE chains SET contracted_id = 1 + contracted_id % 3 WHERE chain_id = 9",
     "no label": "UPDATE chains SET label = NULL WHERE label = '1.8.4-4.1'",
     "a chain missing": "DELETE FROM chains WHERE chain_id = 9",
