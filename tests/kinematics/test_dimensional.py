@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,15 +17,9 @@ from graphsynth.kinematics.dimensional import Embodiment, Goals, embody
 from graphsynth.kinematics.dimensional.design import Design, choices
 from graphsynth.kinematics.dimensional.problem import DimensionProblem
 from graphsynth.kinematics.dimensional.sketch import layout
-from graphsynth.kinematics.dimensional.verify import (
-    GroupForm,
-    group_forms,
-    length_ratio,
-    smallest_transmission,
-    transmission_sines,
-    verify,
-)
-from graphsynth.mechanism.joints import Prismatic, Revolute
+from graphsynth.kinematics.dimensional.transmission import GroupForm, Tie, group_forms, transmission_sines
+from graphsynth.kinematics.dimensional.verify import length_ratio, smallest_transmission, verify
+from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver, Linear
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
@@ -311,7 +307,7 @@ def test_bar_formula_is_the_classical_angle_of_a_four_bar() -> None:
     )
     ends = [(joint.a, joint.b) for joint in mechanism.joints]
     # link 3 turns about its pivot on the frame (joint 1), the coupler is the bar from joint 2 to joint 3
-    form = GroupForm(0, False, (3,), ((2, 1, 3, 3),), ((1, 0, 1, 3),))
+    form = GroupForm(0, False, (3,), (Tie("bar", 2, 1, 3, 3),), (Tie("R", 1, 0, 1, 3),))
     sines = transmission_sines([form], mechanism.dimensions[None], ends, frames[None], motion.margins[None])
     diagonal = 9.0 + 1.0 - 6.0 * np.cos(motion.inputs)
     cosine = (2.6**2 + 2.4**2 - diagonal) / (2 * 2.6 * 2.4)
@@ -352,9 +348,118 @@ def test_bar_formula_of_a_triad_against_lengthened_bars() -> None:
             moved.append(end(at, held(lengths, pose)[1]))
         sines.append(1.0 / (abs(moved[0] - moved[1]) / (2 * h)))
     motion = simulate(mechanism, [0.6], start=pose)
-    assert any(form.bars for form in group_forms(mechanism, motion.steps))
+    assert any(form.lines for form in group_forms(mechanism, motion.steps))
     angle = smallest_transmission(motion)
     assert math.sin(angle) == pytest.approx(min(sines), rel=1e-7)
+
+
+def loosened(joint: Any, link: int, way: complex, h: float) -> Any:
+    """Return a joint whose point on a link is moved by h along a unit vector of the link's frame."""
+    name = "at_a" if joint.a == link else "at_b"
+    moved = complex(*getattr(joint, name)) + h * way
+    return replace(joint, **{name: (moved.real, moved.imag)})
+
+
+def far_line(mechanism: Mechanism, pose: np.ndarray, line: Tie, h: float) -> list[Any]:
+    """Return joints that keep a line of force h longer, along the force."""
+    joints, p, q = [*mechanism.joints], mechanism.joints[line.p], mechanism.joints[line.q]
+    turn = np.exp(1j * pose[:, 2])
+
+    if line.kind == "bar":
+        (bar,) = {p.a, p.b} & {q.a, q.b}
+        ends = [complex(*(j.at_a if j.a == bar else j.at_b)) for j in (p, q)]
+        joints[line.q] = loosened(q, bar, (ends[1] - ends[0]) / abs(ends[1] - ends[0]), h)
+        return joints
+    guide = turn[q.a] * np.exp(1j * getattr(q, "angle_a", 0.0))
+    if line.kind == "pin-slot" and isinstance(q, PinSlot):
+        joints[line.q] = loosened(q, q.a, 1j * guide / turn[q.a], h)
+    elif line.kind == "pin-slot":
+        (leg,) = {p.a, p.b} & {q.a, q.b}
+        joints[line.p] = loosened(p, leg, 1j * guide / turn[leg], h)
+    elif isinstance(q, Cam):
+        points = [complex(*pose[k, :2]) + turn[k] * complex(*at) for k, at in ((q.a, q.at_a), (q.b, q.at_b))]
+        rho, first, _ = q.pitch_radius(float(np.angle((points[1] - points[0]) / guide)))
+        joints[line.q] = replace(q, radius=q.radius + h * math.hypot(1.0, first / rho))
+    else:
+        assert isinstance(q, Gear)
+        joints[line.q] = replace(q, offset=q.offset + h / q.radius_b)
+    return joints
+
+
+def pinned(a: int, b: int, x: float, y: float) -> Revolute:
+    """A pin of links whose frames stand at the origin, unturned."""
+    return Revolute(a, b, (x, y), (x, y))
+
+
+def slide(a: int, b: int, x: float, y: float, x2: float, y2: float) -> Prismatic:
+    """A slide of such links, from a point of the first to one of the second."""
+    return Prismatic(a, b, (x, y), (x2, y2), *2 * [math.atan2(y2 - y, x2 - x)])
+
+
+BARS = [pinned(0, 1, 0.0, 0.0), pinned(1, 3, 1.0, 0.2), pinned(2, 3, 1.5, 1.2)]
+LEGS = [*BARS, pinned(2, 4, 2.3, 1.1), pinned(0, 4, 4.0, -1.0)]
+THIRD = [pinned(2, 5, 1.9, 2.2), pinned(0, 5, 1.0, 5.0)]
+WAVES, CENTRE, TIP = ((0.2, 0.1), (0.05, -0.03)), 3.2 + 2.6j, 1.9 + 2.2j
+_RHO = Cam(0, 2, radius=1.0, harmonics=WAVES).pitch_radius(float(np.angle(TIP - CENTRE)) - 0.4)[0]
+LINES: dict[str, list[Any]] = {
+    "guide of a leg": [*BARS, pinned(2, 4, 2.3, 1.1), slide(0, 4, 4.0, -1.0, 2.9, 0.4), *THIRD],
+    "guide on a leg": [*BARS, pinned(2, 4, 2.3, 1.1), slide(4, 0, 2.9, 0.4, 4.0, -1.0), *THIRD],
+    "slot": [*LEGS, PinSlot(0, 2, (1.0, 1.3), (1.9, 2.2), 0.25 * math.pi)],
+    "cam": [*LEGS, Cam(0, 2, (3.2, 2.6), (1.9, 2.2), 0.4, abs(TIP - CENTRE) - _RHO + 1.0, WAVES)],
+    "gear": [*LEGS, Gear(0, 2, (4.0, -1.0), (2.3, 1.1), 1.1, abs(1.7 - 2.1j) - 1.1)],
+    "internal gear": [*LEGS, Gear(0, 2, (4.0, -1.0), (2.3, 1.1), 1.1 + abs(1.7 - 2.1j), 1.1, internal=True)],
+    "slide on the frame": [*BARS[:2], slide(0, 2, 4.0, 1.0, 3.0, 1.5), pinned(3, 4, 1.8, 0.6),
+                           pinned(2, 4, 3.2, 2.4), pinned(3, 5, 1.1, 1.2), pinned(2, 5, 2.6, 2.0)],
+}  # fmt: skip
+COUNTS = {"slide on the frame": 2}
+
+
+@pytest.mark.parametrize("case", LINES)
+def test_any_line_of_force_against_one_that_is_longer(case: str) -> None:
+    """Let a line of force grow a little at a fixed input: what it holds moves apart by 1 / sin(mu) of that."""
+    joints = LINES[case]
+    if isinstance(gear := joints[-1], Gear):
+        phi = float(np.angle(complex(*gear.at_b) - complex(*gear.at_a)))
+        joints = [*joints[:-1], replace(gear, offset=-(gear.sign * gear.radius_a / gear.radius_b + 1.0) * phi)]
+    links = 1 + max(max(joint.pair) for joint in joints)
+    graph = MechanismGraph(links, [(*joint.pair, joint.mobility) for joint in joints], frame=0)
+    mechanism, pose = Mechanism(graph, tuple(joints), (Driver(0, 1),)), np.zeros((links, 3))
+    motion = simulate(mechanism, [0.0], start=pose)
+    assert motion.assembled[0] and np.abs(motion.poses[0]).max() < 1e-6
+    pose, h, sines = motion.poses[0], 1e-5, []
+    lines = [line for form in group_forms(mechanism, motion.steps) for line in form.lines]
+    assert len(lines) == COUNTS.get(case, 3)
+    for line in lines:
+        p, q = mechanism.joints[line.p], mechanism.joints[line.q]
+        at = [complex(*(p.at_a if line.a == p.a else p.at_b)), complex(*(q.at_a if line.b == q.a else q.at_b))]
+        if isinstance(p, Gear):
+            at = 2 * [at[1] + (at[0] - at[1]) * p.radius_a / (p.radius_a + p.sign * p.radius_b)]
+        elif line.kind != "bar":
+            at = 2 * at[:1]
+        ends = []
+        for sign in (1.0, -1.0):
+            made = Mechanism(graph, tuple(far_line(mechanism, pose, line, sign * h)), mechanism.drivers)
+            other = simulate(made, [0.0], start=pose)
+            assert other.assembled[0] and np.abs(other.poses[0] - pose).max() < 1e-3
+            x, y, angle = other.poses[0, [line.a, line.b]].T
+            ends.append(x + 1j * y + np.exp(1j * angle) * at)
+        (a, b) = (ends[0] - ends[1]) / (2.0 * h)
+        sines.append(1.0 / abs(b - a))
+    assert min(sines) < 0.999 and math.sin(smallest_transmission(motion)) == pytest.approx(min(sines), rel=1e-6)
+
+
+def test_a_group_that_slides_on_the_frame_is_no_worse_for_its_units() -> None:
+    """An angle must not depend on how a matrix is scaled: a slide in a larger group, at three sizes."""
+    angles = []
+    for size in (1e-2, 1.0, 1e3):
+        joints = [
+            replace(own, **{name: tuple(size * z for z in getattr(own, name)) for name in ("at_a", "at_b")})
+            for own in LINES["slide on the frame"]
+        ]
+        graph = MechanismGraph(6, [joint.pair for joint in joints], frame=0)
+        motion = simulate(Mechanism(graph, tuple(joints), (Driver(0, 1),)), [0.0], start=np.zeros((6, 3)))
+        angles.append(smallest_transmission(motion))
+    assert angles == pytest.approx([angles[0]] * 3, rel=1e-9) and angles[0] > 0.1
 
 
 @pytest.mark.parametrize("driver", [1.5, "x", True, (1, 1), (0, 2, 3), [(0, 1, 2)], [None], 9, -1, (0, 9)])

@@ -17,7 +17,7 @@ from graphsynth.design.task.task import DesignTask
 from graphsynth.design.task.ties import ties
 from graphsynth.kinematics.dimensional.matching import MovingLink, at_times
 from graphsynth.kinematics.dimensional.sketch import layout
-from graphsynth.kinematics.dimensional.verify import group_forms, transmission_sines
+from graphsynth.kinematics.dimensional.transmission import group_forms, transmission_sines
 from graphsynth.kinematics.engine.batch import simulate_batch
 from graphsynth.kinematics.engine.gradients import revolute_dyads
 from graphsynth.kinematics.simulation import simulate
@@ -162,7 +162,7 @@ class Model:
             links = {s.group: frozenset(s.links) for s in rest.steps if s.group in own}
             signs = rest.modes[0, own] * _alike(plan.mirror, [links[group] for group in own], signs)
         self.modes = {group: int(sign) for group, sign in zip(own, signs)}
-        self.forms = [form for form in group_forms(self.base, rest.steps) if form.bars]
+        self.forms = [form for form in group_forms(self.base, rest.steps) if form.lines]
         self.rods = _rods(plan)
         self.corners = _corners(self.base, plan, [set(step.links) for step in rest.steps])
         # the vector of unknowns: places, directions, points, what targets add, stroke

@@ -26,7 +26,7 @@ from graphsynth.kinematics.dimensional.goals import (
 from graphsynth.kinematics.dimensional.matching import MovingLink, at_times, matched
 from graphsynth.kinematics.dimensional.mirror import axis_joints, kept
 from graphsynth.kinematics.dimensional.sketch import layout
-from graphsynth.kinematics.dimensional.verify import group_forms, transmission_sines
+from graphsynth.kinematics.dimensional.transmission import group_forms, transmission_sines
 from graphsynth.kinematics.engine.batch import simulate_batch
 from graphsynth.kinematics.engine.gradients import revolute_dyads
 from graphsynth.kinematics.simulation import simulate

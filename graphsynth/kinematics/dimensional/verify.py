@@ -1,27 +1,23 @@
-"""The check that dimensions found must pass: the whole range by `simulate`, step control, events and all.
-
-The transmission angle of a bar in any group is defined in docs/explanation/embodiment.md, "The search".  Here J is the
-constraint matrix of the group's core links, one row per bar: the unit vector along it times the velocity across it.
-"""
+"""The check that dimensions found must pass: the whole range by `simulate`, step control, events and all."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.kinematics.dimensional.goals import FunctionGoal, Goals, LineGoal, PathGoal, PosesGoal
 from graphsynth.kinematics.dimensional.matching import MovingLink, Wanted, at_times, passed
+from graphsynth.kinematics.dimensional.transmission import group_forms, transmission_sines
 from graphsynth.kinematics.simulation import simulate
-from graphsynth.mechanism.joints import Cam, JointGeometry, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.joints import Cam, PinSlot
 
 if TYPE_CHECKING:
-    from graphsynth.kinematics.engine.program import Step
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.model import Mechanism
 
@@ -109,7 +105,7 @@ def faults(motion: Motion, full_turn: bool) -> dict[str, bool]:
 def smallest_transmission(motion: Motion) -> float:
     """Smallest transmission angle of a motion over all groups, radians; NaN if it is not complete.
 
-    For groups larger than dyads see the head of this module.  pi/2 without groups.
+    For groups larger than dyads see `graphsynth.kinematics.dimensional.transmission`.  pi/2 without groups.
     """
     if not motion.completed:
         return math.nan
@@ -208,129 +204,3 @@ def strip_width(z: NDArray[np.complex128]) -> float:
     sides = np.roll(corners, -1) - corners
     across = (np.conj(sides / np.abs(sides))[:, None] * (corners[None] - corners[:, None])).imag
     return float(np.ptp(across, axis=1).min())
-
-
-# --- transmission angles of groups of any class, over many poses at once
-
-
-class GroupForm(NamedTuple):
-    """How to find the transmission of one group.
-
-    ``core`` holds the unknown links, ``bars`` and ``pins`` the constraints: joint at one end, link there, joint at the
-    other end (for a pin the same), link there.  Without bars the margin of the engine is taken: its square root where
-    ``closed``, else its size.
-    """
-
-    group: int
-    closed: bool
-    core: tuple[int, ...]
-    bars: tuple[tuple[int, int, int, int], ...]
-    pins: tuple[tuple[int, int, int, int], ...]
-
-
-def group_forms(mechanism: Mechanism, steps: Sequence[Step]) -> tuple[GroupForm, ...]:
-    """Return the form of every group of a mechanism."""
-    from graphsynth.structure.assur import decompose
-
-    found = decompose(mechanism.graph, [driver.pair for driver in mechanism.drivers])
-    known, forms = {*found.driven}, []  # links placed before a group: the frame, driven links and earlier groups
-    for group, step in zip(found.groups, (step for step in steps if step.group >= 0)):
-        forms.append(_form(mechanism, step, known))
-        known |= {*group.links}
-    return tuple(forms)
-
-
-def _form(mechanism: Mechanism, step: Step, known: set[int]) -> GroupForm:
-    plain = GroupForm(step.group, step.has_two_modes, (), (), ())
-    if step.has_two_modes or not step.iterative:
-        return plain
-    inside, driven = set(step.links), {frozenset(driver.pair) for driver in mechanism.drivers}
-    own = [
-        (k, joint)
-        for k, joint in enumerate(mechanism.joints)
-        if {joint.a, joint.b} & inside and {joint.a, joint.b} <= inside | known
-    ]
-    # a cylinder, a driven slide between two links with one more joint each, is a bar between these
-    cylinders = [joint.pair for _, joint in own if frozenset(joint.pair) in driven and isinstance(joint, Prismatic)]
-    pushed = {link for pair in cylinders for link in pair}
-    if any(mechanism.graph.degrees[link] != 2 or link not in inside for link in pushed):
-        return plain
-    others = [joint for _, joint in own if joint.pair not in cylinders]
-    if any(not isinstance(joint, Revolute) or frozenset(joint.pair) in driven for joint in others):
-        return plain
-    near = {link for _, joint in own if {*joint.pair} & pushed for link in joint.pair}
-    core = ((set(step.core) | near) - pushed) & inside if pushed else set(step.core)
-    bars = [_bar(own, {link}) for link in sorted(inside - core - pushed)] + [_bar(own, {*pair}) for pair in cylinders]
-    own = [(k, joint) for k, joint in own if not {*joint.pair} & pushed]
-    pins = [(k, joint.a, k, joint.b) for k, joint in own if not {joint.a, joint.b} & (inside - core)]
-    if not bars or len(bars) + 2 * len(pins) != 3 * len(core):
-        return plain
-    return GroupForm(step.group, False, tuple(sorted(core)), tuple(bars), tuple(pins))
-
-
-def _bar(own: list[tuple[int, JointGeometry]], links: set[int]) -> tuple[int, int, int, int]:
-    """Joints at both ends of a bar of one link, or of the two of a cylinder, and the links there."""
-    ends = [(k, joint.b if joint.a in links else joint.a) for k, joint in own if len({*joint.pair} & links) == 1]
-    return (*ends[0], *ends[1])
-
-
-def transmission_sines(
-    forms: Sequence[GroupForm], dimensions: Array, ends: Sequence[tuple[int, int]], frames: Array, margins: Array
-) -> Array:
-    """Sine of the smallest transmission angle of every group, shape (sets, n, groups); NaN where there is no pose.
-
-    ``dimensions`` (sets, joints, 10); ``ends``, the links of every joint in that order; ``frames`` (sets, n, links, 4)
-    with x, y, cos, sin of every link; ``margins`` (sets, n, groups).
-    """
-    found = np.empty(margins.shape)
-    for form in forms:
-        margin = margins[:, :, form.group]
-        if form.bars:
-            found[:, :, form.group] = _bars(form, dimensions, ends, frames)
-        elif form.closed:
-            found[:, :, form.group] = np.sqrt(np.clip(margin, 0.0, 1.0))
-        else:
-            found[:, :, form.group] = np.clip(np.abs(margin), 0.0, 1.0)
-    return found
-
-
-def _bars(form: GroupForm, dimensions: Array, ends: Sequence[tuple[int, int]], frames: Array) -> Array:
-    place = {link: 3 * k for k, link in enumerate(form.core)}
-    size = 3 * len(form.core)
-    J = np.zeros((*frames.shape[:2], size, size))
-    bars, row = len(form.bars), len(form.bars)
-    across = np.zeros((*frames.shape[:2], bars + len(form.pins), 2, size))
-    for r, (p, a, q, b) in enumerate((*form.bars, *form.pins)):
-        A = _point(p, a, dimensions, ends, frames)
-        B = A if p == q else _point(q, b, dimensions, ends, frames)
-        for link, at, sign in ((a, A, -1.0), (b, B, 1.0)):
-            if link in place:  # a link's twist is that of its point at the world's origin
-                k = place[link]
-                across[:, :, r, 0, k] = across[:, :, r, 1, k + 1] = sign
-                across[:, :, r, 0, k + 2], across[:, :, r, 1, k + 2] = -sign * at[..., 1], sign * at[..., 0]
-        if p == q:
-            J[:, :, row : row + 2] = across[:, :, r]
-            row += 2
-            continue
-        e = B - A
-        e = e / np.maximum(np.hypot(e[..., 0], e[..., 1]), 1e-300)[..., None]
-        J[:, :, r] = (e[..., None] * across[:, :, r]).sum(axis=2)
-    missing = ~np.isfinite(J).all(axis=(2, 3))
-    J[missing] = np.eye(size)
-    try:
-        columns = np.linalg.inv(J)[..., :bars]
-    except np.linalg.LinAlgError:  # one pose is singular to the last bit
-        columns = np.linalg.pinv(J)[..., :bars] * 1e300
-    moved = np.einsum("...rck,...kr->...rc", across[:, :, :bars], columns)
-    with np.errstate(over="ignore"):
-        sine = 1.0 / np.hypot(moved[..., 0], moved[..., 1]).max(axis=-1)
-    sine[missing] = np.nan
-    return np.asarray(np.minimum(sine, 1.0))
-
-
-def _point(k: int, link: int, dimensions: Array, ends: Sequence[tuple[int, int]], frames: Array) -> Array:
-    """World places of joint k as a point of one of its links, shape (sets, n, 2)."""
-    first = 0 if ends[k][0] == link else 3
-    px, py = dimensions[:, k, first, None], dimensions[:, k, first + 1, None]
-    x, y, c, s = (frames[:, :, link, i] for i in range(4))
-    return np.stack([x + c * px - s * py, y + s * px + c * py], axis=-1)
