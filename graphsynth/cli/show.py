@@ -72,6 +72,8 @@ def _with_special_joints(
 ) -> int:
     """Describe and draw a chain with multiple or prismatic joints, or a planetary gear train."""
     from graphsynth.structure.gear_trains import PlanetaryGearTrain
+    from graphsynth.structure.modes import count_assembly_modes
+    from graphsynth.structure.multiple_joints import MultipleJointChain
 
     geared = isinstance(chain, PlanetaryGearTrain)
     if options.output:
@@ -86,6 +88,13 @@ def _with_special_joints(
         "mobility": chain.mobility,
         "automorphisms": chain.automorphism_order,
     }
+    if isinstance(chain, MultipleJointChain):
+        if chain.mobility > 1:
+            facts["type of mobility"] = chain.mobility_type
+        elif (frame := chain.frame) is not None and chain.links <= _COUNTED:
+            driven = [link for link in range(chain.links) if chain.neighbours[frame] >> link & 1]
+            modes = (f"{count_assembly_modes(chain, [link])} at most with driver {link}" for link in driven)
+            facts["assembly modes"] = ", ".join(modes)
     if isinstance(chain, PlanetaryGearTrain):
         facts["gear pairs"] = ", ".join(f"{a}-{b} on {carrier}" for a, b, carrier in chain.gears)
         ways = chain.arrangements(coaxial=True)

@@ -18,6 +18,7 @@ from graphsynth.core.compilation import named
 from graphsynth.core.errors import GraphError
 from graphsynth.structure.assur import decompose
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.structure.multiple_joints import MultipleJointChain
 
 if TYPE_CHECKING:
     from graphsynth.structure.assur import AssurGroup
@@ -26,12 +27,14 @@ if TYPE_CHECKING:
 __all__ = ["count_assembly_modes", "coupler_curve_degree", "coupler_curve_genus"]
 
 
-def count_assembly_modes(graph: MechanismGraph, drivers: Iterable[int | tuple[int, int]] = ()) -> int:
+def count_assembly_modes(
+    graph: MechanismGraph | MultipleJointChain, drivers: Iterable[int | tuple[int, int]] = ()
+) -> int:
     """Count the assembly modes of a plane structure, complex ones included (exact).
 
     Parameters
     ----------
-    graph : MechanismGraph
+    graph : MechanismGraph or MultipleJointChain
         A structure of mobility 0, as a Baranov truss; or a mechanism with a frame, and ``drivers``.  Joints are
         revolute.
     drivers : iterable of int or (int, int), optional
@@ -47,7 +50,7 @@ def count_assembly_modes(graph: MechanismGraph, drivers: Iterable[int | tuple[in
     ------
     GraphError
         Joints of mobility 2 or more, another space than the plane, a mobility that is not the number of drivers, a
-        structural group of more than 19 bodies.
+        structural group (with multiple joints, the whole) of more than 19 bodies.
 
     Examples
     --------
@@ -57,8 +60,10 @@ def count_assembly_modes(graph: MechanismGraph, drivers: Iterable[int | tuple[in
     >>> sorted(map(count_assembly_modes, enumerate_baranov_trusses(7)))
     [14, 16, 18]
     """
-    _check(graph)
     drivers = tuple(drivers)
+    if isinstance(graph, MultipleJointChain):
+        return _with_pins(graph, drivers)
+    _check(graph)
     if drivers or graph.mobility:
         return prod(map(_modes_of, decompose(graph, drivers).groups))
     return _counted(tuple(range(graph.links)), graph.joints)
@@ -164,6 +169,24 @@ def _check(graph: MechanismGraph) -> None:
         )
 
 
+def _with_pins(chain: MultipleJointChain, drivers: tuple[int | tuple[int, int], ...]) -> int:
+    """Count the modes of a chain with multiple joints at once: links that drivers hold are one body."""
+    if len(drivers) != chain.mobility or (drivers and chain.frame is None):
+        raise GraphError(
+            f"mobility {chain.mobility} takes as many drivers and a frame for them, not {len(drivers)} drivers with "
+            f"frame {chain.frame}: choose a frame, and other drivers"
+        )
+    where = list(range(chain.links))
+    for driver in drivers:
+        a, b = driver if isinstance(driver, tuple) else (chain.frame or 0, driver)
+        if not (0 <= min(a, b) <= max(a, b) < chain.links and chain.neighbours[a] >> b & 1) or where[a] == where[b]:
+            raise GraphError(f"driver {driver}: links {a} and {b} share no joint, or are held already; choose others")
+        where = [where[a] if body == where[b] else body for body in where]
+    number = {body: k for k, body in enumerate(sorted(set(where)))}
+    pins = (tuple(sorted({number[where[link]] for link in joint})) for joint in chain.joints)
+    return _table(tuple(pin for pin in pins if len(pin) > 1), len(number))
+
+
 def _modes_of(group: AssurGroup) -> int:
     """Count the modes of a group and of the groups that assemble its bodies."""
     body = {link: k for k, links in enumerate(group.bodies, start=1) for link in links}
@@ -180,9 +203,9 @@ def _counted(where: tuple[int, ...], joints: Iterable[Joint]) -> int:
 
 
 @lru_cache(maxsize=1000)
-def _table(pairs: tuple[tuple[int, int], ...], bodies: int) -> int:
-    """Count the modes of bodies with a pin for each pair."""
-    return _Spaces(pairs, bodies).count((1 << bodies) - 1, 0, 0) if bodies > 1 else 1
+def _table(pins: tuple[tuple[int, ...], ...], bodies: int) -> int:
+    """Count the modes of bodies; each pin joins those that it names."""
+    return _Spaces(pins, bodies).count((1 << bodies) - 1, 0, 0) if bodies > 1 else 1
 
 
 @lru_cache(maxsize=1000)
@@ -200,9 +223,9 @@ def _genus(pairs: tuple[tuple[int, int], ...], bodies: int) -> int:
 
 
 class _Spaces:
-    """The two linear spaces of bodies with a pin for each pair, by their matroid."""
+    """The two linear spaces of bodies and the pins that join them, by their matroid."""
 
-    def __init__(self, pairs: tuple[tuple[int, int], ...], bodies: int) -> None:
+    def __init__(self, pins: tuple[tuple[int, ...], ...], bodies: int) -> None:
         import numpy as np
 
         from graphsynth.structure.matroids import MOST
@@ -212,9 +235,9 @@ class _Spaces:
                 f"{bodies} bodies must be assembled at once; at most {MOST} are counted: drive other joints"
             )
         fill_ranks, self._count = named("graphsynth.structure.matroids", "fill_ranks", "count_modes")
-        links = np.array(pairs, dtype=np.int64).reshape(-1)
+        links = np.array([link for pin in pins for link in pin], dtype=np.int64)
         self.bodies, self.ranks = bodies, np.empty(1 << bodies, dtype=np.int8)
-        fill_ranks(bodies, links, np.repeat(np.arange(len(pairs)), 2), self.ranks)
+        fill_ranks(bodies, links, np.repeat(np.arange(len(pins)), [len(pin) for pin in pins]), self.ranks)
 
     def count(self, left: int, one: int, two: int) -> int:
         """Count the common points of two minors: links that are left, and those that are contracted in each."""

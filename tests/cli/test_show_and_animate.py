@@ -16,7 +16,8 @@ from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.synthesis import enumerate_chains
+from graphsynth.structure.multiple_joints import MultipleJointChain
+from graphsynth.synthesis import enumerate_chains, enumerate_multiple_joint_chains
 
 CYCLE = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
 PLATFORM = "N}o__QC_cA?C?C?A??w f0 2:1-2,1-3,1-4"
@@ -85,6 +86,14 @@ def test_show_reads_lists_of_chains_with_other_joints(
     assert json.loads(by_line)["key"] == json.loads(capsys.readouterr().out)["key"]
     assert "<svg" in picture.read_text()
     assert main(["show", str(path), "--line", "999"]) == 2
+
+
+def test_show_tells_modes_and_mobility_of_multiple_joints(capsys: pytest.CaptureFixture[str]) -> None:
+    chain = MultipleJointChain.from_joints(6, [(0, 1), (1, 2), (2, 3), (2, 5), (4, 5), (0, 3, 4)], frame=0)
+    assert main(["show", chain.to_text()]) == 0
+    assert "4 at most with driver 1, 4 at most with driver 3, 6 at most with driver 4" in capsys.readouterr().out
+    assert main(["show", next(enumerate_multiple_joint_chains(9, 2)).key]) == 0
+    assert "type of mobility" in capsys.readouterr().out
 
 
 def test_animate_moves_sliders_and_refuses_multiple_joints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections import Counter
 from functools import cache
 
 import numpy as np
@@ -10,11 +11,13 @@ import pytest
 from graphsynth import (
     Mechanism,
     MechanismGraph,
+    MultipleJointChain,
     count_assembly_modes,
     coupler_curve_degree,
     coupler_curve_genus,
     enumerate_baranov_trusses,
     enumerate_chains,
+    enumerate_multiple_joint_chains,
 )
 from graphsynth.core.errors import GraphError
 from graphsynth.structure.assur import decompose
@@ -54,8 +57,13 @@ def bars_of(truss):
     for point, joint in enumerate(truss.joints):
         at[joint.a].append(point)
         at[joint.b].append(point)
+    return bars_between(at.values())
+
+
+def bars_between(bodies):
+    """Bars that hold the points of each body together, and how many of them are free to be mirrored."""
     bars, doubled = [], 0
-    for first, second, *others in at.values():
+    for first, second, *others in bodies:
         bars += [(first, second), *((end, point) for point in others for end in (first, second))]
         doubled += len(others)
     return tuple(bars), doubled
@@ -117,6 +125,49 @@ def test_trusses_beside_the_recursion_over_bars(links):
     for truss in enumerate_baranov_trusses(links):
         bars, doubled = bars_of(truss)
         assert count_assembly_modes(truss) << doubled == laman(named_anew(bars), named_anew(bars))
+
+
+@pytest.mark.parametrize(
+    ("links", "most", "found"),
+    [
+        (6, 9, {4: 13, 6: 1}),
+        pytest.param(8, 9, {8: 495, 12: 180, 14: 41, 16: 38, 18: 7}, marks=pytest.mark.long),
+        pytest.param(8, 11, {8: 495, 12: 180, 14: 41, 16: 38, 18: 7}, marks=pytest.mark.slow),
+    ],
+)
+def test_mechanisms_with_multiple_joints_beside_the_recursion_over_bars(links, most, found):
+    """Frame and driven link are one body; a joint is a point, whatever the number of links on it."""
+    numbers, compared = Counter(), Counter()
+    for chain in enumerate_multiple_joint_chains(links, framed=True):
+        for driver in (link for link in range(1, links) if chain.neighbours[0] >> link & 1):
+            number = count_assembly_modes(chain, [driver])
+            bodies = [{0, driver}, *({link} for link in range(links) if link not in (0, driver))]
+            joints = [set(joint) for joint in chain.joints]
+            bars, doubled = bars_between(
+                [[k for k, joint in enumerate(joints) if body & joint and joint - body] for body in bodies]
+            )
+            if len(bars) <= most:
+                assert number << doubled == laman(named_anew(bars), named_anew(bars)), (chain, driver)
+                compared[number] += 1
+            numbers[number] += 1
+    assert numbers == found and set(compared) >= {min(found)} and compared.total() >= 14
+
+
+def test_multiple_joints_of_two_links_are_simple_ones():
+    for chain in enumerate_chains(8):
+        mechanism = chain.with_frame(0)
+        for driver in mechanism.levels[1]:
+            same = count_assembly_modes(MultipleJointChain(mechanism, 0), [(driver, 0)])
+            assert same == count_assembly_modes(mechanism, [driver])
+    triangle = MultipleJointChain.from_joints(3, [(0, 1), (1, 2), (0, 2)])
+    assert count_assembly_modes(triangle) == 2
+    star = MultipleJointChain.from_joints(6, [(0, 1, 2), (0, 3), (1, 4), (2, 5), (3, 4), (3, 5)], frame=0)
+    for drivers, said in (([], "takes as many drivers"), ([4], "share no joint"), ([7], "share no joint")):
+        with pytest.raises(GraphError, match=said):
+            count_assembly_modes(star, drivers)
+    two = next(enumerate_multiple_joint_chains(7, 2, framed=True))
+    with pytest.raises(GraphError, match="are held already"):
+        count_assembly_modes(two, [(0, two.joints[0][1])] * 2)
 
 
 def loops(pairs, bodies, draw):
