@@ -126,6 +126,7 @@ def page_computations() -> Recorded:
                 dragging.drag(rows, table[0], 0, near, 2, at, np.array(target), way, length[0], found[:3].copy())
         _tilted(mechanism, np.ascontiguousarray(pose[None]), kept)
         _proved(mechanism, pose, kept)
+        _walked(mechanism, kept)
     _through_poses(kept)
     return kept
 
@@ -146,6 +147,27 @@ def _proved(mechanism: Any, pose: np.ndarray, kept: Recorded) -> None:
             kernels.march(*march, limit)
         kernels.closes(rows, table, mechanism.frame, 0, first, inputs[0], first + 0.0, inputs[0], 0)
         kernels.closes(rows, table, mechanism.frame, 0, first, inputs[0], box, end, 1)
+
+
+def _walked(mechanism: Any, kept: Recorded) -> None:
+    """Record calls with which the page proves where a misaligned axis binds: free, on the verge and bound."""
+    from graphsynth.jamming.joints import JointLimits, Misalignment, SlideLimits
+    from graphsynth.jamming.joints.kernels import walking
+    from graphsynth.jamming.joints.program import problem
+    from graphsynth.jamming.joints.walked import Walk
+
+    motion = mechanism.simulate(np.linspace(0.7, 1.2, 5), events=False)
+    limits = {
+        own.pair: JointLimits(0.01, 0.001) if own.kind == "R" else SlideLimits(0.01, 0.02, 0.001)
+        for own in mechanism.joints
+    }
+    with recording(kept, all_calls=True):
+        for alpha in (0.004, 0.026, 0.2):
+            walk = Walk(problem(mechanism, limits, Misalignment(0, 1, alpha, 0.3)), motion, 1e-3, 40)
+            for limit in (0, 4, 9):
+                walking.walk(
+                    walk.task, walk.asked, walk.goal, walk.length, walk.box, walk.state, limit, walk.widths, walk._found
+                )
 
 
 def _through_poses(kept: Recorded) -> None:

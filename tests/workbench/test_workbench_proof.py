@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 from graphsynth import Mechanism, certify
+from graphsynth.jamming.joints import JointLimits, Misalignment, SlideLimits, certify_coupled
+from graphsynth.jamming.joints.program import problem
+from graphsynth.jamming.joints.walked import Walk
 from graphsynth.kinematics.certify.four_bar import certify_four_bar
 from graphsynth.mechanism import gallery
 from graphsynth.mechanism.files import to_dict
@@ -108,3 +111,80 @@ def test_the_page_has_the_bits_of_the_library_and_boxes_hold_the_motion(scripts,
             off[:, 2] = np.remainder(off[:, 2] + math.pi, math.tau) - math.pi
             assert (np.abs(off) < node[kernels.TIGHT] + 1e-9).all()
     assert len(seen) > 100
+
+
+BINDS = """const motion = await Kernels.load("motion"), proof = await Kernels.load("proof"), found = [];
+const binding = await Kernels.load("binding");
+for (const [data, limits, tilt, limited] of args[0]) {
+  const engine = Engine.open(motion, data), { inputs } = engine.sweep();
+  const turns = limited ? 0 : 1, [from, to] = limited || [inputs[0], inputs[inputs.length - 1]];
+  const told = [], asked = { pose: Array.from(engine.pose), driver: 0, from, to, turns, limits, tilt };
+  const tell = share => { told.push(share); return true; };
+  const { pieces, ...rest } = await Proving.binds(motion, proof, binding, data, asked, tell);
+  const text = pieces && pieces.map(own => own.map(String));
+  found.push({ ...rest, pieces: text, told, start: engine.inputs[0], pose: asked.pose });
+  engine.close();
+}
+return found;"""
+
+
+def leaning(mechanism, tilt, end, alpha, joint=0, limited=None):
+    """A question of the page: all joints alike, the axis of one leans by alpha; and the same for the library."""
+    limits = [
+        {"tilt": tilt, "end": end} if own.kind == "R" else {"roll": tilt, "pitch": tilt, "end": end}
+        for own in mechanism.joints
+    ]
+    a, b = mechanism.joints[joint].pair
+    ours = [to_dict(mechanism), limits, {"joint": joint, "alpha": alpha, "direction": 0.3, "base": a}, limited]
+    theirs = {
+        own.pair: JointLimits(tilt, end) if own.kind == "R" else SlideLimits(tilt, tilt, end)
+        for own in mechanism.joints
+    }
+    return ours, (mechanism, theirs, Misalignment(a, b, alpha, 0.3), limited)
+
+
+def cases_of_binding():
+    own = [Mechanism.four_bar(2.0, 1.0, 2.5, 2.5), Mechanism.slider_crank(1.0, 3.0, 0.2), gallery.toggle_press()]
+    bar, crank, press = (Mechanism.from_json(json.dumps(to_dict(assembled(mechanism)))) for mechanism in own)
+    asked = [(bar, 0.02), (bar, 0.027), (crank, 0.026), (crank, 0.2), (press, 0.027)]
+    found = [leaning(mechanism, 0.01, 0.001, alpha) for mechanism, alpha in asked]
+    return [*found, leaning(bar, 0.01, 0.001, 0.026, limited=[-1.0, 1.5])]
+
+
+def proved_to_bind(scripts, asked):
+    return scripts(BINDS, [ours for ours, _ in asked], modules=("motion", "proof", "binding"))
+
+
+@pytest.mark.long
+def test_the_page_proves_where_it_binds_as_the_library_does(scripts):
+    """The same verdicts, and as much decided; another seat, a gear and a misaligned rail are told to be unknown."""
+    asked, verdicts = cases_of_binding(), set()
+    for (_, (mechanism, limits, tilt, limited)), found in zip(asked, proved_to_bind(scripts, asked), strict=True):
+        start = float(found["start"])
+        ends = limited or [start, start + math.tau]
+        theirs = certify_coupled(mechanism.simulate(np.linspace(*ends, 145)), limits, tilt)
+        wanted = {"CERTIFIED_FREE": "free", "CERTIFIED_JAMMED": "binds"}.get(theirs.verdict.name, "undecided")
+        assert found["known"] and found["verdict"] == wanted
+        verdicts.add(wanted)
+        assert found["free"] == pytest.approx(theirs.share(1), abs=0.02)
+        assert found["binds"] == pytest.approx(theirs.share(-1), abs=0.02)
+        assert found["told"] == sorted(found["told"]) and 0.0 < found["told"][-1] <= 1.0 + 1e-12
+    assert verdicts == {"free", "binds"}
+    rail = Mechanism.slider_crank(1.0, 3.0, 0.2)
+    slider = leaning(assembled(rail), 0.01, 0.0, 0.01, joint=[own.kind for own in rail.joints].index("P"))
+    wheels = leaning(assembled(geared()), 0.01, 0.0, 0.01)
+    wheels[0][1][[own.kind for own in geared().joints].index("gear")] = None
+    unknown = proved_to_bind(scripts, [slider, wheels])
+    assert [own["known"] for own in unknown] == [False, False]
+
+
+@pytest.mark.slow  # numba compiles the kernel
+def test_pieces_of_the_page_have_the_bits_of_the_library(scripts):
+    asked = cases_of_binding()[:-1]
+    for (_, (mechanism, limits, tilt, _)), found in zip(asked, proved_to_bind(scripts, asked), strict=True):
+        start, pose = float(found["start"]), np.array(found["pose"], dtype=np.float64).reshape(-1, 3)
+        motion = mechanism.simulate([start, start + math.tau], start=pose, events=False)
+        walk = Walk(problem(mechanism, limits, tilt), motion, 1e-4 * math.tau, 20_000)
+        walk.box[0], walk.widths[1], walk.state[1] = pose, math.tau / 128.0, math.tau / 512.0
+        assert walk.go(20_000)
+        np.testing.assert_array_equal(np.array(found["pieces"], dtype=np.float64), walk.pieces)

@@ -25,6 +25,7 @@ from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.pieces import Found, Work, check_range
 from graphsynth.jamming.joints.program import Bearings, problem
 from graphsynth.jamming.joints.search import Budget, MemberWitness, jamming_member, search, unclosed_member
+from graphsynth.jamming.joints.walked import walked
 from graphsynth.jamming.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]
+Mask = NDArray[np.bool_]
 #: What the verdict is about, for certificates and reports.
 MODEL = (
     "L1 with exact tilts: the small-tilt closure (first order) with bounds of the terms of second order that it "
@@ -235,6 +237,8 @@ def certify_coupled(
     try:
         work = Work(given, motion, box)
         budget = Budget(resolution * (work.high - work.low), max_pieces, seconds, begin)
+        if (pieces := walked(work, resolution, max_pieces, seconds)) is not None:
+            return _told(work, budget, pieces, "", pieces.proved, True)
         return _proved(work, budget, *search(work, budget))
     except Unsupported as error:
         ends, zero = motion.inputs[motion.assembled], np.zeros(1)
@@ -257,6 +261,11 @@ def _proved(work: Work, budget: Budget, pieces: Found, stopped: str) -> TurnCert
         stopped = (
             f"the pose near the input {float(pieces.lo[lost[0]])!r} is not proved to be on the branch of the motion"
         )
+    return _told(work, budget, pieces, stopped, own, branch)
+
+
+def _told(work: Work, budget: Budget, pieces: Found, stopped: str, own: Mask, branch: bool) -> TurnCertificate:
+    """Return the certificate of pieces, of which ``own`` are of the motion and ``branch`` says that all are one."""
     shown = pieces.by_input()
     state = shown.sure
     witness = None if (state == -1).any() or (state == 1).all() else jamming_member(work, pieces, own)

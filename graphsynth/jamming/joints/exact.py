@@ -134,13 +134,18 @@ def neglected(
     lean = lean[:, kept]
     play = layout.end_float_range[0] * (1.0 - 0.5 * lean**2) / _ROUNDING
     # what is left of the vertical closure of every loop: h^2 (h . v) / (1 + cos) of its links, and slips
-    body = np.sin(angles.link) * sizes.link * (1.0 - np.cos(angles.link))
+    body = np.sin(angles.link) * sizes.link * _dip(angles.link)
     rest = 0.5 * (body[:, pairs[:, 0]] + body[:, pairs[:, 1]]) + slips[:, kept] * lean**2
     for place in layout.rails:
         rest[:, place] += sizes.way[:, kept[place]] * _rise(angles, kept[place])
     lift = rest @ np.abs(layout.incidence).T
     changes = (value * _ROUNDING for value in (moved_r, along, shift, moved_about, lift, wide))
     return Neglected._make([*changes, narrow, play, np.asarray(sound & small)])
+
+
+def _dip(angle: Any) -> Any:
+    """One less the cosine, with a small relative error at small angles too."""
+    return 2.0 * np.sin(0.5 * angle) ** 2
 
 
 def _shift(angles: _Angles, k: int) -> Array:
@@ -157,7 +162,7 @@ def _rise(angles: _Angles, k: int) -> Array:
     it, where w is the travel in the plane of the link and h the horizontal part of its normal.
     """
     alpha, own, change = float(angles.seat[k]), angles.link[:, angles.base[k]], _shift(angles, k)
-    less = 1.0 - np.cos(own)
+    less = _dip(own)
     aslant = (alpha + change) * (less + np.sin(alpha) * np.sin(own)) + np.sin(alpha) * less
     return np.asarray(change + alpha**3 * (1.0 / 2.0 + 1.0 / 6.0) + aslant)
 
@@ -232,7 +237,7 @@ def _disturbances(system: Positions, angles: _Angles, sizes: _Sizes, offset: Arr
     at most half of ``x y (1 + small)``: the area of a spherical triangle.
     """
     mechanism = system.mechanism
-    short = sizes.link * (1.0 - np.cos(angles.link))
+    short = sizes.link * _dip(angles.link)
     driven = {driver.pair for driver in mechanism.drivers}
     parents = {edge.joint: edge.parent for edge in system.edges}
     twist = np.zeros_like(offset)
@@ -240,7 +245,7 @@ def _disturbances(system: Positions, angles: _Angles, sizes: _Sizes, offset: Arr
         first, second = angles.link[:, joint.a], angles.link[:, joint.b]
         before = parents.get(k)
         if sizes.sine[k] > 0.0:  # the rail is shorter in the plane of its link, and what it lifts leans with that
-            offset[:, k] += sizes.way[:, k] * (1.0 - np.cos(angles.seat[k]) + sizes.sine[k] * np.sin(first))
+            offset[:, k] += sizes.way[:, k] * (_dip(angles.seat[k]) + sizes.sine[k] * np.sin(first))
         offset[:, k] += short[:, joint.a] + short[:, joint.b] if before is None else short[:, before]
         if isinstance(joint, Gear):
             twist[:, k] = (first + second) ** 2

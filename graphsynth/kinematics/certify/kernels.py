@@ -418,6 +418,32 @@ def room_for(n, box):
 
 
 @kernel
+def begin(task, box, state, Lc, room):
+    """Prove the first node, beside the given poses, unless there is one; `DONE`, or why not."""
+    if state[NODES] > 0.0:
+        return DONE
+    if not count_turns(task, box[CENTRE]):
+        return UNKNOWN
+    if not node(task, state[AT], Lc, room):
+        return STUCK
+    apart(task, box, state[AT], room.node, state[AT], state[AT], room.gap)
+    if not within(task, room.gap, room.node[RADIUS]):
+        return STUCK
+    keep(room.node, box)
+    state[NODES] = 1.0
+    return DONE
+
+
+@kernel
+def shortest_step(task, Lc):
+    """Return the shortest step of the driver; those of a slide are lengths."""
+    for r in range(task.rows.shape[0]):
+        if task.rows[r, 0] == DRIVE_SLIDE and int(task.p[r, SLOT]) == task.driver:
+            return SHORTEST * Lc
+    return SHORTEST
+
+
+@kernel
 def march(rows, p, frame, inputs, driver, goal, Lc, turns, box, state, limit):
     """Prove box after box until the driver is at its goal.
 
@@ -427,24 +453,11 @@ def march(rows, p, frame, inputs, driver, goal, Lc, turns, box, state, limit):
     node that was kept the other way.  ``limit``: tests in all; with 0 only the first node is proved.
     """
     task = Task(rows, p, frame, turns, inputs, driver)
-    n = rows.shape[0]
-    if state[NODES] == 0.0 and not count_turns(task, box[CENTRE]):
-        return UNKNOWN
-    room = room_for(n, box)
-    # the first node, beside the given poses
-    if state[NODES] == 0.0:
-        if not node(task, state[AT], Lc, room):
-            return STUCK
-        apart(task, box, state[AT], room.node, state[AT], state[AT], room.gap)
-        if not within(task, room.gap, room.node[RADIUS]):
-            return STUCK
-        keep(room.node, box)
-        state[NODES] = 1.0
-    # steps of a slide are lengths
-    shortest = SHORTEST
-    for r in range(n):
-        if rows[r, 0] == DRIVE_SLIDE and int(p[r, SLOT]) == driver:
-            shortest = SHORTEST * Lc
+    room = room_for(rows.shape[0], box)
+    code = begin(task, box, state, Lc, room)
+    if code != DONE:
+        return code
+    shortest = shortest_step(task, Lc)
     # from node to node: longer steps while boxes are proved, shorter ones where not
     while state[AT] != goal:
         if state[TESTED] >= limit:

@@ -15,7 +15,7 @@
 
   Bench.Jamming = class {
     constructor(app, place) {
-      Object.assign(this, { app, place, on: false, module: null, seats: null, sheet: null, over: null, now: null });
+      Object.assign(this, { app, place, on: false, module: null, seats: null, sheet: null, over: null, now: null, proof: null });
       Object.assign(this, { joint: null, alpha: 1 * DEGREE, direction: 0, tilt: 0.5 * DEGREE, end: 0 });
       app.on("sheet rest tool", () => this.build());
       app.on("pose sheet rest view", () => this.show());
@@ -39,14 +39,17 @@
         const driven = driver ? this.data.joints.findIndex(j => [j.a, j.b].includes(driver.base) && [j.a, j.b].includes(driver.link)) : -1;
         this.joint = driven >= 0 ? driven : known[0];
       }
-      const limits = this.data.joints.map(({ kind }) => ({ R: { tilt: this.tilt, end: this.end } })[kind] ||
+      const limits = this.limits = this.data.joints.map(({ kind }) => ({ R: { tilt: this.tilt, end: this.end } })[kind] ||
         (kind === "P" || kind === "pin-slot" ? { roll: this.tilt, pitch: this.tilt, end: this.end } : null));
-      this.seats = Binding.open(this.module, this.data, limits, { joint: this.joint, alpha: this.alpha, direction: this.direction, base: this.base });
+      this.leaning = { joint: this.joint, alpha: this.alpha, direction: this.direction, base: this.base };
+      this.seats = Binding.open(this.module, this.data, limits, this.leaning);
       return this.seats;
     }
     close() {
       if (this.seats) this.seats.close();
-      Object.assign(this, { seats: null, over: null, now: null });
+      // a proof of what is no longer asked is given up
+      if (this.proof && !this.proof.found) this.app.work.stop();
+      Object.assign(this, { seats: null, over: null, now: null, proof: null });
     }
     /** The judgement over the whole motion. */
     whole() {
@@ -95,7 +98,9 @@
           Bench.field(app, "jam.limit", shown(this.tilt), text => this.set({ tilt: angle(text) }), { unit: "°" }),
           Bench.field(app, "jam.end", String(this.end), text => this.set({ end: length(text, app.sheet.unit) }), { unit: app.sheet.unit }),
           this.answer = make("div", { id: "jammed", "aria-live": "polite" }), this.summary(),
-          make("div", { class: "acts" }, Bench.button("jam.prove", () => this.prove(), { "data-prove": true })));
+          ...this.proved(),
+          make("div", { class: "acts" }, Bench.button(this.proof && !this.proof.found ? "jam.stop" : "jam.prove", () => this.prove(), { "data-prove": true }),
+            Bench.button("jam.python", () => this.python(), { "data-program": true })));
       }
       place.replaceChildren(...parts.filter(Boolean));
       this.show();
@@ -153,9 +158,36 @@
       return [svg("path", { class: "leans", d: Bench.pathOf([[x, y], tip]) }), grip];
     }
 
-    /** The program that proves it with the library. */
-    prove() {
-      Bench.showPython(this.open().python(), "python.prove", "prove.py");
+    /** The proof over the whole motion, in the worker; where its kernels do not know a joint, the library's program. */
+    async prove() {
+      const { app, motion, data } = this;
+      if (this.proof && !this.proof.found) { this.proof = null; app.work.stop(); app.changed("rest"); return; }
+      const seats = this.open(), swept = motion.driven && !seats.fault ? motion.sweep() : null, own = { found: null, swept };
+      if (!swept || this.data.drivers.length !== 1) { this.python(); return; }
+      const { inputs } = swept, turns = swept.full && swept.turns < Infinity ? swept.turns : 0;
+      const asked = { pose: Array.from(motion.engine.pose), driver: motion.driver, from: inputs[0], to: inputs[inputs.length - 1], turns, limits: this.limits, tilt: this.leaning };
+      if (app.work.busy) app.work.stop();
+      this.proof = own;
+      app.changed("rest");
+      app.say("said.proving", { share: 0 });
+      const found = await Bench.job(app, ["proof.wasm", "binding.wasm"], "binds", [data, asked], share => app.say("said.proving", { share: Math.round(100 * share) }));
+      if (this.proof !== own) return;
+      this.proof = found && found.known ? { found, swept } : null;
+      if (found && !found.known) this.python();
+      if (this.proof) app.say(`said.jam.${found.verdict}`);
+      app.changed("rest");
+    }
+
+    /** The library's program for the same question. */
+    python() { Bench.showPython(this.open().python(), "python.prove", "prove.py"); }
+
+    /** What is proved, in words; shares are rounded down. */
+    proved() {
+      const { found, swept } = this.proof || {};
+      if (!found || !this.motion.driven || this.motion.sweep() !== swept) return [];
+      const share = value => Bench.shown(Math.floor(1000 * value) / 10);
+      const text = Bench.word(`jam.proved.${found.verdict}`, { free: share(found.free), binds: share(found.binds), at: found.at === null ? "" : Bench.shownInput(this.motion, found.at) });
+      return [make("p", { id: "jamProved", class: found.verdict === "free" ? "" : "warn" }, text), make("p", { class: "soft" }, Bench.word("jam.model", { n: found.pieces.length }))];
     }
   };
 })();

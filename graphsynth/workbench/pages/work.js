@@ -47,6 +47,10 @@ const Work = (() => {
     async prove([data, asked], tell) {
       return Proving.found(await Kernels.load("motion"), await Kernels.load("proof"), data, asked, tell);
     },
+    /* Where a tilted axis binds, proved. */
+    async binds([data, asked], tell) {
+      return Proving.binds(await Kernels.load("motion"), await Kernels.load("proof"), await Kernels.load("binding"), data, asked, tell);
+    },
   };
 
   const run = (name, args, tell = () => true) => jobs[name](args, tell);
