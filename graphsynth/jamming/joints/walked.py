@@ -6,6 +6,7 @@ If it decides everything, the certificate is that of the walk; else the search o
 
 from __future__ import annotations
 
+import os
 from functools import cache
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -118,8 +119,8 @@ class Walk:
 
 @cache
 def compiled() -> bool:
-    """Whether the walk is in the library of kernels: to compile it takes longer than a search."""
-    return any(name == f"{_KERNEL}.walk" for name, _, _ in contents())
+    """Whether the walk is in the library of kernels, or recorded for it: to compile it takes longer than a search."""
+    return "GRAPHSYNTH_RECORD" in os.environ or any(name == f"{_KERNEL}.walk" for name, _, _ in contents())
 
 
 def walked(work: Work, resolution: float, max_pieces: float, seconds: float) -> Found | None:
