@@ -296,6 +296,14 @@ def test_bad_questions() -> None:
         embody(CYCLE, tries=0)
 
 
+@pytest.mark.parametrize(("angle", "ratio", "why"), [(1.4, 50.0, "transmission angle"), (0.1, 1.2, "length ratio")])
+def test_the_reason_named_first_is_that_of_the_best_result(angle: float, ratio: float, why: str) -> None:
+    found = embody(chains(6)[0], Goals(min_transmission_angle=angle, max_length_ratio=ratio), tries=1, effort=0.05)
+    assert not found.accepted and found.figures is not None and all(count > 0 for count in found.reasons.values())
+    assert next(iter(found.reasons)).startswith(f"result: the {why} is")
+    assert (found.figures.transmission_angle < angle) == (why == "transmission angle")
+
+
 # --- transmission of larger groups
 
 

@@ -219,7 +219,8 @@ class Embodiment(Shown):
         Its motion over the range.
     figures : Figures or None
     reasons : dict of str to int
-        Why candidates were rejected, counted: of each first population, and of every result verified.
+        Why candidates were rejected, counted: of each first population, and of every result verified; that of the
+        best result first.
     statement : str
     goals : Goals
     seed : int
@@ -429,7 +430,7 @@ class _Run:
                     mechanism,
                     motion,
                     figures,
-                    {},
+                    {f"result: {reason}": 1 for reason in why},
                     "",
                     self.goals,
                     self.seed,
@@ -454,7 +455,8 @@ class _Run:
         best, tries = self.best[1], len(self.found)
         frame = "" if best.graph.frame is None else f"frame {best.graph.frame}, "
         choice = f"{frame}drivers {', '.join(f'{a}-{b}' for a, b in best.drivers)}"
-        reasons = {reason: count for reason, count in self.reasons.items() if count}
+        ordered = *best.reasons, *self.reasons  # why the best is not accepted comes first
+        reasons = {reason: self.reasons[reason] for reason in ordered if self.reasons[reason]}
         if best.accepted and best.figures is not None:
             text = (
                 f"accepted after {tries} search{'es' * (tries > 1)}: {choice}; smallest transmission angle "
