@@ -9,7 +9,7 @@ lower vertex to the higher one.  In a mechanism whose frame is a binary link, on
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise, product
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import TooLargeError
 from graphsynth.synthesis.kernels.layout import (
     BETWEEN_LINKS,
+    BETWEEN_PINS,
     COPIES_MASK,
     GIRTH,
     KIND_SHIFT,
@@ -70,10 +71,10 @@ class EdgeLabel:
             return EdgeLabel((paths[0], *sorted(paths[1:])), len(paths[0]) - self.mark)
         return EdgeLabel(tuple(sorted(paths)), 0)
 
-    def cover(self, rules: int) -> int:
+    def cover(self, rules: int, length: Callable[[PathType], int]) -> int:
         """Return what the label gives to links and loops: see ``graphsynth.synthesis.kernels.covers``."""
         if rules >> GIRTH:
-            shortest = min(map(len, self.paths))
+            shortest = min(map(length, self.paths))
             return (shortest == 1) + 4 * min(LONGEST, shortest)
         low, high = (any(path[end] != SLIDER for path in self.paths) for end in (0, -1))
         fewest = min(len(path) - path.count(SLIDER) for path in self.paths)
@@ -169,9 +170,13 @@ class EdgeLabels:
     def _girth(self) -> int:
         return self.rules >> GIRTH & LONGEST
 
-    def _turns(self, paths: tuple[PathType, ...]) -> bool:
+    def _length(self, ends: int) -> Callable[[PathType], int]:
+        """Return what measures paths in joints; among multiple joints in halves, of which one counts at an end."""
+        return (lambda path: 2 * len(path) - min(ends, BETWEEN_PINS)) if self.pins else len
+
+    def _turns(self, paths: tuple[PathType, ...], ends: int) -> bool:
         """Tell whether every loop of two of the paths has two revolute joints, if it has to, or is long enough."""
-        if len(paths) > 1 and sum(sorted(map(len, paths))[:2]) < self._girth:
+        if len(paths) > 1 and sum(sorted(map(self._length(ends), paths))[:2]) < self._girth:
             return False
         fewest = sorted(len(path) - path.count(SLIDER) for path in paths)[:2]
         return not self.rules & NO_SLIDING_LOOP or len(paths) == 1 or sum(fewest) >= 2
@@ -191,7 +196,7 @@ class EdgeLabels:
                 weight = max(0, self.space - freedom(path))
                 for paths in self._multisets(multiplicity - 1, 0, self._cost(path), weight, False):
                     found.extend(EdgeLabel((path, *paths), mark) for mark in range(1, len(path)))
-        found = [label for label in found if self._fits_ends(label.paths, ends) and self._turns(label.paths)]
+        found = [label for label in found if self._fits_ends(label.paths, ends) and self._turns(label.paths, ends)]
         if len(found) > _MAX_LABELS:
             raise TooLargeError(
                 f"{len(found)} kinds of {multiplicity} parallel paths (bound {_MAX_LABELS}): "
@@ -275,12 +280,14 @@ class EdgeLabels:
         for limit in self.limits[:-1]:
             steps.append(steps[-1] * (limit + 1))
         shifts = range(0, _DIGIT * len(steps), _DIGIT)
-        alike, covers = [], []
+        alike = []
         for label in self.flat:
             cost = self.cost(label)
             packed = sum(c << shift for c, shift in zip(cost, shifts))
             alike.append((self.weight(label), sum(c * step for c, step in zip(cost, steps)), packed))
-            covers.append(label.cover(self.rules) if self.rules else 0)
+        lengths = [self._length(kind // 2 >> KIND_SHIFT) for kind, labels in enumerate(self.by_kind) for _ in labels]
+        asked = self.rules & ~CYLINDERS  # else nothing needs what labels give
+        covers = [label.cover(self.rules, length) if asked else 0 for label, length in zip(self.flat, lengths)]
         reverse: list[int] = []
         kinds, group_kinds = [], []
         groups: list[tuple[int, ...]] = []

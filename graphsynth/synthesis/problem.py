@@ -95,14 +95,18 @@ class EnumerationProblem:
                 f"{self.title}: wishes speak of loops and of links by their joints, which the axes of a gear train do "
                 "not have: list the trains, and choose"
             )
-        others = any(family.pins or family.rules & (NO_SLIDING_LINK | NO_SLIDING_LOOP) for family in self.families)
-        rules = 0 if others else wishes.rules  # the search has no room for needs of two kinds
+        rules, searched = wishes.rules, wishes.is_searched
+        if any(family.pins for family in self.families):
+            rules = wishes.rules_of_pins
+            searched = rules > 0 and wishes == Wishes(wishes.girth)
+        if any(family.rules & (NO_SLIDING_LINK | NO_SLIDING_LOOP) for family in self.families):
+            rules, searched = 0, False  # the search has no room for needs of two kinds
         return replace(
             self,
             title=f"{self.title} {wishes}".strip(),
             families=tuple(replace(family, rules=family.rules | rules) for family in self.families),
             one_by_one=tuple(replace(item, wishes=wishes) for item in self.one_by_one if isinstance(item, OneByOne)),
-            wishes=None if wishes.is_searched and not others else wishes,
+            wishes=None if searched else wishes,
         )
 
     @classmethod

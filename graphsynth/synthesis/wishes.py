@@ -1,8 +1,8 @@
 """Wishes besides the numbers of links and joints: what a chain as a whole is to be like.
 
 The length of the shortest loop, and links that share a joint or not, are needs of the search and of counts.  The others
-are asked of each chain as it is listed: no list is kept, but a count makes every chain.  So are all wishes for chains
-with multiple joints, and for those with prismatic joints unless each is a cylinder's.
+are asked of each chain as it is listed: no list is kept, but a count makes every chain.  So are all wishes but
+the girth for chains with multiple joints, and all for those with prismatic joints unless each is a cylinder's.
 """
 
 from __future__ import annotations
@@ -102,6 +102,11 @@ class Wishes:
         for place, (one, other, apart) in enumerate(self._searched):
             rules |= (one | other << 4 | apart << 8) << (PAIRS + PAIR * place)
         return rules
+
+    @property
+    def rules_of_pins(self) -> int:
+        """The same for chains with multiple joints: the girth, up to 7, in halves of a joint."""
+        return 2 * self.girth << GIRTH if 3 < self.girth <= LONGEST // 2 else 0
 
     @property
     def _searched(self) -> list[tuple[int, int, bool]]:

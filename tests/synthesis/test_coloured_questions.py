@@ -134,6 +134,25 @@ def test_wishes_for_cylinders_are_counted_without_a_list():
     assert EnumerationProblem.sliders(9, 2, 2, False, False, False, True).wishing(Wishes(girth=5)).wishes
 
 
+@pytest.mark.parametrize(
+    ("links", "mobility", "framed", "girths"),
+    [
+        (9, 2, False, {4: 174, 5: 10}),
+        pytest.param(9, 2, True, {5: 56, 6: 0}, marks=pytest.mark.long),
+        pytest.param(10, 3, False, {4: 463, 5: 67, 6: 0}, marks=pytest.mark.long),
+    ],
+)
+def test_girth_of_multiple_joints_is_counted_without_a_list(links, mobility, framed, girths):
+    """In halves of a joint, which paths between multiple joints have less of."""
+    chains = list(enumerate_multiple_joint_chains(links, mobility, framed=framed))
+    for girth, number in girths.items():
+        wish = Wishes(girth=girth)
+        assert EnumerationProblem.multiple_joints(links, mobility, None, framed=framed).wishing(wish).wishes is None
+        assert count_multiple_joint_chains(links, mobility, framed=framed, wishes=wish) == number
+        listed = [chain.key for chain in enumerate_multiple_joint_chains(links, mobility, framed=framed, wishes=wish)]
+        assert sorted(listed) == sorted(chain.key for chain in chains if wish.fit(chain)) and len(listed) == number
+
+
 @pytest.mark.long
 def test_wishes_for_multiple_joints():
     """A wish of each kind that tells chains of eight or nine links apart."""
