@@ -151,17 +151,22 @@ class Engine:
         """Return the questions that run what is changed, first those that noticed changes of the same function."""
         asked = questions.of_the_second_count() if path == SECOND else questions.of_the_engine()
         asked = [one for one in asked if not change or self.runs[one[0]] & changed]
-        best = self.by.get((path.stem, change.function), Counter()) if change else Counter()
-        return sorted(asked, key=lambda one: -best[one[0]] / (0.1 + self.usual.get(one[0], 0.0)))
+        noticed = {one[0]: self._noticed(path, change, one[0]) for one in asked}
+        return sorted(asked, key=lambda one: (-noticed[one[0]], self.usual.get(one[0], 0.0)))
+
+    def _noticed(self, path: Path, change: Change | None, question: str) -> float:
+        """How many changes of the function, and of its module, a question noticed, for its time."""
+        function = self.by.get((path.stem, change.function if change else ""), Counter())
+        alike = function[question] + 0.1 * self.by.get((path.stem, ""), Counter())[question]
+        return alike / (0.05 + self.usual.get(question, 0.0))
 
     def answer(self, path: Path, change: Change | None) -> dict[str, float] | str:
         """Return the first question that is answered wrongly, or the seconds that each took."""
-        source = path.read_text("utf-8")
-        changed = self.change(path, change.applied(source)) if change else set()
+        changed = self.change(path, change.applied(path.read_text("utf-8"))) if change else set()
         seconds = {}
         for name, question, right in self.questions(path, change, changed):
             begin = time.process_time()
-            signal.setitimer(signal.ITIMER_PROF, 1 + 4 * self.usual.get(name, 4.0))
+            signal.setitimer(signal.ITIMER_PROF, 0.5 + 3 * self.usual.get(name, 10.0))
             try:
                 if (found := question()) != right:
                     return f"{name}: {found}"
@@ -185,10 +190,11 @@ class Engine:
                 fork.say(self.answer(path, change))
         by = "no answer" if fork.said is None else fork.said
         if isinstance(by, dict):
-            self.usual = by if change is None else self.usual
+            self.usual.update(by if change is None else {})
             by = ""
         elif change:
-            self.by.setdefault((path.stem, change.function), Counter())[by.partition(":")[0]] += 1
+            for function in (change.function, ""):
+                self.by.setdefault((path.stem, function), Counter())[by.partition(":")[0]] += 1
         place = {"module": str(path.relative_to(ROOT)), "status": "killed" if by else "survived", "by": by}
         return {**(vars(change) if change else {}), **place, "seconds": round(time.monotonic() - begin, 1)}
 
@@ -232,7 +238,7 @@ def main() -> int:
     warnings.simplefilter("ignore")
     _interpret()
     engine = Engine(MODULES)
-    for path in (SECOND, MODULES[0]):
+    for path in (SECOND, ENGINE):
         if wrong := engine.judge(path, None)["by"]:
             print(f"the code as it is answers wrongly: {wrong}")
             return 1

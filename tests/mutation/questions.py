@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from fractions import Fraction
+from io import StringIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -155,6 +159,46 @@ def of_the_second_count() -> list[Question]:
     def fractionated(mobility: int, *links: int) -> list[int]:
         return [second.with_fractionated(n, mobility) for n in links]
 
+    def graphs(n: int) -> list[int]:
+        clusters = second.Clusters(n, n * (n - 1) // 2)
+        kept = {p: clusters.all(tuple((length, (1,)) for length in p)) for p in second.partitions(n, n)}
+        numbers = range(clusters.most + 1)
+        return [second.mean({p: clusters.coefficient(own, i) for p, own in kept.items()}) for i in numbers]
+
+    def connected(links: int, most: int) -> list[tuple[int, int, Fraction]]:
+        sums: Counter[tuple[int, int]] = Counter()
+        for cycles, numbers in second.connected(second.Clusters(links, most), links).items():
+            for joints, number in numbers.items():
+                sums[sum(cycles), joints] += number  # type: ignore[assignment]
+        return sorted((n, i, number) for (n, i), number in sums.items() if number)
+
+    def pairs() -> list[int]:
+        every = (second.pair_orbits(p) for p in second.partitions(6, 6))
+        return sorted({sum(length * number for length, number in orbits.items()) for orbits in every})
+
+    def written() -> list[str]:
+        with TemporaryDirectory() as folder, redirect_stdout(StringIO()) as said:
+            path = Path(folder, "kept")
+            second.main(8, path)
+            lines = path.read_text("utf-8").splitlines(keepends=True)
+            path.write_text("".join(lines[:9])[:-2], "utf-8")  # in the middle of a number
+            second.main(8, path)
+            clusters = second.Clusters(8, 10)
+            right = second.read(path) == {p: second.kept_by(clusters, p) for p in second.partitions(8, 8)}
+            return [said.getvalue(), str(right and path.read_text("utf-8") == "".join(lines))]
+
+    trees = [
+        (1, 0, 1),
+        (2, 1, 1),
+        (3, 2, 1),
+        (4, 3, 2),
+        (4, 4, 1),
+        (5, 4, 3),
+        (5, 5, 2),
+        (6, 5, 6),
+        (6, 6, 6),
+        (6, 7, 2),
+    ]
     return [
         ("second chains", lambda: [second.chains(n) for n in (4, 6, 8)], [1, 2, 16]),
         ("Laman graphs", lambda: [second.chains(n, 2) for n in (3, 4, 5, 6, 7)], [1, 1, 3, 13, 70]),
@@ -162,4 +206,9 @@ def of_the_second_count() -> list[Question]:
         ("second fractionated", lambda: fractionated(2, 5, 7, 9), [1, 4, 40]),
         ("second three freedoms", lambda: fractionated(3, 6, 8), [1, 7]),
         ("no joints", lambda: fractionated(1, 7), [0]),
+        ("graphs", lambda: [graphs(4), sum(graphs(5)), sum(graphs(6))], [[1, 1, 2, 3, 2, 1, 1], 34, 156]),
+        ("pairs", pairs, [15]),
+        ("connected without joints", lambda: connected(14, 0), [(1, 0, 1)]),
+        ("connected", lambda: connected(6, 7), trees),
+        ("written", written, ["16\n16\n", "True"]),
     ]

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import tomllib
+from collections import Counter
 from pathlib import Path
 
+import brute_force
+import networkx as nx
 import pytest
 import rigid_clusters
 
@@ -56,3 +59,26 @@ def test_permutations_of_links_give_all_chains_with_fractionated_ones(mobility, 
 def test_loops_of_chains_that_do_not_exist():
     assert rigid_clusters.with_fractionated(7, 1) == 0
     assert rigid_clusters.with_fractionated(6, 1) == 2
+
+
+def test_connected_graphs_are_those_of_networkx():
+    """All connected graphs without rigid sets of up to six links, trees and loose ends included, by joints."""
+    clusters = rigid_clusters.Clusters(6, 7)
+    found, wanted = Counter(), Counter()
+    for cycles, numbers in rigid_clusters.connected(clusters, 6).items():
+        for joints, number in numbers.items():
+            found[sum(cycles), joints] += number
+    for graph in nx.graph_atlas_g():
+        if 2 <= len(graph) <= 6 and nx.is_connected(graph):
+            joints = [(a, b, 1) for a, b in graph.edges]
+            if brute_force.worst_subset(len(graph), joints, 3) > 0:
+                wanted[len(graph), len(joints)] += 1
+    wanted[1, 0] = 1
+    assert +found == wanted
+
+
+def test_without_joints_only_one_link_is_connected():
+    """The logarithm and Moebius inversion up to 14, where everything cancels."""
+    found = rigid_clusters.connected(rigid_clusters.Clusters(14, 0), 14)
+    assert [cycles for cycles, numbers in found.items() if any(numbers.values())] == [(1,)]
+    assert found[1,] == {0: 1}
