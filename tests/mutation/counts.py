@@ -108,7 +108,8 @@ class Engine:
 
     def __init__(self, paths: list[Path]) -> None:
         for path in paths:
-            import_module(_name(path))
+            if (taken := import_module(_name(path)).__file__) != str(path):
+                raise SystemExit(f"{path.stem} is imported from {taken}, not from this checkout: set PYTHONPATH={ROOT}")
         files = {str(path) for path in paths}
         self.functions: dict[tuple[str, str], list[FunctionType]] = {}
         for one in gc.get_objects():

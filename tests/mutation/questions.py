@@ -10,8 +10,10 @@ from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from unittest import mock
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graphsynth import MechanismGraph, StructuralSpec
 
@@ -74,12 +76,15 @@ def of_the_engine() -> list[Question]:
         ("not jointed", lambda: keys(gs.enumerate_chains(10, wishes=wish(apart=[(3, 4)]))), 83),
         ("holds", lambda: gs.count_chains(8, wishes=wish(without=[four])), 1),
         ("gear trains", lambda: [trains(n) for n in (5, 6)], [13, 81]),
+        ("listed trains", lambda: [keys(gs.enumerate_planetary_gear_trains(n)) for n in (4, 5)], [3, 13]),
+        ("finest axes", lambda: trains(8, 2, rotation=True), 178),
         ("rotation graphs", lambda: [trains(n, w, rotation=True) for n, w in ((5, 1), (6, 1), (6, 2))], [6, 27, 2]),
         ("roles of trains", lambda: [trains(5, framed=True), *(trains(5, drive=d) for d in ways)], [50, 109, 37]),
         ("drawn trains", _drawn_trains, True),
         ("drawn choices", _drawn_choices, True),
         ("all identities", _together, [16, 230]),
         ("splits", _splits, [1, 4, 17, 118]),
+        ("streamed", _streamed, [117, 117, True]),
         ("grown", _grown, [3, 13, 24, 38, 23, 16, 87]),
     ]  # fmt: skip
 
@@ -113,6 +118,26 @@ def _grown() -> list[int]:
         growth = make_growth(2000)
         symmetric += grow(k, graphs, len(graphs), loops, 4, 5, 8, True, growth, out, sizes, sums)
     return [*sums[3:9].tolist(), symmetric]
+
+
+def _streamed() -> list[object]:
+    """Write the graphs of five loops, seven at a time: how many, how many different, and whether each is one."""
+    from graphsynth.synthesis.contracted import contracted_graphs
+    from graphsynth.synthesis.kernels.growing import grow, make_growth
+    from graphsynth.synthesis.kernels.layout import MAX_VERTICES
+
+    found: list[NDArray[np.uint8]] = []
+    roots = [(loops, k, contracted_graphs(loops, k)) for loops in range(2, 5) for k in range(2, 2 * loops - 1)]
+    roots.append((5, 2, np.array([[[0, 6], [6, 0]]], np.uint8)))
+    for loops, k, graphs in roots:
+        growth, written = make_growth(2000), 7
+        while written == 7:
+            out, sizes = np.zeros((7, MAX_VERTICES, MAX_VERTICES), np.uint8), np.zeros(7, np.int64)
+            sums = np.zeros(MAX_VERTICES + 1, np.int64)
+            written = grow(k, graphs, len(graphs), loops, 4, 5, 8, False, growth, out, sizes, sums)
+            found += [out[i, : sizes[i], : sizes[i]] for i in range(written)]
+    right = all((g == g.T).all() and g.sum(1).min() > 2 and g.sum() == 2 * (len(g) + 4) for g in found)
+    return [len(found), len({g.tobytes() for g in found}), right]
 
 
 def _drawn_trains() -> bool:
@@ -187,6 +212,14 @@ def of_the_second_count() -> list[Question]:
             right = second.read(path) == {p: second.kept_by(clusters, p) for p in second.partitions(8, 8)}
             return [said.getvalue(), str(right and path.read_text("utf-8") == "".join(lines))]
 
+    def asked(kept: int) -> tuple[str, int]:
+        """What is printed, and how many kinds of permutation are asked for, if each kept so many."""
+        calls: list[object] = []
+        with TemporaryDirectory() as folder, redirect_stdout(StringIO()) as said:
+            with mock.patch.object(second, "kept_by", lambda *of: calls.append(of) or kept):
+                second.main(6, Path(folder, "kept"))
+            return said.getvalue(), len(calls)
+
     trees = [
         (1, 0, 1),
         (2, 1, 1),
@@ -210,5 +243,6 @@ def of_the_second_count() -> list[Question]:
         ("pairs", pairs, [15]),
         ("connected without joints", lambda: connected(14, 0), [(1, 0, 1)]),
         ("connected", lambda: connected(6, 7), trees),
+        ("asked for", lambda: [asked(1), asked(0)], [("1\n", 11), ("0\n", 1)]),
         ("written", written, ["16\n16\n", "True"]),
     ]
