@@ -42,7 +42,8 @@ KERNELS += ("growing", "listing", "moving", "splitting", "variables")
 SECOND = ROOT / "tests/synthesis/rigid_clusters.py"
 MODULES = [*(ENGINE / f"{name}.py" for name in NAMES), *(ENGINE / "kernels" / f"{name}.py" for name in KERNELS), SECOND]
 #: What only estimates work or room, chooses between two ways to count, or is not counted here.
-BESIDE = {"work", "weigh_block", "_visited", "_least", "_stays", "labellings", "_ways", "_known_ways", "_costs", "weight",
+BESIDE = {"work", "weigh_block",
+          "_visited", "_least", "_stays", "labellings", "_ways", "_known_ways", "_costs", "weight",
           "make_work", "open_fixed", "decode_fixed", "_nth_label", "expand_text", "_put_number", "_put_plain",
           "_lay_pairs", "_is_ordered", "_smallest_sets_first", "refine",
           "is_counted_together", "totals_of", "_search_order", "identity_sums"}  # fmt: skip

@@ -105,7 +105,7 @@ def _in_parts(shipped: int) -> int:
     from graphsynth.synthesis.families import chain_families
 
     families = tuple(chain_families(10, 1, 3, {}, False))
-    with mock.patch.multiple(totals, SHIPPED_LOOPS=shipped, GROWN_LOOPS=shipped + 1, _GRAPHS=5, _ROOTS=5):
+    with mock.patch.multiple(totals, SHIPPED_LOOPS=shipped, GROWN_LOOPS=shipped + 1, _GRAPHS=2, _ROOTS=2):
         return int(sum(part.count() for part in totals._totals.__wrapped__(families)))
 
 
