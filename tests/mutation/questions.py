@@ -21,6 +21,7 @@ __all__ = ["Question", "of_the_engine", "of_the_second_count"]
 
 Question = tuple[str, Callable[[], Any], Any]
 LEVELS: list[dict[int, Any]] = [{-1: 1}, {3: 2}, {2: (3, None)}]
+ROLES: list[dict[str, Any]] = [{}, {"framed": True}, {"drive": "any"}, {"drive": "coaxial"}]
 SAMPLED = ["1CAvElhAw", "1CAvIkEjQ", "1CAvQWghQ"]  # by the same draws always
 
 
@@ -29,6 +30,7 @@ def of_the_engine() -> list[Question]:
     import graphsynth as gs
 
     trains, ways = gs.count_planetary_gear_trains, ("any", "coaxial")
+    listed = gs.enumerate_planetary_gear_trains
     four = MechanismGraph.from_text("Cl")
     wish, eight = gs.Wishes, StructuralSpec(W=1, links=8)
 
@@ -81,6 +83,8 @@ def of_the_engine() -> list[Question]:
         ("rotation graphs", lambda: [trains(n, w, rotation=True) for n, w in ((5, 1), (6, 1), (6, 2))], [6, 27, 2]),
         ("roles of trains", lambda: [trains(5, framed=True), *(trains(5, drive=d) for d in ways)], [50, 109, 37]),
         ("drawn trains", _drawn_trains, True),
+        ("urns", _urns, [3, 8, 10, 3]),
+        ("listed roles", lambda: [sum(1 for _ in listed(5, **asked)) for asked in ROLES], [13, 50, 109, 37]),
         ("drawn choices", _drawn_choices, True),
         ("all identities", _together, [16, 230]),
         ("in parts", lambda: [_in_parts(shipped) for shipped in (3, 4)], [230, 230]),
@@ -105,7 +109,7 @@ def _in_parts(shipped: int) -> int:
     from graphsynth.synthesis.families import chain_families
 
     families = tuple(chain_families(10, 1, 3, {}, False))
-    with mock.patch.multiple(totals, SHIPPED_LOOPS=shipped, GROWN_LOOPS=shipped + 1, _GRAPHS=2, _ROOTS=2):
+    with mock.patch.multiple(totals, SHIPPED_LOOPS=shipped, GROWN_LOOPS=shipped + 1, _GRAPHS=2, _ROOTS=1):
         return int(sum(part.count() for part in totals._totals.__wrapped__(families)))
 
 
@@ -188,6 +192,20 @@ def _drawn_choices() -> bool:
             if chances != {chosen: Fraction(1, len(wanted)) for chosen in wanted}:
                 return False
     return True
+
+
+def _urns() -> list[Fraction]:
+    """Sum the orbits of all urns, each by the chance that what is drawn is a train: trains of four links by roles."""
+    from gear_symmetries import every_draw
+
+    from graphsynth.synthesis.geared_trees import geared_trees
+
+    sums = [Fraction(0)] * 4
+    for roles in range(4):
+        for item in geared_trees(4, False, 1, roles):
+            for orbits, draw in item.urns():
+                sums[roles] += orbits * sum(chance for train, chance in every_draw(draw) if train is not None)
+    return sums
 
 
 def of_the_second_count() -> list[Question]:
