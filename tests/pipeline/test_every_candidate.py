@@ -6,6 +6,7 @@ import copy
 import tomllib
 from collections import Counter
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,23 @@ def test_a_mechanism_that_moves_badly_is_told_apart_from_one_that_does_not() -> 
     scene["outputs"]["products"] = ["records"]
     (record,) = execute(Scene.from_mapping(scene))["records"]
     assert record.status == "rejected" and record.cause == "embody: moves, but the transmission angle is too small"
+
+
+def test_what_cannot_move_is_told_to_be_over_constrained() -> None:
+    """A truss, and a loose loop on four links that are braced twice."""
+    braced = MechanismGraph(
+        11, [*combinations(range(4), 2), (0, 4), *((k, k + 1) for k in range(4, 10)), (1, 10)], frame=0
+    )
+    scene = tables("worked_example") | {"structure": {"graphs": ["Bw f0", braced.to_text()]}}
+    scene["outputs"]["products"] = ["records"]
+    truss, loose = execute(Scene.from_mapping(scene))["records"]
+    for record in (truss, loose):
+        assert record.status == "rejected" and record.cause == "embody: over-constrained"
+        assert record.reason.endswith("it moves with special dimensions, if at all")
+    assert "mobility 0: nothing moves" in truss.reason
+    assert loose.reason.startswith(
+        "over-constrained: links 0, 1, 2, 3 form an over-constrained sub-chain of mobility -3"
+    )
 
 
 @pytest.mark.long

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.core.errors import GraphsynthError
+from graphsynth.core.errors import GraphError, GraphsynthError
 from graphsynth.pipeline.planar.tables import (
     BearingsTable,
     EmbodyTable,
@@ -103,7 +103,14 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
     own = table.embody
     goals = replace(goals_of(own), **_symmetry(context, design.graph) if own.symmetric else {})
     seed = context.scene.scene.seed
-    found = search(design.graph, goals, seed, joints=own.pairs, tries=own.tries, effort=own.effort)
+    try:
+        found = search(design.graph, goals, seed, joints=own.pairs, tries=own.tries, effort=own.effort)
+    except GraphError as why:  # whatever its dimensions, unless they are special ones
+        part = design.graph.rigid_subchain()
+        if part is None and design.graph.mobility > 0:
+            raise
+        told = f"{part}; " if part else ""
+        raise Rejected("over-constrained", f"{told}{why}: it moves with special dimensions, if at all") from why
     if not found.accepted or found.mechanism is None or found.figures is None:
         causes = [why.removeprefix("result: ") for why in found.reasons if why.startswith("result: ")]
         error = found.figures.goal_error if found.figures is not None else math.nan
