@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 import time
@@ -153,7 +154,12 @@ def prove_that_it_binds(person, downloads):
     fill(person, "binding", "jam.alpha", "3")
     person.script("document.querySelector('[data-prove]').click()")
     person.until("return document.getElementById('jamProved')", seconds=60)
-    assert text(person, "jamProved").startswith("Proved: it binds in")
+    assert text(person, "jamProved").startswith("Proved: it binds everywhere in the motion, most at 3")
+    fill(person, "binding", "jam.alpha", "1.2")
+    person.script("document.querySelector('[data-prove]').click()")
+    person.until("return document.getElementById('jamProved')", seconds=60)
+    shares = [float(part) for part in re.findall(r"([0-9.]+) %", text(person, "jamProved"))]
+    assert len(shares) == 2 and min(shares) > 1.0 and sum(shares) <= 100.0
     person.script("document.querySelector('[data-program]').click()")
     program = person.script("return document.getElementById('snippet').value")
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300, check=True)

@@ -186,7 +186,7 @@
       const { found, swept } = this.proof || {};
       if (!found || !this.motion.driven || this.motion.sweep() !== swept) return [];
       const share = value => Bench.shown(Math.floor(1000 * value) / 10);
-      const text = Bench.word(`jam.proved.${found.verdict}`, { free: share(found.free), binds: share(found.binds), at: found.at === null ? "" : Bench.shownInput(this.motion, found.at) });
+      const text = Bench.word(`jam.proved.${found.everywhere ? "everywhere" : found.verdict}`, { free: share(found.free), binds: share(found.binds), at: found.at === null ? "" : Bench.shownInput(this.motion, found.at) });
       return [make("p", { id: "jamProved", class: found.verdict === "free" ? "" : "warn" }, text), make("p", { class: "soft" }, Bench.word("jam.model", { n: found.pieces.length }))];
     }
   };

@@ -9,7 +9,7 @@
    What is proved: for every input in the range the joint equations (the other drivers held) have exactly one solution
    beside that branch, which is continuous, regular everywhere, and begins beside the pose.
 
-     Proving.binds(motion, proof, binding, data, asked, tell)    -> {known, verdict, free, binds, pieces, at, factor}
+     Proving.binds(motion, proof, binding, data, asked, tell)    -> {known, verdict, free, binds, everywhere, pieces, at, factor}
          data, asked: as above, with the `limits` and the `tilt` of `Binding`; binding: the module of that name
          verdict: "free" over the whole range, "binds" somewhere in it, or "undecided"; free, binds: shares of the
          range that are proved; pieces: [[low, high, lower, upper, state]]; at, factor: the middle of the
@@ -120,6 +120,7 @@ const Proving = (() => {
       const all = done && pieces.every(own => own[4] === 1), most = pieces.filter(own => own[4] === -1).reduce((a, b) => (a && a[2] >= b[2] ? a : b), null);
       return {
         known: true, verdict: most ? "binds" : all ? "free" : "undecided", free, binds: bound, pieces,
+        everywhere: done && pieces.every(own => own[4] === -1),
         at: most && 0.5 * (most[0] + most[1]), factor: most && most[2],
       };
     } finally { engine.close(); }
