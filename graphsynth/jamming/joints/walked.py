@@ -81,7 +81,7 @@ class Walk:
     """A walk from the lowest input of a motion to the highest one; ``pieces`` (N, 5) as the kernel writes them."""
 
     def __init__(self, given: JointProblem, motion: Motion, narrowest: float, most: int) -> None:
-        from graphsynth.kinematics.certify.kernels import Task
+        from graphsynth.kinematics.certify.kernels.enclosing import Task
         from graphsynth.kinematics.engine.program import equations
 
         mechanism, keep = given.mechanism, np.flatnonzero(motion.assembled)
@@ -104,7 +104,7 @@ class Walk:
     @property
     def stuck(self) -> bool:
         """Whether there is no way on."""
-        from graphsynth.kinematics.certify.kernels import LIMIT
+        from graphsynth.kinematics.certify.kernels.marching import LIMIT
 
         return self.code != LIMIT
 

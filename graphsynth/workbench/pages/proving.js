@@ -19,7 +19,7 @@
    small-tilt model, and of what exact tilts change, in every box of the branch.  Limits are the numbers given. */
 
 const Proving = (() => {
-  const PLACE = "kinematics.certify.kernels.", FIRST = 0.05, PART = 40, MOST = 200000;
+  const PLACE = "kinematics.certify.kernels.marching.", FIRST = 0.05, PART = 40, MOST = 200000;
   /* Narrowest and widest piece of a range, as in the library. */
   const WALK = "jamming.joints.kernels.walking.walk", SMALLEST = 1e-4, WIDEST = 128, PIECES = 4;
   const AT = 0, STEP = 1, NODES = 2, TESTED = 3, DONE = 0, LIMIT = 1, UNKNOWN = 3;

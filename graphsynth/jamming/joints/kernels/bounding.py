@@ -13,6 +13,7 @@ from graphsynth.core.compilation import kernel
 from graphsynth.intervals.kernels import arithmetic as ia
 from graphsynth.intervals.kernels.krawczyk import invert
 from graphsynth.intervals.kernels.nearest import hypot
+from graphsynth.intervals.kernels.pairs import minus, plus, size, thin, times
 from graphsynth.intervals.kernels.rounding import add_up, divide_both, multiply_both
 from graphsynth.jamming.joints.kernels.moving import (
     DX,
@@ -31,7 +32,6 @@ from graphsynth.jamming.joints.kernels.moving import (
     sum_of,
 )
 from graphsynth.jamming.joints.kernels.sharing import Seats, rows_of, share_pose
-from graphsynth.kinematics.certify.kernels import minus, plus, size, thin, times
 
 #: Share in which a joint that is used up may still tilt further; rounds of an enclosed solve.
 STIFF, ROUNDS = 1e-3, 3

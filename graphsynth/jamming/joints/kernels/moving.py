@@ -2,7 +2,7 @@
 
 A line is ``value + slope t`` for t within ``h`` of zero, with intervals for both: for every t there are numbers in
 them that give the quantity exactly.  What is of second order, and how far the assembly can be from the moving centre
-of its box (`graphsynth.kinematics.certify.kernels`), is in the value.  See theory/joints-that-share-a-tilt 7.
+of its box (`graphsynth.kinematics.certify.kernels.proving`), is in the value.  See theory/joints-that-share-a-tilt 7.
 """
 
 from collections import namedtuple
@@ -11,8 +11,9 @@ import numpy as np
 
 from graphsynth.core.compilation import kernel
 from graphsynth.intervals.kernels import trigonometry
+from graphsynth.intervals.kernels.pairs import around, minus, plus, size, thin, times
 from graphsynth.intervals.kernels.rounding import multiply_both
-from graphsynth.kinematics.certify.kernels import CENTRE, SPEED, around, minus, plus, size, thin, times
+from graphsynth.kinematics.certify.kernels.proving import CENTRE, SPEED
 
 #: What is asked: as `sharing.Seats`, with loops (loops, joints) and bounds ``low`` and ``high`` of the limits.
 #: ``tilts`` (joints, 5): bounds of the misalignment and of its direction in the frame of a link; that link: 1 for a,

@@ -10,21 +10,18 @@ from collections import namedtuple
 import numpy as np
 
 from graphsynth.core.compilation import kernel
-from graphsynth.intervals.kernels.krawczyk import invert
 from graphsynth.intervals.kernels.nearest import cos, hypot, sin
 from graphsynth.intervals.kernels.rounding import add_up, multiply_both
 from graphsynth.jamming.joints.kernels.moving import AX, AY, BX, BY
-from graphsynth.kinematics.certify.kernels import (
+from graphsynth.kinematics.certify.kernels.enclosing import evaluate, middle, unknown
+from graphsynth.kinematics.certify.kernels.proving import (
     CENTRE,
     LEAST,
     RADIUS,
     SPEED,
     TIGHT,
-    column,
-    evaluate,
     krawczyk,
     newton_step,
-    unknown,
     within,
 )
 from graphsynth.kinematics.engine.codes import ANGLE, DRIVE_ANGLE
@@ -127,13 +124,7 @@ def disturbed(asked, task, u, half, Lc, rest, room):
     n, box = task.rows.shape[0], rest.box
     room.spread[:] = 0.0
     evaluate(task, box[CENTRE], u, room)
-    room.J[:] = 0.0
-    for r in range(n):
-        for c in range(6):
-            _, j = column(task, r, c)
-            if j >= 0:
-                room.J[r, j] += 0.5 * (room.g[r, c, 0] + room.g[r, c, 1])
-    if not invert(room.J, room.Y):
+    if not middle(task, room):
         return False
     # the Newton step along the centre, then what the disturbances add to it
     newton_step(task, box[CENTRE], u, box[SPEED], half, room)

@@ -1,6 +1,6 @@
 """Where a mechanism with misaligned axes is free and where it binds, proved box after box along one branch; compiled.
 
-The boxes are those of `graphsynth.kinematics.certify.kernels.march`; in each the factor is bounded with small tilts,
+The boxes are those of `graphsynth.kinematics.certify.kernels.marching`; in each the factor is bounded with small tilts,
 and where that decides, with exact ones.  A box that decides nothing is halved until it is as short as is asked.
 For sharp dimensions, revolute joints, guides and pins in slots with limits, and misaligned revolute joints.
 See theory/joints-that-share-a-tilt 4, 5 and theory/jam-arcs 5.
@@ -30,9 +30,8 @@ from graphsynth.jamming.joints.kernels.neglecting import (
     limits_of,
     new_rest,
 )
-from graphsynth.kinematics.certify.kernels import (
+from graphsynth.kinematics.certify.kernels.marching import (
     AT,
-    CENTRE,
     DONE,
     GROWTH,
     LIMIT,
@@ -40,7 +39,6 @@ from graphsynth.kinematics.certify.kernels import (
     STEP,
     STUCK,
     TESTED,
-    TIGHT,
     UNKNOWN,
     begin,
     keep,
@@ -48,6 +46,7 @@ from graphsynth.kinematics.certify.kernels import (
     shortest_step,
     taken,
 )
+from graphsynth.kinematics.certify.kernels.proving import CENTRE, TIGHT
 
 #: Entry of the state of a walk after those of a march: pieces written.
 PIECES = 4
