@@ -272,11 +272,12 @@ class CurveIndex:
         return unpacked(np.concatenate(parts))
 
     def _matched(self, number: int, wanted: Wanted) -> CurveMatch | None:
-        """Move a mechanism anew and fit it; None if it does not move."""
+        """Move a mechanism anew and fit it; None if it does not move, or not to where the wanted curve begins."""
         entry = self.entry(number)
         traced = entry.traced()
         if len(traced.curve) < _FEWEST:
             return None
         error, fitted = wanted.fitted(traced)
         family = entry.family
-        return CurveMatch(error, family.key, family.design.graph.links, family.dyadic, number, entry, fitted)
+        match = CurveMatch(error, family.key, family.design.graph.links, family.dyadic, number, entry, fitted)
+        return match if np.isfinite(match.start.places).all() else None  # near a dead centre steps decide

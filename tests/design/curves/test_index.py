@@ -71,6 +71,27 @@ def test_what_is_found_draws_the_wanted_curve(index: CurveIndex) -> None:
     assert len(seen) >= 4
 
 
+def test_what_does_not_come_to_the_beginning_of_a_curve_is_left_out(
+    index: CurveIndex, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Near a dead centre a motion may end in other steps than those of the index: letter B had one among 400."""
+    entry, frames = index.entry(rows(index, 1, 3)[0]), Entry.frames
+    wanted = disturbed(entry, np.random.default_rng(3))
+    found = index.find(wanted, 3, closed=entry.closed)
+    ended = found[0].number
+
+    def ending(own: Entry, inputs: np.ndarray) -> np.ndarray:
+        poses = frames(own, inputs)
+        if own.row == index.entry(ended).row and len(inputs) not in (257, 513):
+            poses[-1] = math.nan
+        return poses
+
+    monkeypatch.setattr(Entry, "frames", ending)
+    again = index.find(wanted, 2, closed=entry.closed)
+    assert [match.number for match in again] == [match.number for match in found[1:]]
+    assert all(np.isfinite(match.start.places).all() for match in again)
+
+
 @pytest.mark.long
 def test_motions_are_found_by_any_point_of_the_link(index: CurveIndex) -> None:
     random = np.random.default_rng(8)
