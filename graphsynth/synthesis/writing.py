@@ -22,6 +22,7 @@ from graphsynth.core.journal import Journal, Work, digest_of
 from graphsynth.core.ordered import in_order
 from graphsynth.structure.gear_trains import PlanetaryGearTrain
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.structure.multiple_joints import MultipleJointChain
 from graphsynth.structure.slider_chains import SliderChain
 from graphsynth.synthesis.chunks import Chunk
 from graphsynth.synthesis.problem import EnumerationProblem, WorkItem, counts, graphs, texts, whole_sum
@@ -63,6 +64,11 @@ def _json_line(chain: Any) -> str:
         record |= {"frame": chain.frame, "joints": chain.joints}
     if isinstance(chain, SliderChain):
         record["sliders"] = chain.sliders
+    if not isinstance(chain, MechanismGraph):  # chains of joints of mobility 1 alone have a catalogue
+        record |= {"mobility": chain.mobility, "symmetries": chain.automorphism_order}
+    if isinstance(chain, SliderChain | MultipleJointChain):
+        graph = chain.graph if isinstance(chain, SliderChain) else chain
+        record |= {"girth": graph.girth, "mobility_type": graph.mobility_type}
     return json.dumps(record) + "\n"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 from functools import cache
 from itertools import combinations
@@ -191,3 +192,23 @@ def test_command_line(capsys, tmp_path):
     assert "P:" in capsys.readouterr().out
     for wrong in (["--sliders", "two"], ["--cylinders"], ["--sliders", "1", "--multiple-joints", "1"]):
         assert main(["count", "--links", "8", *wrong]) == 2
+
+
+@pytest.mark.parametrize("question", ["--links 8 --sliders 1", "--links 8 --multiple-joints any"])
+def test_facts_in_lists_are_those_of_the_graph(question, tmp_path, capsys):
+    """Symmetries and girth by networkx, on the graph of links and joints as vertices of their kinds."""
+    assert main(["enumerate", *question.split(), "-o", str(tmp_path / "list.jsonl")]) == 0
+    rows = [json.loads(line) for line in (tmp_path / "list.jsonl").read_text().splitlines()]
+    assert len(rows) in (84, 44)
+    for row in rows[::9]:
+        sliders = [tuple(pair) for pair in row.get("sliders", ())]
+        graph = nx.Graph()
+        graph.add_nodes_from(range(8), kind="link")
+        for joint in row["joints"]:
+            graph.add_node(name := ("joint", *joint), kind="P" if tuple(joint) in sliders else "R")
+            graph.add_edges_from((name, link) for link in joint)
+        same = nx.isomorphism.GraphMatcher(graph, graph, nx.isomorphism.categorical_node_match("kind", ""))
+        assert row["symmetries"] == sum(1 for _ in same.isomorphisms_iter())
+        assert row["girth"] == nx.girth(graph) // 2
+        assert row["mobility"] == 3 * 7 - 2 * sum(len(joint) - 1 for joint in row["joints"]) == 1
+        assert row["mobility_type"] == "total"
