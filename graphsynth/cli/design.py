@@ -52,5 +52,10 @@ def run(options: argparse.Namespace) -> int:
         print_summary(report, console.screen(), report["tables"])
         if files:
             console.put(f"See them move: {folder / 'report.html'}")
-            console.put(f"Make one, with a unit of length of 1 mm: graphsynth parts {files[0]} --unit 1")
+        for record, file in zip(report["records"], files):
+            found = {margin.name: margin.value for margin in record.margins}
+            if "layers of sheets" in found:  # a size as in millimetres, else as large as a hand
+                unit = 1 if 30 <= found["size"] <= 3000 else float(f"{200 / found['size']:.1g}")
+                console.put(f"Make one, with a unit of length of {unit:g} mm: graphsynth parts {file} --unit {unit:g}")
+                break
     return 0

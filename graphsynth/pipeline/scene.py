@@ -199,7 +199,8 @@ class Scene:
                 raise place.error(f"has an unknown table [{key}]{other}", str(key))
         for key in ("scene", "mechanism", "outputs"):
             if key not in tables:
-                raise place.error(f"lacks the table [{key}]")
+                remedy = '; give it with products, such as ["records", "tables"]' if key == "outputs" else ""
+                raise place.error(f"lacks the table [{key}]{remedy}")
         mechanism, at = tables["mechanism"], place / "mechanism"
         if not isinstance(mechanism, Mapping):
             raise at.error("must be a table")

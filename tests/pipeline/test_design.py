@@ -112,7 +112,11 @@ segment = [[0, 0], [4, 0]]
 products = ["tables"]
 """
     (tmp_path / "own.toml").write_text(text, "utf-8")
-    options = ["--out", str(tmp_path / "report"), "--workers", "1", "--seconds", "20", "--json"]
+    options = ["--out", str(tmp_path / "report"), "--workers", "1", "--seconds", "20"]
+    assert main(["design", str(tmp_path / "own.toml"), *options]) == 0
+    hint = re.search(r"unit of length of (\d+) mm: graphsynth parts \S+ --unit (\d+)", capsys.readouterr().out)
+    assert hint and hint[1] == hint[2] and 5 <= int(hint[1]) <= 100  # a stroke of 4, so a few units wide
+    options.append("--json")
     assert main(["design", str(tmp_path / "own.toml"), *options]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["accepted"] == 1 and told["answers"][0]["error of the path"] < 0.01
@@ -212,7 +216,16 @@ def test_verdicts_of_answers_that_fail_say_what_tells_against_them() -> None:
     )
     task = scene(paths=[SEGMENT]).mechanism.task()
     table = _verdicts(SimpleNamespace(task=task, answers=(failed, changed)))  # type: ignore[arg-type]
-    assert [row[1:3] for row in table.rows] == [
-        ("the range is not completed", "the range is not completed"),
-        ("turns fully, estimated", "an assembly mode changes"),
+    assert [(*row[1:3], row[-1]) for row in table.rows] == [
+        ("the range is not completed", "the range is not completed", ""),
+        ("turns fully, estimated", "an assembly mode changes", ""),
     ]
+
+
+def test_verdicts_tell_what_can_be_built_as_sheets() -> None:
+    """Chebyshev's lambda linkage needs two layers; crank and rocker that sweep over each other's pivot have none."""
+    from graphsynth.pipeline.design.stages import _layers
+
+    assert _layers(gs.simulate(gs.gallery.chebyshev_lambda())) == (2, "")
+    layers, collision = _layers(gs.simulate(gs.Mechanism.four_bar(1, 2.5, 2, 2.5)))
+    assert layers == 0 and collision.endswith("overlap") and "input" not in collision

@@ -111,6 +111,17 @@ def test_what_cannot_move_is_told_to_be_over_constrained() -> None:
     )
 
 
+def test_a_rigid_part_alone_is_not_called_over_constrained() -> None:
+    """A braced triangle, mobility 0, hangs on the frame by a pin in a slot: two freedoms, and no joint to drive."""
+    hung = MechanismGraph(4, [(1, 2), (2, 3), (1, 3), (0, 2, 2)], frame=0)
+    scene = tables("worked_example") | {"structure": {"graphs": [hung.to_text()]}}
+    scene["outputs"]["products"] = ["records"]
+    (record,) = execute(Scene.from_mapping(scene))["records"]
+    assert record.status == "rejected" and record.cause == "embody: no driver fits it"
+    assert record.reason.partition(": ")[2].startswith("links 1, 2, 3 form a rigid sub-chain")
+    assert "driving 2 of its joints of mobility 1" in record.reason and "special" not in record.reason
+
+
 @pytest.mark.long
 def test_a_sample_speaks_for_all(tmp_path: Path) -> None:
     scene = tables("worked_example")

@@ -378,19 +378,21 @@ def _angle_error(task: DesignTask, target: Target, motion: Motion, carriers: Map
 
 
 def _swing_error(task: DesignTask, target: SwingTarget, motion: Motion, link: int, base: int) -> float:
-    """Return what the stroke lacks or has too much, and how far the slow stroke is from its time (input)."""
+    """Return what the stroke lacks or has too much, and by what input, of a slider arc, the slow stroke is late."""
     from scipy.interpolate import CubicHermiteSpline
 
     values, rates = output(motion, link, base)
     ends = [_extreme(task, motion.inputs, values, rates, sign) for sign in (1.0, -1.0)]
     high, low = CubicHermiteSpline(motion.inputs, values, rates)(ends)
     swing = float(high - low)
+    if not target.slides and abs(values[-1] - values[0]) > math.pi:
+        return math.inf  # it goes round, not to and fro
     error = abs(swing - min(max(swing, target.least), target.most))
     if target.time_ratio is None:
         return error
     apart = abs(ends[0] - ends[1])
-    slow = max(apart, math.tau - apart)
-    return max(error, abs(slow - math.tau * target.time_ratio / (1.0 + target.time_ratio)))
+    late = abs(max(apart, math.tau - apart) - math.tau * target.time_ratio / (1.0 + target.time_ratio))
+    return max(error, late * (swing if target.slides else 1.0))
 
 
 def _extreme(task: DesignTask, u: Array, values: Array, rates: Array, sign: float) -> float:

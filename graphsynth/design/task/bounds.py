@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
 Array = NDArray[np.float64]
-#: Relative difference of a length from that of a given bar.
-_FIT = 1e-3
+#: Relative difference of a length from that which is given.
+FIT = 1e-3
 
 
 def places_of(motion: Motion) -> Array:
@@ -60,7 +60,7 @@ def broken_bounds(task: DesignTask, motion: Motion, places: Array, plan: Plan) -
         lengths = side_lengths(mechanism, {*range(mechanism.graph.links)} - {mechanism.frame}) or [1.0]
         for bar in task.bars:
             k = min(range(len(lengths)), key=lambda k: abs(math.log(lengths[k] / bar)), default=-1)
-            fits = k >= 0 and abs(math.log(lengths.pop(k) / bar)) <= _FIT
+            fits = k >= 0 and abs(math.log(lengths.pop(k) / bar)) <= FIT
             broken["a given bar is not used"] = broken.get("a given bar is not used", False) or not fits
     if task.plates:
         broken["a given plate is not used"] = not _has_plates(task, mechanism)
@@ -87,7 +87,7 @@ def _has_plates(task: DesignTask, mechanism: Mechanism) -> bool:
             own = [j.at_a if j.a == link else j.at_b for j in mechanism.joints if link in j.pair and j.kind == "R"]
             own += [point.at for point in mechanism.points.values() if point.link == link]
             sides = ([math.dist(p, q), math.dist(q, r), math.dist(r, p)] for p, q, r in permutations(own, 3))
-            if any(np.abs(np.log(np.array(own_sides) / plate)).max() <= _FIT for own_sides in sides):
+            if any(np.abs(np.log(np.array(own_sides) / plate)).max() <= FIT for own_sides in sides):
                 left.remove(link)
                 break
         else:
@@ -105,7 +105,7 @@ def _crank_bounds(task: DesignTask, mechanism: Mechanism, places: Array) -> dict
     ways = [at[k] - at[pivot] for k in own if k != pivot] if pivot >= 0 else []
     broken: dict[str, bool] = {}
     if task.crank is not None and ways:
-        broken["the crank has not its length"] = abs(math.log(abs(ways[0]) / task.crank)) > _FIT
+        broken["the crank has not its length"] = abs(math.log(abs(ways[0]) / task.crank)) > FIT
     if task.crank_start is not None:
         base = at[next(k for k in fixed if k != pivot)] - at[pivot] if task.crank_from == "frame" else 1.0
         low, high = task.crank_start

@@ -5,9 +5,14 @@ from __future__ import annotations
 import math
 from itertools import combinations
 
+from graphsynth.design.task.bounds import FIT
 from graphsynth.design.task.places import meet, outside
 from graphsynth.design.task.targets import PathTarget, PosesTarget
 from graphsynth.design.task.task import DesignTask
+from graphsynth.kinematics.dimensional.verify import SLACK
+
+#: How far a length may be beyond its bounds: two that are given, each as exactly as answers take it.
+_SPARE = 2.0 * FIT + 2.0 * SLACK
 
 
 def proof(task: DesignTask) -> str:
@@ -45,6 +50,13 @@ def proof(task: DesignTask) -> str:
             f"{len(task.every_pivot)} pivots are given, but no link of a chain of {max(task.links)} links and one "
             f"freedom has more than {max(task.links) // 2} joints"
         )
-    if task.lengths is not None and task.crank is not None and not task.lengths[0] <= task.crank <= task.lengths[1]:
-        return f"the crank is {task.crank:g}, but lengths must be {task.lengths[0]:g} to {task.lengths[1]:g}"
+    points = any(task.names.values())  # a side of a plate may go to a point, which no bound of lengths speaks of
+    given = task.given[: 1 + len(task.bars) - (task.crank is None)] if points else task.given
+    for length in given:
+        what = "the crank is" if length == task.crank else "a given link has the length"
+        low, high = task.lengths or (0.0, math.inf)
+        if "lengths" not in task.soft and not low * (1.0 - _SPARE) <= length <= high * (1.0 + _SPARE):
+            return f"{what} {length:g}, but lengths must be {low:g} to {high:g}"
+        if "length_ratio" not in task.soft and length > min(given) * task.length_ratio * (1.0 + _SPARE):
+            return f"{what} {length:g}, and another {min(given):g}: a larger ratio than {task.length_ratio:g}"
     return ""

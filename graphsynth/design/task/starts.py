@@ -392,7 +392,7 @@ def _screened(
             tried = _guesses(model, aim, some, guess[at], wanted)  # (sets, guesses, n)
             error, placement = _fitted(some, tried[:, :, few], wanted, few, held[at], goals)
             if aim.inputs is None:  # a small part of a curve is near to any line, but of a mechanism that is too large
-                error += np.maximum(np.log(np.abs(placement[..., 0]) * long[at, None]), 0.0)
+                error += np.log(np.maximum(np.abs(placement[..., 0]) * long[at, None], 1.0))
             row, k = np.arange(len(error)), error.argmin(axis=1)
             better = error[row, k] < best[at]
             best[at] = np.where(better, error[row, k], best[at])

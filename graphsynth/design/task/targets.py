@@ -66,6 +66,8 @@ class Target:
 
     def __post_init__(self) -> None:
         positive("weight", self.weight)
+        if "" in (getattr(self, "point", None), getattr(self, "link", None)):
+            raise GeometryError(f"a {type(self).__name__} has an empty name; name its point or link")
 
     @property
     def unknowns(self) -> int:
@@ -285,8 +287,8 @@ class PosesTarget(TimedTarget):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 2 <= len(self.poses) <= MOST:
-            raise GeometryError(f"a motion needs 2 to {MOST} poses; it has {len(self.poses)}")
+        if not 2 <= len(self.poses) <= MOST or len(set(self.poses)) < 2:
+            raise GeometryError(f"a motion needs 2 to {MOST} poses that are not all the same; it has {len(self.poses)}")
         self._time(len(self.poses))
 
     @property
@@ -449,7 +451,8 @@ class SwingTarget(LinkTarget):
     least, most : float or str
         Limits of the stroke: radians or texts such as "30 deg", lengths of a slider.
     time_ratio : float, optional
-        Time of the slow stroke over that of the quick one, at a constant speed of the driver (full rotation).
+        Time of the slow stroke over that of the quick one, at a constant speed of the driver (full rotation).  The
+        slow stroke may be longer or shorter by the tolerance in radians of the input, of a slider over the stroke.
     link, base, slides, pivot
         As of a function.
     """

@@ -13,7 +13,7 @@ from graphsynth.core.checks import choice, finite, positive, whole
 from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import Shown
 from graphsynth.design.task.places import Box, Place, Point, box, limits, place
-from graphsynth.design.task.targets import LinkTarget, PathTarget, PosesTarget, SwingTarget, Target
+from graphsynth.design.task.targets import DwellTarget, LinkTarget, PathTarget, PosesTarget, SwingTarget, Target
 
 Drive = Literal["rotation", "rocking", "cylinder", "slide"]
 #: How the driven link turns: counter-clockwise is positive.
@@ -21,6 +21,8 @@ Turning = Literal["either", "counter-clockwise", "clockwise"]
 _SENSES = {"either": 0, "counter-clockwise": 1, "clockwise": -1}
 #: Lengths of links unless they are given, in sizes of the task.
 _SHORT, _LONG = 0.1, 6.0
+#: Least span of a rocking drive, and the largest misalignment for which tilts are small.
+_LEAST, _MOST = 1e-3, 0.5
 #: Bounds that may be wishes.
 SOFT = ("transmission", "length_ratio", "lengths", "box")
 #: What answers are ranked by, and how much each counts: errors in tolerances, links, size of the task, radians,
@@ -85,8 +87,8 @@ class DesignTask(Shown):
     pivot_region, box : (x0, y0, x1, y1), optional
         Where all joints on the frame lie; where all joints and named points stay over the whole motion.
     lengths : (float, float), optional
-        Shortest and longest distance of two revolute joints on a link; by default 0.1 and 6 sizes of
-        the task.  A point is no nearer to a joint than the shortest, if other links would do nothing there.
+        Shortest and longest distance of two revolute joints on a link; by default 0.1 and 6 sizes of the task, further
+        if links are given.  A point is no nearer to a joint than the shortest, if other links would do nothing there.
     crank : float, optional
         Given length of the driven link.
     crank_start : float, str or a pair of them, optional
@@ -160,9 +162,9 @@ class DesignTask(Shown):
         put(self, "targets", targets)
         choice("drive", self.drive, ("rotation", "rocking", "cylinder", "slide"))
         span = 1.0 if self.linear else positive("span", self.span)
-        if span > math.tau or (self.drive == "rotation" and span < math.tau):
+        if not _LEAST <= span <= math.tau or (self.drive == "rotation" and span < math.tau):
             raise GeometryError(
-                f"span = {span:.6g} must be at most 2 pi, and a turn for a rotation; use drive 'rocking'"
+                f"span = {span:.6g} must be {_LEAST:g} to 2 pi, and a turn for a rotation; use drive 'rocking'"
             )
         put(self, "span", span)
         if self.stroke is not None:
@@ -185,21 +187,21 @@ class DesignTask(Shown):
                 put(self, name, box(name, getattr(self, name)))
         if self.lengths is not None:
             put(self, "lengths", limits("lengths", self.lengths))
-        else:
-            sizes = [self.size, *(math.dist(p, q) for p, q in combinations(self.given_pivots, 2))]
-            put(self, "lengths", (_SHORT * min(sizes), _LONG * max(sizes)))
         if self.crank is not None:
             positive("crank", self.crank)
         self._shaped()
         put(self, "bars", tuple(positive(f"bars[{k}]", bar) for k, bar in enumerate(self.bars)))
         put(self, "plates", tuple(_plate(f"plates[{k}]", plate) for k, plate in enumerate(self.plates)))
+        if self.lengths is None:
+            sizes = [self.size, *(math.dist(p, q) for p, q in combinations(self.given_pivots, 2))]
+            put(self, "lengths", (min([_SHORT * min(sizes), *self.given]), max([_LONG * max(sizes), *self.given])))
         if self.plates and max(self.links) < 6 and not any(self.names.values()):
             raise GeometryError(
                 "no link of four-bars but the frame has three joints; allow six links for plates, or name a point"
             )
         for name in ("misalignment", "joint_tilt"):
-            if getattr(self, name) is not None:
-                positive(name, getattr(self, name))
+            if (tilt := getattr(self, name)) is not None and positive(name, tilt) > _MOST:
+                raise GeometryError(f"{name} = {tilt:.6g} is no small tilt; give at most {_MOST:g} rad")
         if self.misalignment is not None and self.linear:
             raise GeometryError("misalignment is that of an axis that is driven; a linear drive has none: leave it out")
         if finite("length_ratio", self.length_ratio) < 1.0:
@@ -220,9 +222,12 @@ class DesignTask(Shown):
         if any(getattr(target, "slides", False) for target in targets) and not self.sliders:
             raise GeometryError("a link slides, but sliders = 0; allow one or more")
         for target in targets:
-            last = (getattr(target, "inputs", None) or (0.0,))[-1]
-            if last > span + 1e-9 and self.drive != "rotation":
-                raise GeometryError(f"a target has an input of {last:.6g}, but the drive ends at {span:.6g}")
+            inputs = getattr(target, "inputs", None) or (0.0,)
+            if isinstance(target, DwellTarget):
+                inputs = (target.start or 0.0, (target.start or 0.0) + target.span)
+            for u in (inputs[0], inputs[-1]):
+                if self.drive != "rotation" and not -1e-9 <= u <= span + 1e-9:
+                    raise GeometryError(f"a target has an input of {u:.6g}, but the drive goes from 0 to {span:.6g}")
             if isinstance(target, SwingTarget) and target.time_ratio is not None and self.drive != "rotation":
                 raise GeometryError("a time ratio needs a drive that turns fully; use drive = 'rotation'")
 
@@ -274,6 +279,11 @@ class DesignTask(Shown):
         return tuple(p for p in self.every_pivot if len(p) == 2)
 
     @property
+    def given(self) -> tuple[float, ...]:
+        """Lengths that are given: those of the crank, of bars and of sides of plates."""
+        return *((self.crank,) if self.crank else ()), *self.bars, *(side for plate in self.plates for side in plate)
+
+    @property
     def linear(self) -> bool:
         """Whether the drive pushes; then inputs are parts of its stroke."""
         return self.drive in ("cylinder", "slide")
@@ -288,8 +298,7 @@ class DesignTask(Shown):
         sizes = [target.size for target in self.targets if isinstance(target, PathTarget | PosesTarget)]
         apart = [math.dist(p, q) for p, q in combinations(self.given_pivots, 2)]
         apart += [target.size for target in self.targets if isinstance(target, LinkTarget)]
-        given = [self.crank or 0.0, *self.bars, *(side for plate in self.plates for side in plate)]
-        given += [self.stroke[1]] if self.linear and self.stroke else []
+        given = [*self.given, *([self.stroke[1]] if self.linear and self.stroke else [])]
         box = (0.5 * min(self.box[2] - self.box[0], self.box[3] - self.box[1]),) if self.box else ()
         return next((found for some in (sizes, apart, given, box) if (found := max(some, default=0.0))), 1.0)
 

@@ -418,7 +418,9 @@ def choices(graph: MechanismGraph, driver: Drivers | None) -> list[tuple[Mechani
     frames = [graph] if graph.frame is not None else graph.inversions()
     found = _driven(frames, on_frame=True) or _driven(frames, on_frame=False)
     if not found:
-        raise GraphError(f"no {graph.mobility} joints of mobility 1 move this mechanism when they are driven")
+        raise GraphError(
+            f"driving {graph.mobility} of its joints of mobility 1, whichever they are, does not move this graph"
+        )
     return [(inversion, pairs) for _, inversion, pairs in sorted(found, key=lambda item: item[0])]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from graphsynth.design.task.task import DesignTask
     from graphsynth.drawing.plots import Line
     from graphsynth.drawing.shapes import Shape
+    from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.pipeline.design.tables import DesignTable
 
@@ -104,6 +106,8 @@ def records(context: Context, designs: Designs) -> tuple[Record, ...]:
         )
         if math.isfinite(answer.jam_margin):
             margins = (*margins, Quantity("margin of binding", answer.jam_margin, "", "certified"))
+        if answer.accepted and (layers := _layers(answer.motion)[0]):
+            margins = (*margins, Quantity("layers of sheets", layers))
         words = f"does the task, {proof}" if answer.accepted else "does not do the task"
         reason = "; ".join(answer.reasons)
         found.append(
@@ -152,9 +156,13 @@ def _verdicts(designs: Designs) -> Table:
         turns = proved and (not whole or (proof is not None and proof.closed))
         drive = _known("turns fully" if whole else "moves over its range", turns, answer, _STOPS)
         row: list[object] = [str(place), drive, _known("one branch", proved, answer, _CHANGES)]
-        rows.append([*row, _forgiven(designs, answer)] if not task.linear else row)
+        row += [_forgiven(designs, answer)] if not task.linear else []
+        layers, collision = _layers(answer.motion) if answer.accepted else (0, "")
+        rows.append([*row, f"{layers} layer{'s' * (layers > 1)}" if layers else collision and f"none: {collision}"])
     columns = ["place", "drive", "branch"] + (["forgives a tilted axis [°] | .2f"] if not task.linear else [])
-    note = "Proved: over the whole range, between the samples too, for the dimensions as they are. "
+    columns.append("as sheets")
+    note = "Proved: over the whole range, between the samples too, for the dimensions as they are. As sheets: layers "
+    note += "above the board in which nothing collides, estimated for the sizes that graphsynth parts takes by itself. "
     if not task.linear:
         tilt = f"Tilt of the driver's axis that the joints can share if each tilts by {_degrees(task.joint_tilt)}"
         note += f"{tilt}, certified for small tilts."
@@ -165,6 +173,17 @@ def _known(what: str, proved: bool, answer: DesignedMechanism, against: tuple[st
     """Say that something holds, and how that is known; or what tells against it."""
     wrong = next((reason for reason in answer.reasons if reason in against), "")
     return wrong or f"{what}, {'proved' if proved else 'estimated'}"
+
+
+@lru_cache(maxsize=100)
+def _layers(motion: Motion) -> tuple[int, str]:
+    """Return in how many layers above the board links can be sheets, else 0 and what would collide first."""
+    from graphsynth.design.parts.api import parts
+
+    try:
+        return max(parts(motion, prove=False).layers), ""
+    except GeometryError as error:
+        return 0, str(error).partition(";")[0].partition(" at input")[0].rpartition(": ")[2]
 
 
 def _forgiven(designs: Designs, answer: DesignedMechanism) -> float | None:

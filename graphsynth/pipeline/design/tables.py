@@ -157,7 +157,7 @@ class FunctionTable:
 class DwellTable:
     """A link stands still for a part of the input; the tolerance says how still; ``within``, a length: it slides."""
 
-    span: float
+    span: Annotated[float, In(above=0)]
     start: float | None = None
     link: str = "output"
     base: str = ""

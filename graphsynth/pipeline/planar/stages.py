@@ -107,9 +107,9 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
         found = search(design.graph, goals, seed, joints=own.pairs, tries=own.tries, effort=own.effort)
     except GraphError as why:  # whatever its dimensions, unless they are special ones
         part = design.graph.rigid_subchain()
-        if part is None and design.graph.mobility > 0:
-            raise
         told = f"{part}; " if part else ""
+        if design.graph.mobility > 0 and (part is None or part.mobility == 0):
+            raise Rejected("no driver fits it", f"{told}{why}") from why
         raise Rejected("over-constrained", f"{told}{why}: it moves with special dimensions, if at all") from why
     if not found.accepted or found.mechanism is None or found.figures is None:
         causes = [why.removeprefix("result: ") for why in found.reasons if why.startswith("result: ")]

@@ -22,7 +22,7 @@ from graphsynth.design import (
     design,
 )
 from graphsynth.design.task.aims import PointAim
-from graphsynth.design.task.answers import Candidate, Origin, judged, signature
+from graphsynth.design.task.answers import Candidate, Origin, _swing_error, judged, signature
 from graphsynth.design.task.classical import solutions
 from graphsynth.design.task.descend import descend
 from graphsynth.design.task.model import Model
@@ -415,6 +415,23 @@ def test_strokes_and_time_ratios_are_those_of_the_closed_form() -> None:
     apart = abs(corner(ground, far, swing) - corner(ground, near, swing))
     assert abs(stroke - math.radians(60)) < 0.02
     assert abs((math.pi + apart) / (math.pi - apart) - ratio) < 0.02
+
+
+@pytest.mark.parametrize("size", [1.0, 1000.0])
+def test_a_slow_stroke_of_a_slider_that_is_late_counts_as_an_arc(size: float) -> None:
+    """A centred slider-crank: stroke 2, both ways half a turn; whatever the unit of length, the same share is late."""
+    mechanism = gs.Mechanism.slider_crank(1.0, 3.0).scaled(size)
+    wanted = SwingTarget(least=2.0 * size, most=2.0 * size, time_ratio=1.2, link="ram", slides=True)
+    task = DesignTask(targets=[wanted], links=[4], sliders=1)
+    motion = gs.simulate(mechanism, np.linspace(0.0, math.tau, 721))
+    late = math.tau * 1.2 / 2.2 - math.pi
+    assert _swing_error(task, wanted, motion, 3, 0) == pytest.approx(2.0 * size * late, rel=1e-6)
+
+
+def test_a_link_that_goes_round_does_not_swing() -> None:
+    task = DesignTask(targets=[SwingTarget(least="60 deg")], links=[4])
+    drag_link = gs.simulate(gs.Mechanism.four_bar(1.0, 2.5, 2.4, 2.6), np.linspace(0.0, math.tau, 721))
+    assert drag_link.completed and _swing_error(task, task.targets[0], drag_link, 3, 0) == math.inf  # type: ignore[arg-type]
 
 
 @pytest.mark.long

@@ -11,6 +11,7 @@ import pytest
 from graphsynth.core.errors import GeometryError
 from graphsynth.design import DesignTask, DwellTarget, FunctionTarget, PathTarget, PosesTarget, SwingTarget, design
 from graphsynth.design.task.formulas import formula
+from graphsynth.design.task.impossible import proof
 
 
 def test_an_arc_has_its_length_and_centre() -> None:
@@ -96,6 +97,9 @@ def test_a_tolerance_is_an_angle_with_its_unit_or_a_part_of_the_size() -> None:
         (lambda: SwingTarget(least=2, most=1), "least <= most"),
         (lambda: SwingTarget(time_ratio=0.5), "time_ratio"),
         (lambda: PosesTarget(poses=[(0, 0, 0)]), "2 to 400 poses"),
+        (lambda: PosesTarget(poses=[(0, 0, 1), (0, 0, 1)]), "not all the same"),
+        (lambda: SwingTarget(link=""), "empty name"),
+        (lambda: PathTarget(points=[(0, 0), (1, 0)], point=""), "empty name"),
         (lambda: DesignTask(targets=[]), "one or more targets"),
         (lambda: task(links=[5]), "even numbers"),
         (lambda: DesignTask(targets=[SwingTarget(least=1, slides=True)]), "sliders = 0"),
@@ -113,8 +117,18 @@ def test_a_tolerance_is_an_angle_with_its_unit_or_a_part_of_the_size() -> None:
             lambda: DesignTask(
                 targets=[DwellTarget(span=1), FunctionTarget(inputs=[0, 2], outputs=[0, 1])], drive="slide"
             ),
-            "ends",
+            "drive goes from 0 to 1",
         ),
+        (
+            lambda: DesignTask(targets=[DwellTarget(span="60 deg")], drive="rocking", span="50 deg"),
+            "input of 1.0472, but the drive goes from 0 to 0.872665",
+        ),
+        (
+            lambda: DesignTask(targets=[FunctionTarget(inputs=[-0.5, 0.5], outputs=[0, 1])], drive="slide"),
+            "input of -0.5",
+        ),
+        (lambda: DesignTask(targets=[SwingTarget(least=1)], drive="rocking", span=1e-12), "0.001 to 2 pi"),
+        (lambda: task(misalignment="100 deg"), "no small tilt"),
     ],
 )
 def test_what_cannot_be_is_refused_with_a_sentence(make: Any, words: str) -> None:
@@ -136,6 +150,8 @@ def task(**more: Any) -> DesignTask:
         ({"pivots": [(0, 0), (2, 0), (4, 0)], "links": [4]}, "more than 2 joints"),
         ({"box": (-1, -1, 5, 5), "pivot_region": (6, 6, 7, 7)}, "do not meet"),
         ({"crank": 9.0, "lengths": (0.5, 4)}, "the crank is 9"),
+        ({"bars": [9.0], "lengths": (0.5, 4)}, "a given link has the length 9, but"),
+        ({"bars": [1.0, 9.0]}, "length 9, and another 1: a larger ratio than 8"),
     ],
 )
 def test_impossible_tasks_say_why_without_a_search(more: dict[str, Any], words: str) -> None:
@@ -144,3 +160,15 @@ def test_impossible_tasks_say_why_without_a_search(more: dict[str, Any], words: 
     found = design(task(**more))
     assert re.search(words, found.impossible) and found.pieces == 0 and len(found) == 0
     assert found.statement == f"impossible: {found.impossible}"
+
+
+def test_what_is_given_widens_the_bounds_of_lengths_that_nobody_gave() -> None:
+    assert task(crank=0.05, bars=[30.0]).lengths == (0.05, 30.0)
+    assert not proof(task(crank=0.05))
+
+
+def test_a_plate_is_within_bounds_if_its_sides_go_to_joints() -> None:
+    """A side to a point that draws has no bound."""
+    plate: dict[str, Any] = {"plates": [(1, 1, 1)], "lengths": (2, 3), "links": [6]}
+    assert "length 1, but" in proof(DesignTask(targets=[SwingTarget(least=1)], **plate))
+    assert not proof(task(**plate))
