@@ -126,6 +126,8 @@ def rows_of(args: tuple[Any, ...], blocks: list[Any]) -> tuple[list[Any], list[t
             view = copies[-1].view()
             view.flags.writeable = leaf.flags.writeable
             columns.append(list(view))
+        elif isinstance(block, list):
+            columns.append(block)
         else:
             columns.append(block.tolist() if isinstance(leaf, float) else repeat(block))
     if not any(isinstance(part, tuple) for part in args):
@@ -239,9 +241,31 @@ def _canon_packed(args: tuple[Any, ...], rng: np.random.Generator) -> tuple[Any,
     return at(args, _1=renumbered(args[1], np.argsort(order).astype(np.uint8)), _2=args[2][order])
 
 
+def _renumbered_graphs(mults: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    order = rng.permutation(mults.shape[-1])
+    return np.ascontiguousarray(mults[..., order, :][..., order])
+
+
 def _count_block(args: tuple[Any, ...], rng: np.random.Generator) -> tuple[Any, ...]:
     start = int(rng.integers(args[2], args[3], endpoint=True))
-    return at(args, _2=start, _3=min(start + int(rng.integers(9)), args[3]))
+    return at(args, _1=_renumbered_graphs(args[1], rng), _2=start, _3=min(start + int(rng.integers(9)), args[3]))
+
+
+def _list_rows(args: tuple[Any, ...], rng: np.random.Generator) -> tuple[Any, ...]:
+    from graphsynth.synthesis.kernels.listing import ACTIVE, GRAPH, ORDER, PART, PARTS
+
+    args = at(args, _8=args[8][: int(rng.choice((1, 2, 1 + len(args[8]) // 2, len(args[8]))))])  # few shapes
+    work, graphs = args[7], args[2]
+    if work.state[ACTIVE] or work.state[ORDER] or not graphs:
+        return args
+    state, parts = work.state.copy(), int(rng.integers(1, 4))  # nothing begun: from anywhere on, a part
+    state[GRAPH], state[PART], state[PARTS] = rng.integers(graphs), rng.integers(parts), parts
+    return at(args, _1=_renumbered_graphs(args[1], rng), _7=work._replace(state=state))
+
+
+def _expand(args: tuple[Any, ...], rng: np.random.Generator) -> tuple[Any, ...]:
+    rows = int(rng.integers(min(args[4], 6), endpoint=True))
+    return at(shuffled(args, 3, rng=rng, count=args[4]), _4=rows)
 
 
 def _open_fixed(args: tuple[Any, ...], rng: np.random.Generator) -> tuple[Any, ...]:
@@ -269,11 +293,9 @@ OTHERS: dict[str, Callable[[tuple[Any, ...], np.random.Generator], tuple[Any, ..
     "synthesis.kernels.counting.weigh_block": lambda args, rng: shuffled(args, 2, rng=rng),
     "synthesis.kernels.counting.open_fixed": _open_fixed,
     "synthesis.kernels.counting.decode_fixed": lambda args, rng: at(args, _3=int(rng.integers(args[3] + 1))),
-    "synthesis.kernels.expanding.expand_packed": lambda args, rng: shuffled(args, 3, rng=rng, count=args[4]),
-    "synthesis.kernels.expanding.expand_text": lambda args, rng: shuffled(args, 3, rng=rng, count=args[4]),
-    "synthesis.kernels.listing.list_rows": lambda args, rng: at(
-        args, _8=args[8][: int(rng.integers(1, len(args[8]), endpoint=True))]
-    ),
+    "synthesis.kernels.expanding.expand_packed": _expand,
+    "synthesis.kernels.expanding.expand_text": _expand,
+    "synthesis.kernels.listing.list_rows": _list_rows,
     "synthesis.kernels.listing.rewind": lambda args, rng: at(args, _0=int(rng.integers(99)), _1=int(rng.integers(9))),
     "systems.platform.kernels.turns": _turns,
     "synthesis.kernels.splitting.split_all": lambda args, rng: at(

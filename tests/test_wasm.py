@@ -21,8 +21,9 @@ from graphsynth.core.native.wasm import MODULES, read_modules
 from graphsynth.workbench import modules
 
 from .kernel_bits import kernel_of
-from .wasm_bits import PAGE, Bits, Recorded, computations, page_computations
+from .wasm_bits import Bits
 from .wasm_calls import LOADER, Remote, node, tables
+from .wasm_cases import PAGE, Recorded, computations, page_computations
 
 ROOT = Path(__file__).parents[1]
 needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
 import threading
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from queue import Empty, Queue
+from subprocess import DEVNULL, Popen
 from tempfile import TemporaryDirectory
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ import numpy as np
 from graphsynth.core.native.wasm import MODULES
 from graphsynth.workbench import __file__ as _workbench
 
-from .kernel_bits import leaves
+from .kernel_bits import leaves, same_bits, same_results
 
 LOADER = Path(_workbench).with_name("pages") / "kernels.js"
 RUNNER = Path(__file__).with_name("wasm_runner.js")
@@ -36,7 +37,7 @@ def tables() -> dict[str, dict[str, Any]]:
 class Remote:
     """Kernels that run elsewhere: `call` makes a chunk of calls."""
 
-    def __init__(self, start: Callable[[str], Callable[[], None]], seconds: float = 600.0) -> None:
+    def __init__(self, start: Callable[[str], tuple[Popen[bytes], Callable[[], None]]], seconds: float = 600.0) -> None:
         self._chunks: Queue[bytes] = Queue()
         self._found: Queue[bytes | str] = Queue()
         self._seconds = seconds
@@ -79,7 +80,7 @@ class Remote:
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
         self._server.daemon_threads = True
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
-        self._stop = start(f"http://127.0.0.1:{self._server.server_port}")
+        self._process, self._stop = start(f"http://127.0.0.1:{self._server.server_port}")
         self._tables = tables()
 
     def close(self) -> None:
@@ -91,11 +92,18 @@ class Remote:
     def call(
         self, module: str, kernel: str, args: tuple[Any, ...], blocks: list[Any], count: int
     ) -> tuple[list[Any], list[np.ndarray]]:
-        """Make ``count`` calls; ``blocks``: every leaf of ``args``, an array or a float with one more axis.
+        """Make ``count`` calls; ``blocks``: every leaf of ``args``, an array or a float with one more axis,
+        a whole number once, or as a list of one for each call.
 
         Returned are the results, of a call that raises the name of the error's class, and the arrays afterwards.
         """
-        found = self._ask(module, kernel, args, blocks, count, 0.0)
+        self.ask(_described(module, kernel, args, blocks, count, 0.0))
+        return self.read(self.found(), module, kernel, args, blocks, count)
+
+    def read(
+        self, found: bytes, module: str, kernel: str, args: tuple[Any, ...], blocks: list[Any], count: int
+    ) -> tuple[list[Any], list[np.ndarray]]:
+        """Read results and arrays of calls."""
         calls = self._tables[module]["kernels"][kernel]["calls"]
         assert len({result for _, _, result, *_ in calls}) == 1
         reader = _Reader(found)
@@ -111,44 +119,74 @@ class Remote:
     def seconds(self, module: str, kernel: str, args: tuple[Any, ...], seconds: float) -> float:
         """Return how long one call takes, by calls for some seconds."""
         blocks = [np.asarray(leaf)[None] if isinstance(leaf, np.ndarray | float) else leaf for leaf in leaves(args)]
-        return float(np.frombuffer(self._ask(module, kernel, args, blocks, 1, seconds))[0])
+        self.ask(_described(module, kernel, args, blocks, 1, seconds))
+        return float(np.frombuffer(self.found())[0])
 
-    def _ask(
-        self, module: str, kernel: str, args: tuple[Any, ...], blocks: list[Any], count: int, seconds: float
-    ) -> bytes:
-        """Send a chunk, and wait for what comes back."""
-        numbers = iter(range(len(blocks)))
-        described, data, at = [], [], 0
-        for leaf, block in zip(leaves(args), blocks, strict=True):
-            if isinstance(leaf, np.ndarray | float):
-                block = np.ascontiguousarray(block)
-                kind = "b1" if block.dtype == bool else block.dtype.str[1:]
-                what = "array" if isinstance(leaf, np.ndarray) else "float"
-                described.append({"kind": what, "type": kind, "shape": list(block.shape[1:]), "at": at})
-                data.append(block)
-                at += (block.nbytes + 15) // 16 * 16
-            elif leaf is None or isinstance(leaf, bool | np.bool_):
-                described.append({"kind": "constant", "value": None if leaf is None else bool(leaf)})
-            else:
-                described.append({"kind": "whole", "value": str(int(leaf))})
-        tree = _tree(args, numbers)
-        self._chunks.put(
-            _packed(
-                {
-                    "module": module,
-                    "kernel": kernel,
-                    "count": count,
-                    "tree": tree,
-                    "leaves": described,
-                    "seconds": seconds,
-                },
-                data,
-            )
-        )
-        found = self._found.get(timeout=self._seconds)
+    def ask(self, chunk: bytes) -> None:
+        """Send a chunk."""
+        self._chunks.put(chunk)
+
+    def found(self) -> bytes:
+        """Wait for what comes back."""
+        end = monotonic() + self._seconds
+        while True:
+            try:
+                found = self._found.get(timeout=5.0)
+                break
+            except Empty:
+                if monotonic() > end or self._process.poll() is not None:
+                    raise RuntimeError("no answer: the kernels elsewhere have ended, or take too long") from None
         if isinstance(found, str):
             raise RuntimeError(found)
         return found
+
+
+class Both:
+    """Kernels in Node and in a headless Chromium: the same calls in each."""
+
+    def __init__(self) -> None:
+        self.places = node(), browser()
+
+    def close(self) -> None:
+        for place in self.places:
+            place.close()
+
+    def call(
+        self, module: str, kernel: str, args: tuple[Any, ...], blocks: list[Any], count: int
+    ) -> tuple[list[Any], list[np.ndarray]]:
+        """Make calls as `Remote.call`; raises if results differ, except in the bits of a NaN."""
+        chunk = _described(module, kernel, args, blocks, count, 0.0)
+        for place in self.places:
+            place.ask(chunk)
+        first, second = (place.found() for place in self.places)
+        read = self.places[0].read
+        results, arrays = read(first, module, kernel, args, blocks, count)
+        if first != second:
+            others, more = read(second, module, kernel, args, blocks, count)
+            same = same_results(results, others) and all(map(same_bits, arrays, more))
+            assert same, f"Node and Chromium differ: {kernel}"
+        return results, arrays
+
+
+def _described(module: str, kernel: str, args: tuple[Any, ...], blocks: list[Any], count: int, seconds: float) -> bytes:
+    """Write a chunk of calls."""
+    numbers = iter(range(len(blocks)))
+    described, data, at = [], [], 0
+    for leaf, block in zip(leaves(args), blocks, strict=True):
+        if isinstance(leaf, np.ndarray | float):
+            block = np.ascontiguousarray(block)
+            kind = "b1" if block.dtype == bool else block.dtype.str[1:]
+            what = "array" if isinstance(leaf, np.ndarray) else "float"
+            described.append({"kind": what, "type": kind, "shape": list(block.shape[1:]), "at": at})
+            data.append(block)
+            at += (block.nbytes + 15) // 16 * 16
+        elif leaf is None or isinstance(leaf, bool | np.bool_):
+            described.append({"kind": "constant", "value": None if leaf is None else bool(leaf)})
+        else:
+            values = list(map(str, block)) if isinstance(block, list) else None
+            described.append({"kind": "whole", "value": str(int(leaf)), "values": values})
+    head = {"module": module, "kernel": kernel, "count": count, "leaves": described, "seconds": seconds}
+    return _packed(head | {"tree": _tree(args, numbers)}, data)
 
 
 def _tree(args: tuple[Any, ...], numbers: Iterator[int]) -> list[Any]:
@@ -207,11 +245,11 @@ class _Reader:
 def node() -> Remote:
     """Kernels in Node."""
 
-    def start(address: str) -> Callable[[], None]:
+    def start(address: str) -> tuple[Popen[bytes], Callable[[], None]]:
         program = shutil.which("node")
         assert program is not None
-        process = subprocess.Popen([program, str(RUNNER), str(LOADER), address])
-        return lambda: process.wait(30) and None
+        process = Popen([program, str(RUNNER), str(LOADER), address])
+        return process, lambda: process.wait(30) and None
 
     return Remote(start)
 
@@ -219,7 +257,7 @@ def node() -> Remote:
 def browser() -> Remote:
     """Kernels in a headless Chromium."""
 
-    def start(address: str) -> Callable[[], None]:
+    def start(address: str) -> tuple[Popen[bytes], Callable[[], None]]:
         program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
         assert program is not None
         folder = TemporaryDirectory()
@@ -227,13 +265,13 @@ def browser() -> Remote:
             "--headless=new --no-sandbox --disable-gpu --no-first-run --disable-background-networking --disable-sync"
         )
         command = [program, *flags.split(), f"--user-data-dir={folder.name}", "--remote-debugging-port=0", address]
-        process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        process = Popen(command, stderr=DEVNULL)
 
         def stop() -> None:
             process.terminate()
             process.wait(30)
             folder.cleanup()
 
-        return stop
+        return process, stop
 
     return Remote(start)

@@ -44,6 +44,7 @@ function arguments_of(tree, leaves, k) {
       return { data: leaf.data.subarray(k * each, (k + 1) * each), shape: leaf.shape };
     }
     if (leaf.kind === "float") return leaf.data[k];
+    if (leaf.values) return BigInt(leaf.values[k]);
     return leaf.kind === "whole" ? BigInt(leaf.value) : leaf.value;
   });
 }
@@ -70,6 +71,78 @@ function timed(module, head) {
   return new Uint8Array(Float64Array.of(best / 1000).buffer);
 }
 
+/* The ordinary way in, through the loader: for single calls. */
+function call(module, head, entry, out) {
+  let result = null, kind = "";
+  try {
+    result = module.call(head.kernel, ...arguments_of(head.tree, head.leaves, 0));
+  } catch (error) {
+    if (!error.kind) throw error;
+    kind = error.kind;
+  }
+  tell(out, entry, kind, result);
+  for (const leaf of head.leaves) if (leaf.kind === "array") out.put(bytes_of(leaf.data));
+}
+
+const bytes_of = (data) => new Uint8Array(data.buffer, data.byteOffset, data.byteLength);
+
+function tell(out, entry, kind, result) {
+  const name = kind ? new TextEncoder().encode(kind) : [];
+  out.put([name.length]);
+  if (kind) out.put(name);
+  else write(out, entry.result, result);
+}
+
+/* Many calls: the whole chunk lies in the module's memory, and from call to call only places and numbers change. */
+function calls(module, head, entry, out) {
+  for (const leaf of head.leaves) {
+    if (leaf.kind !== "array") continue;
+    leaf.kept = module.array(leaf.type, [head.count, ...leaf.shape]);
+    leaf.kept.data.set(leaf.data);
+    leaf.kept.shape = leaf.shape;
+    leaf.each = leaf.data.byteLength / head.count;
+  }
+  const fill = (tree) => tree.map((part) => (Array.isArray(part) ? fill(part)
+    : head.leaves[part].kept || arguments_of([part], head.leaves, 0)[0]));
+  const slots = module.reserve(8 * (entry.slotsIn + entry.slotsOut + 2)), own = { at: slots, taken: [] }, changing = [];
+  const put = (types, tree, args) => types.filter((type) => type.kind !== "omitted").forEach((type, k) => {
+    if (type.kind === "tuple") {
+      put(type.items, tree[k], args[k]);
+      return;
+    }
+    const leaf = head.leaves[tree[k]];
+    if (leaf.kind === "array" || leaf.kind === "float" || leaf.values) changing.push([own.at, leaf]);
+    module.put(type, args[k], own, head.kernel);
+  });
+  put(entry.types, head.tree, fill(head.tree));
+  const results = slots + 8 * (entry.slotsIn + 1), about = slots + 8 * entry.slotsIn;
+  let view = new DataView(module.memory.buffer);
+  for (let k = 0; k < head.count; k++) {
+    if (view.buffer !== module.memory.buffer) view = new DataView(module.memory.buffer);
+    for (const [at, leaf] of changing) {
+      if (leaf.kept) view.setUint32(at + 32, leaf.kept.place + k * leaf.each, true);
+      else if (leaf.values) view.setBigInt64(at, BigInt(leaf.values[k]), true);
+      else view.setFloat64(at, leaf.data[k], true);
+    }
+    let result = null, kind = "";
+    try {
+      const code = entry.run(slots, results, about);
+      if (code !== 0 && code !== -2) module.raise(head.kernel, code, about);
+      result = module.get(entry.result, { at: results });
+    } catch (error) {
+      if (!error.kind) throw error;
+      kind = error.kind;
+    }
+    tell(out, entry, kind, result);
+  }
+  module.exports.release(slots);
+  for (const { kept } of head.leaves) {
+    if (!kept) continue;
+    out.put(bytes_of(kept.data));
+    module.free(kept);
+  }
+}
+
 function run(modules, head, buffer) {
   const module = modules[head.module], entries = module.kernels.get(head.kernel);
   for (const leaf of head.leaves) {
@@ -79,31 +152,18 @@ function run(modules, head, buffer) {
     leaf.data = new View(buffer, leaf.at, leaf.length * head.count);
   }
   if (head.seconds) return timed(module, head);
-  const out = new Writer();
-  for (let k = 0; k < head.count; k++) {
-    const args = arguments_of(head.tree, head.leaves, k);
-    let result = null, kind = "";
-    try {
-      result = module.call(head.kernel, ...args);
-    } catch (error) {
-      if (!error.kind) throw error;
-      kind = error.kind;
-    }
-    const name = new TextEncoder().encode(kind);
-    out.put([name.length]);
-    if (kind) out.put(name);
-    else write(out, (entries.length === 1 ? entries[0] : entries.find((one) => module.fits(one.types, args))).result, result);
-  }
-  for (const leaf of head.leaves) {
-    if (leaf.kind === "array") out.put(new Uint8Array(leaf.data.buffer, leaf.data.byteOffset, leaf.data.byteLength));
-  }
+  const out = new Writer(), first = arguments_of(head.tree, head.leaves, 0);
+  const entry = entries.length === 1 ? entries[0] : entries.find((one) => module.fits(one.types, first));
+  (head.count === 1 ? call : calls)(module, head, entry, out);
   return out.bytes.slice(0, out.size);
 }
 
+/* Ends when it is told to, or nobody asks any more. */
 async function serve(Kernels, address) {
   const modules = {};
   for (;;) {
-    const answer = await fetch(`${address}/next`, { method: "POST" });
+    const answer = await fetch(`${address}/next`, { method: "POST" }).catch(() => null);
+    if (answer === null) return;
     const all = await answer.arrayBuffer();
     const size = new DataView(all).getUint32(0, true);
     const head = JSON.parse(new TextDecoder().decode(new Uint8Array(all, 8, size)));

@@ -8,8 +8,8 @@ import numpy as np
 
 import graphsynth as gs
 from tests.kernel_bits import kernel_of
-from tests.wasm_bits import Recorded, recording
 from tests.wasm_calls import browser, node
+from tests.wasm_cases import Recorded, recording
 
 RUN = "kinematics.engine.kernels.running.run"
 
