@@ -151,6 +151,32 @@ def test_ranges_between_limits_are_those_of_the_library(tmp_path: Path) -> None:
     assert np.abs(np.reshape(result["done"][2]["pose"], (4, 3))[:, :2] - posed.poses[0][:, :2]).max() < 1e-9
 
 
+def test_a_change_point_upon_a_sample_ends_the_range_as_in_the_library(tmp_path: Path) -> None:
+    """Scott Russell's crank and rod are equal: at +-90 degrees both modes meet and go on."""
+    flat = Mechanism.four_bar(2.0, 1.0, 2.0, 1.0)
+    posed = simulate(flat, [1.0], events=False).poses[0]
+    parallelogram = Mechanism(flat.graph, flat.joints, flat.drivers, pose=tuple(map(tuple, posed.tolist())))
+    (result,) = in_page(tmp_path, [(parallelogram, [["sweep", 181]])])
+    swept = result["done"][0]["result"]
+    assert not swept["full"] and {event["kind"] for event in swept["events"]} == {"change point"}
+    assert np.allclose([swept["inputs"][0], swept["inputs"][-1]], [0.0, math.pi], atol=1e-7, rtol=0.0)
+    assert np.allclose(simulate(parallelogram).inputs[[0, -1]], [0.0, math.pi], atol=2e-3 * math.pi)
+    for degrees in (40.0, 40.3, -75.0):
+        given = Mechanism.slider_crank(1.0, 1.0, 0.0)
+        pose = simulate(given, [math.radians(degrees)], events=False).poses[0]
+        mechanism = Mechanism(given.graph, given.joints, given.drivers, pose=tuple(map(tuple, pose.tolist())))
+        (result,) = in_page(tmp_path, [(mechanism, [["sweep", 181], ["advance", 1.7], ["advance", -1.7]])])
+        swept, up, down = (done["result"] for done in result["done"])
+        assert not swept["full"]
+        ends = [event["input"] for event in swept["events"] if event["kind"] == "change point"]
+        assert np.allclose(ends, [-math.pi / 2, math.pi / 2], atol=1e-7, rtol=0.0)
+        library = simulate(mechanism)
+        assert np.allclose(library.inputs[[0, -1]], ends, atol=2e-3 * math.pi)
+        for stop, sense in ((up, 1.0), (down, -1.0)):
+            assert not stop["reached"] and stop["stop"]["kind"] == "change point"
+            assert abs(stop["input"] - sense * math.pi / 2) < 1e-7
+
+
 def test_faults_and_groups_are_those_of_the_library(tmp_path: Path) -> None:
     random = np.random.default_rng(4)
     mechanisms = [random_mechanism(random, 0.3) for _ in range(40)]

@@ -63,6 +63,70 @@ def test_a_four_bar_is_drawn_with_fingers_on_a_phone(window, bench):
     assert person.script("return Bench.app.view.camera.scale") == pytest.approx(2 * before, rel=0.02)
 
 
+@pytest.mark.parametrize("size", [(568, 320), (740, 360), (932, 430)])
+@pytest.mark.parametrize("language", ["en", "ru"])
+def test_a_phone_held_across_leaves_room_for_the_drawing(window, bench, size, language):
+    """Tools and panel stand beside the drawing, which is seen whole; nothing of the bars is cut off."""
+    person = Person(window, bench, size, mobile=True).open("#t=jansen", language)
+    person.look()
+    boxes = person.script(
+        """return [...["sheet", "player", "undo", "tools", "chosen", "said"].map(id => document.getElementById(id)),
+             ...document.querySelectorAll(".top>*, #player>*")].filter(own => own.id === "sheet" || own.offsetWidth)
+             .map(own => { const b = own.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; })"""
+    )
+    (left, top, right, bottom), player = boxes[:2]
+    assert bottom - top > 0.7 * size[1] and right - left > 0.45 * size[0]
+    assert all(box[0] >= 0 and box[2] <= size[0] and box[1] < size[1] for box in boxes)
+    assert player[3] - player[1] < 60
+    assert person.script(
+        "return Bench.app.view.holds(Bench.boxWithPaths(Bench.app), document.getElementById('player').offsetHeight)"
+    )
+
+
+def test_another_unit_and_places_on_a_picture(person):
+    """What is seen stays where it is in another unit, also after undo; places on a picture do not snap to the grid."""
+    four_bar(person)
+    before = person.pixels(40, 0)
+    choose = "const u = document.getElementById('unit'); u.value = arguments[0]; u.dispatchEvent(new Event('change'))"
+    person.script(choose, "in")
+    assert person.said() == "Changed."
+    assert Mechanism.from_json(json.dumps(person.drawn())).joint(0, 3).at_a == pytest.approx((40 / 25.4, 0))
+    assert person.pixels(40 / 25.4, 0) == pytest.approx(before)
+    person.key("z", control=True)
+    assert person.pixels(40, 0) == pytest.approx(before)
+    pick = "const app = Bench.app; app.tool = arguments[0]; return Bench.stage.pickAt(app.view.px([13.1, -7.3]))"
+    picked = [person.script(pick, tool)[c] for tool in ("picture", "link") for c in "xy"]
+    assert picked == pytest.approx([13.1, -7.3, 15, -5])
+
+
+def test_each_link_at_a_multiple_joint_can_be_driven(person):
+    """The panel lists them; the speed changes also while the mechanism is moved, and a fault is not left standing."""
+    four_bar(person)
+    person.tool("link")
+    person.drag((-40, 0), (-80, 30))
+    person.script(
+        "const { points } = Bench.app.sheet;Bench.app.select([Object.keys(points).find(id => points[id].name === 'A')])"
+    )
+    boxes = "[...document.querySelectorAll('#chosen label.check')].filter(own => /^driven/.test(own.textContent))"
+    assert person.script(f"return {boxes}.map(own => own.textContent)") == [
+        "driven: link 1 on frame",
+        "driven: link 4 on frame",
+    ]
+    person.script(f"{boxes}[1].querySelector('input').click()")
+    assert [driver["link"] for driver in person.drawn()["drivers"]] == [1, 4]
+    person.script("Bench.app.motion.to(0.3); Bench.app.changed('rest')")
+    speed = """const all = [...document.querySelectorAll('#chosen label.field')];
+               const input = all.find(own => own.textContent === 'Speed').querySelector('input');
+               input.value = arguments[0]; input.dispatchEvent(new Event('change'))"""
+    person.script(speed, "fast")
+    assert "fast" in person.said()
+    person.script(speed, "2")
+    assert person.said() == "Changed."
+    mechanism = Mechanism.from_json(json.dumps(person.drawn()))
+    assert [driver.law.rate for driver in mechanism.drivers] == [2, 1]
+    assert mechanism.simulate().assembled.all()
+
+
 def test_a_four_bar_is_drawn_with_keys_alone(person):
     def at(x, y):
         person.script("Bench.stage.cursor = {x: arguments[0], y: arguments[1]}", x, y)

@@ -55,9 +55,9 @@ def test_a_rocker_is_proved_up_to_its_exact_limits_and_not_beyond(scripts):
 
 @pytest.mark.long
 def test_nothing_is_proved_through_a_position_where_branches_meet(scripts):
-    """A parallelogram folds flat after half a turn; a gear is none of the known joints."""
+    """A parallelogram is flat before and after half a turn; a gear is none of the known joints."""
     flat, wheels = proved(scripts, Mechanism.four_bar(2.0, 1.0, 2.0, 1.0, crank_angle=1.0), geared())
-    assert not flat["full"] and flat["low"] == flat["start"]
+    assert not flat["full"] and 0.0 < flat["low"] < 1e-5
     assert math.pi - 1e-5 < flat["high"] < math.pi
     assert wheels == {"known": False} | {key: wheels[key] for key in ("asked", "start", "Lc")}
 

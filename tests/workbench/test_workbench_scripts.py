@@ -183,6 +183,20 @@ def test_a_copy_and_a_mirror_image_have_the_same_lengths(scripts):
             assert one == pytest.approx(other, rel=1e-14)
 
 
+def test_a_copy_is_driven_as_its_original_and_a_mirror_image_the_other_way(scripts):
+    found = scripts(
+        FOUR_BAR
+        + """
+        const all = Object.keys(s.links);
+        return [Bench.copied(s, all, (x, y) => [x + 7, y - 3])[0], Bench.mirrored(s, all, 50)[0]].map(Bench.written);"""
+    )
+    for data, sense in zip(found, (1.0, -1.0)):
+        both = Mechanism.from_json(json.dumps(data))
+        assert len(both.drivers) == both.graph.mobility == 2
+        one, other = both.simulate().poses[:, [1, 4], 2].T
+        assert np.allclose(other, sense * one, atol=1e-12)
+
+
 def test_numbers_with_units(scripts):
     asked = [
         ["12", "mm"],
@@ -201,6 +215,56 @@ def test_numbers_with_units(scripts):
     )
     assert found[:6] == pytest.approx([12, 38.1, 32, -4, -4, 1000 / 25.4])
     assert found[6:] == [None, None, 100, None]
+
+
+@pytest.mark.parametrize("name", ["geared", "sliding", "table", "excavator_arm"])
+def test_in_another_unit_the_mechanism_is_as_large_as_it_was(scripts, name):
+    """Only its numbers change: the motion in inches is that in millimetres, and the way back loses nothing."""
+    found = scripts(
+        """const s = Bench.opened(Bench.checked(args[0])), other = Bench.inUnit(s, "in");
+           return [other, Bench.inUnit(other, "mm"), s].map(Bench.written);""",
+        to_dict(assembled(CASES[name]())),
+    )
+    small, large, known = (Mechanism.from_json(json.dumps(data)) for data in found)
+    assert np.allclose(large.dimensions, known.dimensions, rtol=1e-13, atol=1e-13)
+    inputs = np.linspace(0.0, 0.3, 5) if known.input_range is None else np.linspace(*known.input_range, 5)
+    one, other = (own.simulate(inputs, events=False).poses for own in (small, large))
+    assert np.isfinite(other).all()
+    assert np.abs(one * [25.4, 25.4, 1.0] - other).max() < 1e-9 * max(1.0, np.abs(other).max())
+
+
+def test_the_unit_of_a_file_is_that_of_its_own_comment(scripts):
+    """Not a word of any other comment that a file may begin with."""
+    found = scripts(
+        """const own = Bench.languages().flatMap(name => { Bench.speak(name); return Bench.UNITS.map(unit => [unit,
+             Bench.unitOf(Bench.toToml(Bench.written(Bench.empty()), unit))]); });
+           return [own, args[0].map(Bench.unitOf)]""",
+        ["# a press with its rods in\n", "# drawn in 1906, lengths in m and angles in rad\n", "format = 1"],
+    )
+    assert all(unit == read for unit, read in found[0]) and len(found[0]) == 8
+    assert found[1] == [None, None, None]
+
+
+def test_several_drivers_stay_in_step(scripts):
+    """One of two drivers was moved, its speed or its place changed: the file begins where the drawing stands."""
+    graph = MechanismGraph(5, [(0, 1), (1, 2), (2, 3), (3, 4), (0, 4)], frame=0)
+    made = Mechanism.from_graph(graph, [(0, 0), (-2, 5), (5, 9), (12, 5), (10, 0)], driver=(0, 1))
+    made = replace(made, drivers=(Driver(0, 1), Driver(0, 4)))
+    held = replace(made, drivers=(Driver(0, 1), Driver(0, 4, Polynomial((0.0,)))))
+    moved = held.simulate(np.linspace(0.0, -0.7, 15)).poses[-1]
+    found = scripts(
+        """const s = Bench.opened(Bench.checked(args[0])), one = Bench.rebased(s, args[1]);
+           const [first, second] = one.drivers, off = Bench.toggleDriver(one, second.base, second.link);
+           return [one, Bench.toggleDriver(off, second.base, second.link)].map(Bench.written)""",
+        to_dict(made),
+        moved.tolist(),
+    )
+    for data in found:
+        drawn = Mechanism.from_json(json.dumps(data))
+        motion = drawn.simulate()
+        assert motion.assembled.all()
+        start = drawn.simulate([-drawn.drivers[0].law.offset]).poses[0]
+        assert np.abs(start).max() < 1e-12 * 10
 
 
 def test_lengths_are_read_with_the_units_that_are_shown_in_every_language(scripts):

@@ -33,7 +33,7 @@
       this.history.push(sheet);
       this.selection = (select || this.selection).filter(id => this.has(id));
       this.changed("sheet");
-      if (say) this.say(...say);
+      this.say(...(say || ["said.changed"]));
     }
     has(id) { return Boolean(this.sheet.points[id] || this.sheet.links[id] || this.sheet.pairs[id]); }
 

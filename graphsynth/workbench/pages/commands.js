@@ -28,15 +28,17 @@
       app.changed("view");
     },
     fresh: app => {
-      app.take(Bench.empty(), { select: [], say: ["said.fresh"] });
-      Object.assign(app.view.camera, { x: 0, y: 0, scale: 2 });
+      const { unit } = app.sheet;
+      app.measured = null;
+      app.take({ ...Bench.empty(), unit }, { select: [], say: ["said.fresh"] });
+      Object.assign(app.view.camera, { x: 0, y: 0, scale: 2 * Bench.UNIT_SIZE[unit] });
       app.changed("view");
     },
     mode: app => app.setMode(app.mode === "draw" ? "run" : "draw"),
     grid: app => { app.options.grid = !app.options.grid; app.changed("view"); },
     snap: app => { app.options.snap = !app.options.snap; app.say(app.options.snap ? "said.snap" : "said.nosnap"); app.changed("view"); },
     names: app => { app.options.names = !app.options.names; app.changed("view"); },
-    help: () => document.getElementById("help").showModal(),
+    help: () => { const dialog = document.getElementById("help"); dialog.showModal(); dialog.scrollTop = 0; },
     escape: app => {
       if (app.picks.length || app.measured) { app.picks = []; app.measured = null; app.changed("view"); } else if (app.tool !== "select") app.pick("select");
       else app.select([]);

@@ -94,10 +94,10 @@
   /** The driver of a joint picked at a point or a pair: there, turned round, gone. */
   Bench.toggleDriver = (sheet, base, link) => {
     const own = driver => (driver.base === base && driver.link === link) || (driver.base === link && driver.link === base);
-    if (sheet.drivers.some(own)) return { ...sheet, drivers: sheet.drivers.filter(d => !own(d)), range: null };
+    if (sheet.drivers.some(own)) return { ...sheet, drivers: Bench.inStep(sheet.drivers.filter(d => !own(d))), range: null };
     if (!Bench.drivable(sheet, base, link)) throw new Bench.Fault("fault.driver");
     const driver = { base, link, law: { kind: "linear", rate: 1, offset: 0 } };
-    return { ...sheet, drivers: [...sheet.drivers, driver], range: null };
+    return { ...sheet, drivers: Bench.inStep([...sheet.drivers, driver]), range: null };
   };
 
   /** The two links that a driver at this place would drive: [base, link], the frame as base where it is there. */
@@ -158,8 +158,9 @@
     return [...found];
   };
 
-  /** Copies of links (and of points between them), changed by a map of places; returns [sheet, new ids]. */
-  Bench.copied = (sheet, selection, map, turn = angle => angle) => {
+  /** Copies of links, of points between them and of their drivers, changed by a map of places, which may turn angles round;
+      returns [sheet, new ids]. */
+  Bench.copied = (sheet, selection, map, turn = angle => angle, sense = 1) => {
     const chosen = new Set(selection), points = new Set(Bench.pointsOf(sheet, selection));
     const links = Object.keys(sheet.links).filter(id => id !== GROUND &&
       (chosen.has(id) || (sheet.links[id].points.every(point => points.has(point)))));
@@ -180,12 +181,14 @@
       const angle = pair.angle === undefined ? {} : { angle: turn(Bench.direction(from, pair)) };
       [sheet] = Bench.withPair(sheet, { ...pair, a: of(pair.a), b: of(pair.b), at: to[pair.at], ...angle, ...more });
     }
-    return [sheet, links.map(id => to[id])];
+    const drivers = from.drivers.filter(own => of(own.base) && of(own.link) && Bench.drivable(sheet, of(own.base), of(own.link))).map(own => ({
+      base: of(own.base), link: of(own.link), law: Bench.scaledLaw(own.law, Bench.drivable(from, own.base, own.link).turns ? sense : 1) }));
+    return [drivers.length ? { ...sheet, drivers: [...sheet.drivers, ...drivers], range: null } : sheet, links.map(id => to[id])];
   };
 
   /** Mirror images of a selection about the vertical line through x. */
   Bench.mirrored = (sheet, selection, x) =>
-    Bench.copied(sheet, selection, (px, py) => [2 * x - px, py], angle => Math.PI - angle);
+    Bench.copied(sheet, selection, (px, py) => [2 * x - px, py], angle => Math.PI - angle, -1);
 
   /** The box around points: [left, bottom, right, top], or null. */
   Bench.box = (sheet, ids = Object.keys(sheet.points)) => {

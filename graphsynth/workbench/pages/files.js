@@ -26,8 +26,9 @@
 
   /** Open a text; what it is not is said in one sentence, and the drawing stays. */
   Bench.openText = (app, text, name = "") => app.attempt(() => {
-    const unit = /^# .*\b(mm|cm|m|in)\b/.exec(text), sheet = Bench.fromText(text);
-    return { sheet: { ...sheet, unit: unit ? unit[1] : app.sheet.unit }, select: [], say: ["said.opened", { file: name.slice(0, 60) }] };
+    const sheet = Bench.fromText(text), unit = Bench.unitOf(text) || app.sheet.unit;
+    app.measured = null;
+    return { sheet: { ...sheet, unit }, select: [], say: ["said.opened", { file: name.slice(0, 60) }] };
   }) && (Bench.do.fit(app), true);
 
   Bench.do.open = app => {

@@ -100,7 +100,7 @@
       const [base, link] = j.b === ids.indexOf(Bench.GROUND) ? [j.b, j.a] : [j.a, j.b];
       const text = Bench.word("know.drive", { a: Bench.linkName(sheet, ids[link]), b: Bench.linkName(sheet, ids[base]) });
       return [text, () => app.attempt(s => ({
-        sheet: { ...s, range: null, drivers: [{ base: ids[base], link: ids[link], law: { kind: "linear", rate: 1, offset: 0 } }, ...s.drivers.slice(1)] },
+        sheet: { ...s, range: null, drivers: Bench.inStep([{ base: ids[base], link: ids[link], law: { kind: "linear", rate: 1, offset: 0 } }, ...s.drivers.slice(1)]) },
         say: ["said.driven", { a: Bench.linkName(s, ids[link]), b: Bench.linkName(s, ids[base]) }],
       }))];
     }))];

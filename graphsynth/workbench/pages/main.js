@@ -83,7 +83,7 @@
     theme.value = document.documentElement.dataset.theme || "auto";
     theme.onchange = () => { document.documentElement.dataset.theme = theme.value; remembered("workbench-theme", theme.value); };
     unit.replaceChildren(...Bench.UNITS.map(name => make("option", { value: name }, Bench.unitName(name))));
-    unit.onchange = () => app.take({ ...app.sheet, unit: unit.value });
+    unit.onchange = () => app.attempt(sheet => ({ sheet: Bench.inUnit(sheet, unit.value) }));
   }
 
   function speak(app) {
@@ -127,7 +127,23 @@
     $("sheet").setAttribute("aria-label", Bench.word("sheet.label", { links, joints, drivers: sheet.drivers.length, mode: Bench.word(`mode.${app.mode}`) }));
   }
 
+  /** Everything that is no part of the drawing in the unit that the drawing has now. */
+  function sameUnit(app, state) {
+    const { view: { camera }, background, target, poses, sheet: { unit } } = app, by = Bench.UNIT_SIZE[state.unit] / Bench.UNIT_SIZE[unit];
+    state.unit = unit;
+    if (by === 1) return;
+    const times = ([x, y, ...more]) => [x * by, y * by, ...more];
+    Object.assign(camera, { x: camera.x * by, y: camera.y * by, scale: camera.scale / by });
+    for (const key of ["x", "y", "width", "height"]) if (background) background[key] *= by;
+    if (target) app.target = { ...target, curve: target.curve.map(times) };
+    if (poses) app.poses = poses.map(times);
+    Object.assign(app, { measured: null });
+    app.jamming.end *= by;
+  }
+
   function show(app, stage) {
+    const state = { unit: app.sheet.unit };
+    app.on("sheet", () => sameUnit(app, state));
     let asked = false;
     const paint = () => {
       asked = false;

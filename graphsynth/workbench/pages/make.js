@@ -30,9 +30,9 @@
     return make("label", { class: "field" }, make("span", {}, Bench.word(key)), input, unit ? make("i", {}, Bench.unitName(unit)) : null);
   };
 
-  Bench.check = (key, on, take) => {
+  Bench.check = (key, on, take, values) => {
     const input = make("input", { type: "checkbox", checked: on, on: { change: () => take(input.checked) } });
-    return make("label", { class: "check" }, input, Bench.word(key));
+    return make("label", { class: "check" }, input, Bench.word(key, values));
   };
 
   Bench.choice = (key, value, all, take) => {

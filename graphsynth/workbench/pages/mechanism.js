@@ -76,6 +76,12 @@
     return { ...law, coefficients: [law.coefficients[0] + by, ...law.coefficients.slice(1)] };
   };
 
+  /** Drivers in step: at the input at which the first one is in the drawn position all linear ones are. */
+  Bench.inStep = drivers => {
+    const { law = {} } = drivers[0] || {}, there = law.kind === "linear" && law.rate ? law.offset / law.rate : NaN;
+    return drivers.map((own, k) => (k && own.law.kind === "linear" && Number.isFinite(there) ? { ...own, law: { ...own.law, offset: own.law.rate * there } } : own));
+  };
+
   /** Where a pose of a link takes a place of its frame. */
   Bench.carried = (pose, at) => {
     const c = Math.cos(pose[2]), s = Math.sin(pose[2]);
@@ -188,11 +194,11 @@
       slides[`${pair.a} ${pair.b}`] = Math.cos(angle) * (at[0] - old[0]) + Math.sin(angle) * (at[1] - old[1]);
       return [id, { ...pair, angle }];
     }));
-    const drivers = sheet.drivers.map(driver => {
+    const drivers = Bench.inStep(sheet.drivers.map(driver => {
       const key = [`${driver.base} ${driver.link}`, `${driver.link} ${driver.base}`].find(own => own in slides);
       const by = key ? slides[key] : pose(driver.link)[2] - pose(driver.base)[2];
       return { ...driver, law: Bench.shiftedLaw(driver.law, -by) };
-    });
+    }));
     const points = Object.fromEntries(Object.entries(sheet.points).map(([id, point]) =>
       [id, { ...point, x: places[id][0], y: places[id][1] }]));
     return { ...sheet, points, pairs, drivers };

@@ -38,18 +38,25 @@
       check("panel.fixed", links.includes(Bench.GROUND), () => app.attempt(s => Bench.TOOLS.ground.apply(s, [{ point: id }]))),
       check("panel.traced", point.trace, on => set({ trace: on })),
       make("p", { class: "soft" }, Bench.word("panel.through", { links: links.map(own => Bench.linkName(sheet, own)).join(", ") || "–" })),
-      ...driverPart(app, Bench.driverAt(sheet, id)),
+      ...driverParts(app, id),
       links.length > 1 && button("do.separate", () => take(app, s => Bench.unpinned(s, id))),
     ];
   }
 
-  /** The driver of a joint: there or not, its speed, where it begins. */
-  function driverPart(app, links) {
+  /** The drivers at a point: of what slides there, or of every joint, by the names of its links where there are more. */
+  function driverParts(app, id) {
+    const { sheet } = app, pins = Bench.pinsAt(sheet, id), slides = Object.values(sheet.pairs).some(pair => pair.kind === "P" && pair.at === id);
+    return pins.length > 1 && !slides ? pins.flatMap(pin => driverPart(app, pin, "panel.drivenof")) : driverPart(app, Bench.driverAt(sheet, id));
+  }
+
+  /** The driver of a joint: there or not, and its speed. */
+  function driverPart(app, links, key = "panel.driven") {
     if (!links) return [];
     const sheet = app.posed(), own = sheet.drivers.find(d => links.includes(d.base) && links.includes(d.link));
-    const box = check("panel.driven", Boolean(own), () => take(app, s => Bench.toggleDriver(s, ...links)));
+    const names = { a: Bench.linkName(sheet, links[1]), b: Bench.linkName(sheet, links[0]) };
+    const box = check(key, Boolean(own), () => take(app, s => Bench.toggleDriver(s, ...links)), names);
     if (!own || own.law.kind !== "linear") return [box];
-    const set = law => take(app, s => ({ ...s, drivers: s.drivers.map(d => (d === own ? { ...d, law: { ...d.law, ...law } } : d)), range: null }));
+    const set = law => take(app, s => ({ ...s, drivers: Bench.inStep(s.drivers.map(d => (d.base === own.base && d.link === own.link ? { ...d, law: { ...d.law, ...law } } : d))), range: null }));
     const value = text => {
       const found = Number(text.replace(",", "."));
       if (!Number.isFinite(found) || found === 0) throw new Bench.Fault("fault.typed", { text: text.slice(0, 20) });

@@ -6,10 +6,11 @@
 (function () {
   const GROUND = "l0";
   const LIMITS = { points: 400, links: 64, pairs: 100, size: 1e7, name: 40 };
-  const UNITS = ["mm", "cm", "m", "in"];
+  const UNIT_SIZE = { mm: 1, cm: 10, m: 1000, in: 25.4 }, UNITS = Object.keys(UNIT_SIZE);
   Bench.GROUND = GROUND;
   Bench.LIMITS = LIMITS;
   Bench.UNITS = UNITS;
+  Bench.UNIT_SIZE = UNIT_SIZE;
 
   Bench.empty = () => ({
     unit: "mm", next: 1, points: {}, links: { [GROUND]: { points: [], name: "" } }, pairs: {}, drivers: [], range: null,
@@ -128,6 +129,23 @@
       }
     }
     return { ...moved, pairs };
+  };
+
+  /** A table of which some entries, numbers or lists of them, are multiplied. */
+  function scaled(own, by, ...keys) {
+    const times = value => (Array.isArray(value) ? value.map(times) : Number(bounded(value * by).toPrecision(15)));
+    return { ...own, ...Object.fromEntries(keys.filter(key => own[key] !== undefined).map(key => [key, times(own[key])])) };
+  }
+
+  /** A motion law whose coordinate is multiplied. */
+  Bench.scaledLaw = (law, by) => scaled(law, by, "rate", "offset", "mean", "amplitude", "coefficients", "values");
+
+  /** The same mechanism in another unit: the numbers change, the mechanism is as large as it was. */
+  Bench.inUnit = (sheet, unit) => {
+    const by = UNIT_SIZE[sheet.unit] / UNIT_SIZE[unit];
+    const each = (table, ...keys) => Object.fromEntries(Object.entries(table).map(([id, own]) => [id, scaled(own, by, ...keys)]));
+    const drivers = sheet.drivers.map(own => (Bench.drivable(sheet, own.base, own.link).turns ? own : { ...own, law: Bench.scaledLaw(own.law, by) }));
+    return { ...sheet, unit, points: each(sheet.points, "x", "y"), pairs: each(sheet.pairs, "radii", "radius", "harmonics"), drivers };
   };
 
   Bench.distance = (sheet, a, b) =>

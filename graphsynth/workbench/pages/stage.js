@@ -35,7 +35,7 @@
       const { app, view } = this, hit = this.hit(pixels, event.pointerType === "touch");
       const point = hit.point && app.sheet.points[hit.point], grid = app.options.snap && Bench.gridStep(view.camera.scale);
       const from = this.lastPick();
-      const place = Bench.snapped(view.place(pixels), { point, from, straight: event.shiftKey, grid, off: event.altKey });
+      const place = Bench.snapped(view.place(pixels), { point, from, straight: event.shiftKey, grid, off: event.altKey || app.tool === "picture" });
       return { ...hit, ...place };
     }
     lastPick() { return this.app.picks[this.app.picks.length - 1] || null; }

@@ -13,6 +13,9 @@
     return `{ ${Object.entries(own).map(([name, part]) => `${name} = ${value(name, part)}`).join(", ")} }`;
   }
 
+  /** The unit that the comment at the head of a file names, as `toToml` writes it in any language; null for any other comment. */
+  Bench.unitOf = text => (/^# [^\s:]+: (mm|cm|m|in)\r?\n/.exec(text) || /^# lengths in (mm|cm|m|in)\r?\n/.exec(text) || [null, null])[1];
+
   /** Write a mechanism in the form of files as TOML; the lengths are in this unit, which a comment says. */
   Bench.toToml = (data, unit) => {
     const lines = [`# ${Bench.word("file.unit", { unit })}`];

@@ -120,7 +120,7 @@
   Bench.parseLength = (text, unit) => {
     const found = /^\s*([+−-]?\d*[.,]?\d*(?:e[+-]?\d+)?)\s*(mm|cm|m|in|мм|см|м|дюйм)?\s*$/i.exec(text);
     if (!found || !/\d/.test(found[1])) return NaN;
-    const names = { мм: "mm", см: "cm", м: "m", дюйм: "in" }, size = { mm: 1, cm: 10, m: 1000, in: 25.4 };
+    const names = { мм: "mm", см: "cm", м: "m", дюйм: "in" }, size = Bench.UNIT_SIZE;
     const own = (found[2] || unit).toLowerCase(), value = Number(found[1].replace(",", ".").replace("−", "-"));
     return own === unit ? value : (value * size[names[own] || own]) / size[unit];
   };

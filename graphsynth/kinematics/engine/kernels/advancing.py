@@ -26,6 +26,10 @@ SMALLEST = 1e-11
 SAFE = 0.2
 #: Cosine of the largest turn of a link between two samples that is taken as it is.
 SUDDEN = 0.5
+#: Margins at and below this have vanished: two modes meet at the sample.
+TOUCH = 1e-15
+#: Part of the longest step beyond a place that is not reached at which a branch that goes on there is met again.
+BEYOND = 4e-5
 #: Steps that are tried at most for one way.
 TRIALS = 100_000
 
@@ -96,6 +100,8 @@ def doubt(tables, state):
         m0, m1, m2, m3 = abs(M[s, 0]), abs(M[s, 1]), abs(M[s, 2]), abs(M[s, 3])
         if min(min(m0, m1), min(m2, m3)) > SAFE:
             continue
+        if min(m1, min(m2, m3)) <= TOUCH < m0:  # a sample upon the place where the modes meet
+            return outlines.MEETING, s
         # the cubic through the samples falls into the step from both ends: how far?
         if 18.0 * m1 + 2.0 * m3 < 11.0 * m0 + 9.0 * m2 and 18.0 * m2 + 2.0 * m0 < 11.0 * m3 + 9.0 * m1:
             lowest = min(m1, m2)
@@ -161,6 +167,11 @@ def follow(tables, modes, state, start, goal, span, sizes, work):
         step = 0.5 * length
         if step < SMALLEST * most:
             break
+    if code == codes.UNREACHABLE and tables.steps[at, 0] in codes.TWO_MODES and abs(end - s) > BEYOND * most:
+        # it is assembled again right behind: the margin has vanished without changing its sign
+        coordinates(start, goal, rate, s, s + math.copysign(BEYOND * most, end - s), q, u)
+        done, _, _ = run_set(tables, 0, wanted, q, u, modes, state, room, limits, 1, sizes, True)
+        code = outlines.MEETING if done == SAMPLES else code
     return s, code, at
 
 
