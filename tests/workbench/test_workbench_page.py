@@ -125,6 +125,11 @@ def test_each_link_at_a_multiple_joint_can_be_driven(person):
     mechanism = Mechanism.from_json(json.dumps(person.drawn()))
     assert [driver.law.rate for driver in mechanism.drivers] == [2, 1]
     assert mechanism.simulate().assembled.all()
+    # a new drawing: nothing of the old one is left, what was wanted neither
+    person.script("Bench.app.poses = [[0, 0, 0]]; Bench.app.target = { curve: [[0, 0], [1, 1]], closed: false }")
+    person.press("[data-do=fresh]")
+    person.look()
+    assert person.script("return document.querySelectorAll('[data-layer=target] *').length") == 0
 
 
 def test_a_four_bar_is_drawn_with_keys_alone(person):

@@ -222,6 +222,12 @@ def test_names_and_uses_are_found(page):
     until(window, "document.querySelector('#entry .named')")
     text = css(window, "#entry .named").text
     assert "Klann" in text and "patent" in text
+    # from any page to the search, and what fits nothing is told where to ask
+    window.find_element(by.TAG_NAME, "body").send_keys("/")
+    until(window, "document.activeElement.name === 'text'")
+    put(window, "[name=text]", "no such thing")
+    assert count(window) == "0 of 19 chains"
+    assert css(window, "#chosen a").get_attribute("href").endswith("#/find")
 
 
 @pytest.mark.long

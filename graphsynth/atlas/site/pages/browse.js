@@ -40,16 +40,15 @@
     $("list").addEventListener("focusin", event => keepSeen(event.target.closest("li")));
     addEventListener("scroll", later, {passive: true});
     addEventListener("resize", () => { if (!$("browse").hidden) { clear(); lay(); } });
-    document.addEventListener("keydown", event => {
-      if (event.key === "/" && !$("browse").hidden && !event.target.closest("input, textarea, select")) {
-        event.preventDefault();
-        $("filters").open = true;
-        $("question").text.focus();
-      }
-    });
     if (innerWidth < 760) $("filters").open = false;
     ready = true;
   }
+
+  /** Go to the search. */
+  Atlas.search = () => {
+    $("filters").open = true;
+    $("question").text.focus();
+  };
 
   function asked() {
     const own = {};
@@ -102,7 +101,7 @@
     const all = Atlas.rows.length;
     $("count").textContent = found.length === all ? `${Atlas.count(all)} chains` : `${Atlas.count(found.length)} of ${Atlas.count(all)} chains`;
     const rest = Atlas.contents.families.filter(family => !Atlas.families.get(family.name).rows);
-    $("chosen").innerHTML = html`${rest.length > 0 && `Chosen by their number of links, and loaded then: ${rest.map(f => `${Atlas.count(f.chains)} chains with ${f.links} links`).join(", ")}. `}${question.contracted
+    $("chosen").innerHTML = html`${!found.length && html`Nothing fits. Clear takes every choice back; <a href="#/find">Find my mechanism</a> reads drawings, matrices and lists of joints. `}${rest.length > 0 && `Chosen by their number of links, and loaded then: ${rest.map(f => `${Atlas.count(f.chains)} chains with ${f.links} links`).join(", ")}. `}${question.contracted
       && html`with the contracted graph ${Atlas.contents.contracted[question.contracted] || "?"} <button type="button" id="anyshape">any</button>`}`;
     if (question.contracted) $("anyshape").addEventListener("click", () => { $("question").contracted.value = ""; changed(); });
   }

@@ -7,7 +7,7 @@
   Atlas.count = value => String(value).replace(/\B(?=(\d{3})+$)/g, "\u202f");
   Atlas.classes = row => (!row.low ? "not computed" : row.low === row.high ? Atlas.roman(row.low) : `${Atlas.roman(row.low)}–${Atlas.roman(row.high)}`);
 
-  let first = true;
+  let first = true, searching = false;
 
   function decoded(text) {
     try { return decodeURIComponent(text); } catch { return text; }
@@ -23,8 +23,11 @@
     for (const link of document.querySelectorAll("nav a"))
       if (link.dataset.page === page) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current");
     let title = "";
-    if (page === "browse") scrollTo(0, (await Atlas.browse(parameters)) ? scroll || 0 : 0);
-    else if (page === "entry") title = await Atlas.entry(name, parameters);
+    if (page === "browse") {
+      scrollTo(0, (await Atlas.browse(parameters)) ? scroll || 0 : 0);
+      if (searching) Atlas.search();
+      searching = false;
+    } else if (page === "entry") title = await Atlas.entry(name, parameters);
     else title = page === "find" ? Atlas.openFind() : Atlas.about();
     if (title === null) return;
     document.title = title ? `${title} · Atlas of kinematic chains` : "Atlas of kinematic chains";
@@ -54,6 +57,12 @@
       return;
     }
     addEventListener("hashchange", route);
+    document.addEventListener("keydown", event => {
+      if (event.key !== "/" || event.target.closest("input, textarea, select")) return;
+      event.preventDefault();
+      searching = document.getElementById("browse").hidden;
+      if (searching) location.hash = "#/"; else Atlas.search();
+    });
     route();
   });
 })();
