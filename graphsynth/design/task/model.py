@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 #: Samples of the range, and the gap after a turn that counts as closed.
 _SAMPLES, _CLOSED = 60, 1e-6
+#: Distance of a candidate from the origin, over its size, from which it is moved about its own middle.
+_FAR = 3.0
 #: More samples at the ends of a range that is no turn, over the step: dead centres are near, where motions are fast.
 _ENDS = np.array([0.02, 0.1, 0.4])
 #: Frames of links at rest, and rates that do no harm, for sets without a motion.
@@ -277,7 +279,8 @@ class Model:
             inputs = np.sort(np.concatenate([inputs, more]))
             inputs = inputs[np.concatenate([[True], np.diff(inputs) > 1e-12])]
         scale = u.stroke[:, None, None]
-        table = self.plan.design.dimensions(u.places / scale, u.numbers)
+        centre = self.centre(u)
+        table = self.plan.design.dimensions((u.places - centre[:, None]) / scale, u.numbers)
         motion = simulate_batch(self.base, inputs, table, modes=self.modes, rates=True)
         complete = motion.completed.copy()
         period = self.task.span if self.task.drive == "rotation" else 0.0
@@ -287,9 +290,18 @@ class Model:
         frames, rates = np.ascontiguousarray(motion.frames), motion.velocities
         frames[..., :2] *= scale[..., None]
         rates[..., :2] *= scale[..., None]
+        if centre.any():
+            turned = turned_with(frames, centre)
+            frames[..., :2] += centre[:, None, None] - turned
+            rates[..., :2] -= rates[..., 2:] * turned[..., ::-1] * [-1.0, 1.0]
         complete &= np.isfinite(rates).all(axis=(1, 2, 3))
         frames[~complete], rates[~complete] = _REST, _SLOW
         return Moved(inputs, frames, rates, complete, period)
+
+    def centre(self, u: Unknowns) -> Array:
+        """Return where links have their frames while they move (sets, 2): no step is long only because one turns."""
+        middle, wide = u.places.mean(axis=1), np.ptp(u.places, axis=1).max(axis=1)
+        return np.where((np.hypot(*middle.T) > _FAR * wide)[:, None], middle, 0.0)
 
     def untransmitted(self, X: Array) -> Array:
         """Return what groups larger than dyads lack of the transmission angle (sets,), in hundredths of its sine."""
@@ -306,6 +318,12 @@ class Model:
         sines = transmission_sines(forms, table, ends, frames, margins).min(axis=(1, 2))
         weight = 100.0 * self.task.soft.get("transmission", 1.0)
         return np.asarray(weight * np.maximum(least - np.nan_to_num(sines), 0.0))
+
+
+def turned_with(frames: Array, centre: Array) -> Array:
+    """Return the places of centres (sets, 2) on links, turned with their frames (sets, n, links, 4)."""
+    (x, y), c, s = centre.T[:, :, None, None], frames[..., 2], frames[..., 3]
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
 def _alike(mirror: tuple[int, ...], groups: list[frozenset[int]], signs: NDArray[Any]) -> NDArray[Any]:

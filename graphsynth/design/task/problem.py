@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from graphsynth.design.task.aims import Aim, aims_of
 from graphsynth.design.task.contours import ContourAim
-from graphsynth.design.task.model import Model, Rows, Unknowns
+from graphsynth.design.task.model import Model, Rows, Unknowns, turned_with
 from graphsynth.design.task.targets import PathTarget
 from graphsynth.design.task.wishes import Lengths, direct_wishes, sampled_wishes
 from graphsynth.kinematics.engine.gradients import pose_gradients
@@ -126,28 +126,33 @@ class TaskProblem:
         model, sets, scale = self.model, len(u.places), u.stroke[:, None, None, None]
         deep = max(rows.loads.shape[1] for rows, _, _ in every)
         frames = np.concatenate([frames for _, frames, _ in every], axis=1)
-        frames[..., :2] /= scale
+        centre = model.centre(u)
+        turned = turned_with(frames, centre)
+        frames[..., :2] = (frames[..., :2] - centre[:, None, None] + turned) / scale
         loads = np.zeros((sets, deep, model.links, 3, frames.shape[1]))
         at = np.cumsum([0, *(rows.loads.shape[4] for rows, _, _ in every)])
         for k, (rows, _, _) in enumerate(every):
             loads[:, : rows.loads.shape[1], ..., at[k] : at[k + 1]] = rows.loads
+        moment = np.einsum("sdlan,snla->sdln", loads[..., :2, :], turned[..., ::-1] * [1.0, -1.0])
+        loads[..., 2, :] += moment  # about the centre
         loads[..., :2, :] *= scale[..., None]
-        table = model.plan.design.dimensions(u.places / scale[:, 0], u.numbers)
+        places = u.places - centre[:, None]
+        table = model.plan.design.dimensions(places / scale[:, 0], u.numbers)
         by = pose_gradients(model.base, table, frames, loads).dimensions
-        pulled = model.plan.design.pulled(by, u.places / scale[:, 0], u.numbers)  # (sets, d, n, 2 joints + numbers)
+        pulled = model.plan.design.pulled(by, places / scale[:, 0], u.numbers)  # (sets, d, n, 2 joints + numbers)
         pulled[..., : 2 * model.joints] /= scale
         slopes = np.zeros((*pulled.shape[:3], model.size))
         wide = 2 * model.joints
-        places = pulled[..., :wide].reshape(*pulled.shape[:3], model.joints, 2)
+        steep = pulled[..., :wide].reshape(*pulled.shape[:3], model.joints, 2)
         if model.plan.pins is not None:
             own, first, _ = model.plan.pins  # its guide turns with its ends, which moves no other link (to first order)
-            places[..., first, :] += places[..., own, :]
-        slopes[..., : 2 * len(model.free)] = places[..., model.free, :].reshape(*pulled.shape[:3], -1)
+            steep[..., first, :] += steep[..., own, :]
+        slopes[..., : 2 * len(model.free)] = steep[..., model.free, :].reshape(*pulled.shape[:3], -1)
         slopes[..., 2 * len(model.free) : model.points_at] = pulled[..., wide + np.array(model.angles, dtype=np.intp)]
         if model.task.linear:  # a longer stroke: a smaller mechanism with stroke 1, seen larger
             inner = np.einsum("sdlan,snla->sdn", loads[..., :2, :], frames[..., :2])
             slopes[..., model.stroke_at] = (
-                inner - np.einsum("sdnjk,sjk->sdn", _unpinned(places, model), u.places)
+                inner - np.einsum("sdnjk,sjk->sdn", _unpinned(steep, model), places)
             ) / u.stroke[:, None, None]
         found = []
         for k, (rows, _, rates) in enumerate(every):

@@ -146,6 +146,30 @@ def test_derivatives_are_those_of_differences(name: str, monkeypatch: pytest.Mon
     assert checked > 200
 
 
+@pytest.mark.parametrize("drive", ["cylinder", "rotation"])
+def test_a_task_far_from_the_origin_is_the_same_task(drive: str) -> None:
+    """Groups that Newton follows, in steps that a frame far away would make long: errors and derivatives."""
+    found: list[Any] = []
+    for away in (0.0, 2000.0):
+        poses = [(away, away, 0.0), (away + 1.0, away + 1.0, 0.3), (away + 1.5, away + 2.0, 0.9)]
+        target = PosesTarget(poses=poses, inputs=[0.0, 0.5, 1.0])
+        task = DesignTask(targets=[target], links=[6], drive=drive)  # type: ignore[arg-type]
+        plan = next(plan for plan in plans(task, 6) if not plan.design.dyadic)
+        random = np.random.default_rng(1)
+        model = Model(task, plan, random)
+        problem = TaskProblem(model)
+        if not found:
+            X, _ = placed_starts(problem, random_starts(model, 400, random), 6, random)
+            u = model.read(X)
+        X = model.write(u._replace(places=u.places + away, points=u.points + away))
+        found.append(problem.linearise(X, None, 1.0)[0])
+    here, far = found
+    both = np.isfinite(here.error) & np.isfinite(far.error)
+    assert both.sum() >= 4  # of six: a step of a frame that is elsewhere may be at its limit
+    assert far.error[both] == pytest.approx(here.error[both], rel=1e-6)
+    assert np.abs(far.slopes - here.slopes)[both].max() < 1e-5 * np.abs(here.slopes[both]).max()
+
+
 def hidden() -> Any:
     """Return the motion of a crank-rocker with a point off its coupler."""
     own = gs.Mechanism.four_bar(4.0, 1.5, 3.5, 3.0, coupler_point=(1.6, 1.9))
@@ -523,7 +547,8 @@ def test_a_task_is_measured_by_the_lengths_it_names(unit: float) -> None:
     ]
     for task, size in tasks:
         assert task.size == pytest.approx(size * unit, rel=1e-12)
-        assert task.lengths == pytest.approx((0.1 * min(size, 4.0 if task.pivots else size) * unit, 6.0 * size * unit))
+        least = min([0.1 * min(size, 4.0 if task.pivots else size) * unit, *task.given])  # a given crank is allowed
+        assert task.lengths == pytest.approx((least, 6.0 * size * unit))
     assert DesignTask(targets=[turns]).size == 1.0
 
 
