@@ -146,7 +146,7 @@ def estimates(family: Family) -> NDArray[np.float64]:
     The bound depends only on how many classes have how many parallel paths, and there are few such patterns.
     """
     pairs = family.graphs[:, *np.triu_indices(family.vertices, 1)]
-    top = max(family.edge_labels.multiplicities, default=0)
+    top = max(family.edge_labels.multiplicities)
     patterns = np.stack([(pairs == mu).sum(axis=1) for mu in range(1, top + 1)], axis=1)
     if not len(patterns):
         return np.zeros(0)

@@ -107,13 +107,11 @@ class EdgeLabels:
 
     @property
     def limits(self) -> tuple[int, ...]:
-        """Resources to use up: binary links, joints of each higher mobility, and freedom to lend (for W >= 2)."""
-        lend = (self._lend,) if self.mobility > 1 else ()
-        return (self.binary_links, *(count for _, count in self.higher), *lend)
+        """Resources to use up: binary links, joints of each higher mobility, and freedom to lend, the last."""
+        return (self.binary_links, *(count for _, count in self.higher), self._lend)
 
     def _cost(self, path: PathType) -> tuple[int, ...]:
-        lend = (max(0, freedom(path) - self.space),) if self.mobility > 1 else ()
-        return (len(path) - 1, *(path.count(i) for i, _ in self.higher), *lend)
+        return (len(path) - 1, *(path.count(i) for i, _ in self.higher), max(0, freedom(path) - self.space))
 
     def _fits(self, cost: tuple[int, ...]) -> bool:
         return all(c <= limit for c, limit in zip(cost, self.limits))
@@ -158,10 +156,10 @@ class EdgeLabels:
         """
         if ends == BETWEEN_LINKS:
             return True
-        shortest = 1 if ends == TO_PIN else 2
         stiff = [path for path in paths if freedom(path) <= self.space]
-        if ends == LOOSE or any(len(path) < shortest for path in paths):
-            return ends == LOOSE and not stiff
+        if ends == LOOSE:
+            return not stiff
+        shortest = 1 if ends == TO_PIN else 2
         one = len(stiff) == 1 and len(stiff[0]) == shortest
         weight = sum(self.space - freedom(path) for path in stiff)
         return one or (weight <= self.space - 1 - shortest and (ends == TO_PIN or bool(stiff)))
@@ -218,8 +216,7 @@ class EdgeLabels:
 
         ``pattern``: ``pattern[mu - 1]`` classes consist of mu parallel paths.
         """
-        exact = len(self.limits) - (self.mobility > 1)  # freedom to lend may be left over
-        return sum(count for used, count in self._ways(pattern).items() if used[:exact] == self.limits[:exact])
+        return sum(count for used, count in self._ways(pattern).items() if used[:-1] == self.limits[:-1])
 
     def _ways(self, pattern: tuple[int, ...]) -> dict[tuple[int, ...], float]:
         """Count the choices for some classes by the resources they use."""
@@ -237,7 +234,7 @@ class EdgeLabels:
 
     @cached_property
     def _known_ways(self) -> dict[tuple[int, ...], dict[tuple[int, ...], float]]:
-        nothing = (0,) * max(self.multiplicities, default=0)
+        nothing = (0,) * max(self.multiplicities)
         return {nothing: {(0,) * len(self.limits): 1.0}}
 
     @cached_property
@@ -255,7 +252,7 @@ class EdgeLabels:
     @cached_property
     def by_kind(self) -> list[list[EdgeLabel]]:
         """Labels by kind ``2 * multiplicity + marked``; empty for multiplicities that do not occur."""
-        top = max(self.multiplicities, default=0)
+        top = max(self.multiplicities)
         kinds: list[list[EdgeLabel]] = []
         for kind in range(2 * top + 2):
             multiplicity, marked = divmod(kind, 2)
@@ -279,7 +276,7 @@ class EdgeLabels:
         steps = [1]
         for limit in self.limits[:-1]:
             steps.append(steps[-1] * (limit + 1))
-        shifts = range(0, _DIGIT * len(steps), _DIGIT)
+        shifts = [_DIGIT * place for place in range(len(steps))]
         alike = []
         for label in self.flat:
             cost = self.cost(label)
@@ -291,20 +288,19 @@ class EdgeLabels:
         reverse: list[int] = []
         kinds, group_kinds = [], []
         groups: list[tuple[int, ...]] = []
-        heaviest = [0] * (max(self.multiplicities, default=0) + 1)
+        heaviest = []
         for kind, labels in enumerate(self.by_kind):
             start = len(reverse)
             number = {label: start + i for i, label in enumerate(labels)}
             reverse += [number[label.reversed()] for label in labels]
             kinds.append((start, len(reverse)))
             if kind % 2 == 0:
-                heaviest[kind // 2] = max((alike[i][0] for i in number.values()), default=0)
+                heaviest.append(max((alike[i][0] for i in number.values()), default=0))
             for own_reverse in (False, True):
                 members = [i for i in number.values() if not own_reverse or reverse[i] == i]
                 found = Counter((*alike[i], covers[i]) for i in members)
                 group_kinds.append((len(groups), len(groups) + len(found)))
                 groups += [(*own, count, cover) for (*own, cover), count in sorted(found.items())]
-        exact = len(self.limits) - (self.mobility > 1)  # freedom to lend may be left over
         states = np.arange(self.resources)
         digits = [states // step % (limit + 1) for step, limit in zip(steps, self.limits)]
         packed_of = sum(digit << shift for digit, shift in zip(digits, shifts))
@@ -316,7 +312,7 @@ class EdgeLabels:
             group_kinds=_columns(group_kinds, 2),
             groups=_columns(groups, 5),
             heaviest=np.array(heaviest, np.int64),
-            resources=np.array([packed_of, ~np.any(digits[:exact], axis=0)], np.int64),
+            resources=np.array([packed_of, ~np.any(digits[:-1], axis=0)], np.int64),
             space=np.int64(self.space),
             target=np.int64(self.resources - 1),
             guard=np.int64(sum(0x80 << shift for shift in shifts)),
@@ -327,7 +323,7 @@ class EdgeLabels:
 
 def _columns(rows: Sequence[tuple[int, ...]], width: int) -> NDArray[np.int64]:
     """Rows of numbers as an array of their columns."""
-    return np.ascontiguousarray(np.array(rows, np.int64).reshape(-1, width).T)
+    return np.ascontiguousarray(np.array(rows, np.int64).reshape(len(rows), width).T)
 
 
 @lru_cache(maxsize=256)
@@ -342,8 +338,7 @@ def edge_labels_for(
     rules: int = 0,
 ) -> EdgeLabels:
     """Return the labels for all contracted graphs with the given numbers of loops and vertices."""
-    most = loops + 1 if vertices == 2 else loops  # parallel paths between two of the vertices
-    multiplicities = (loops + 1,) if vertices == 2 else tuple(range(1, most))
-    kinds = range(LOOSE + (mobility > 1) if pins else 1)
+    multiplicities = [loops + 1] if vertices == 2 else range(1, loops)  # of paths between two of the vertices
+    kinds = (BETWEEN_LINKS, TO_PIN, BETWEEN_PINS, LOOSE) if pins else (BETWEEN_LINKS,)
     connections = tuple(mu | ends << KIND_SHIFT for ends in kinds for mu in multiplicities)
     return EdgeLabels(space, mobility, binary_links, higher, connections, vertices == 2, pins, rules)

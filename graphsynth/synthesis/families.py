@@ -110,9 +110,9 @@ def chain_numbers(
     Raises `SpecError` for anything else.
     """
     links = whole(links, "links", 2, MOST_LINKS)
-    if least and whole(mobility, "mobility", 0, 50) == 0:
+    mobility = whole(mobility, "mobility", 0, 50)
+    if mobility < least:
         raise SpecError("mobility = 0 must be at least 1: Baranov trusses are the structures without mobility")
-    mobility = whole(mobility, "mobility", least, 50)
     space = whole(space, "space", 2, 6)
     if not isinstance(joints_by_mobility, Mapping | None):
         raise SpecError(
@@ -143,7 +143,7 @@ def chain_families(links: int, mobility: int, space: int, higher: Mapping[int, i
     lower = chain_joints(links, mobility, space, higher)
     if lower is None:
         return []
-    frames = FRAME_VERTEX + FRAME_PATH if framed else FRAME_NONE
+    frames = FRAME_VERTEX | FRAME_PATH if framed else FRAME_NONE
     placed = tuple(sorted((i, count) for i, count in higher.items() if i > 1 and count))
     loops = lower + sum(count for _, count in placed) - links + 1
     return [
@@ -184,10 +184,10 @@ def multiple_joint_families(links: int, mobility: int, pins: int, framed: bool) 
     The numbers are such that there are two loops or more.
     """
     loops = (links - 1 - mobility) // 2
-    frames = FRAME_VERTEX + FRAME_PATH if framed else FRAME_NONE
+    frames = FRAME_VERTEX | FRAME_PATH if framed else FRAME_NONE
     return [
         Family(3, mobility, loops, vertices, links - vertices + pins, (), frames, pins=pins)
-        for vertices in range(max(2, pins), min(2 * (loops - 1), links + pins) + 1)
+        for vertices in range(max(2, pins), 2 * loops - 1)
     ]
 
 
@@ -213,8 +213,7 @@ def _sequences(content: dict[int, int]) -> Iterator[tuple[int, ...]]:
 def _may_slide(sequence: tuple[int, ...], rules: int) -> bool:
     """Tell whether a ring has the revolute joints that the rules of prismatic joints want."""
     turns = len(sequence) - sequence.count(SLIDER)
-    closed = (1, *sequence, 1) if sequence[0] != SLIDER or sequence[-1] != SLIDER else (1, *sequence, SLIDER, 1)
-    return may_slide(closed, rules) and (turns >= 2 or not rules & NO_SLIDING_LOOP)
+    return may_slide((1, *sequence, sequence[0], 1), rules) and (turns >= 2 or not rules & NO_SLIDING_LOOP)
 
 
 def rings(
@@ -238,7 +237,6 @@ def rings(
     from graphsynth.structure.graph import MechanismGraph
 
     if links == 2:
-        mobility = next(i for i, count in content.items() if count)
         yield MechanismGraph(2, [(0, 1, mobility)], frame=0 if framed else None, space=space)
         return
     shifts = range(1 if framed else links)

@@ -107,10 +107,8 @@ class OneByOne(Made):
             return
         for chain in fractionated_chains(self.links, self.mobility, self.space, self.higher):
             for graph in chain.inversions() if self.framed else ():
-                place = [0] * graph.links  # the links level by level
-                for position, link in enumerate(link for level in graph.levels for link in sorted(level)):
-                    place[link] = position
-                yield graph.relabelled(place)
+                order = [link for level in graph.levels for link in sorted(level)]
+                yield graph.relabelled([order.index(link) for link in range(graph.links)])
             if not self.framed:
                 yield chain
 
@@ -134,9 +132,6 @@ class OneByOne(Made):
 def blocks_of(links: int, mobility: int, space: int, higher: Higher) -> tuple[MechanismGraph, ...]:
     """List the blocks with given numbers: non-fractionated chains, or a single joint."""
     content = dict(higher)
-    if links == 2:
-        fits = {mobility: 1} == (content or {1: 1}) and 1 <= mobility < space
-        return (MechanismGraph(2, [(0, 1, mobility)], space=space),) if fits else ()
     found = list(rings(links, mobility, space, content, False))
     for chunk in cut(chain_families(links, mobility, space, content, False), listing=True):
         found += chunk.graphs()
@@ -305,10 +300,8 @@ class _Joined:
 
     def _loops(self, exponents: Exponents) -> int:
         """Return the number of loops of what has these exponents: 0 for single joints, negative if there is nothing."""
-        if not (exponents[0] and exponents[1]):
-            return -1
         links, mobility, space, higher = self._numbers(exponents)
-        lower = chain_joints(links, mobility, space, dict(higher))
+        lower = chain_joints(links, mobility, space, dict(higher)) if mobility else None
         return -1 if lower is None else lower + sum(n for _, n in higher) - exponents[0]
 
     def _at_one_block(self, exponents: Exponents, *, pointed: bool, least: int = 1) -> int:
@@ -340,7 +333,7 @@ class _Joined:
         total = 0
         for part in _up_to(tuple(e // length for e in rest)):
             left = _minus(rest, tuple(length * e for e in part))
-            for used in range(number if everywhere else 0, min(number, part[1]) + 1):
+            for used in range(number if everywhere else 0, number + 1):
                 if sets := self._divided(used, part):
                     total += comb(number, used) * sets * self._distributed(others, left, everywhere)
         return total

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from itertools import permutations
+from itertools import groupby, permutations
 from math import factorial
+from operator import itemgetter
 from random import Random
 
 import numpy as np
@@ -22,7 +23,6 @@ from graphsynth.synthesis.made import EACH, Draw, Made
 MOST_LINKS = 11
 NO_ROLES, FRAME, DRIVE, COAXIAL = range(4)  # which roles of links are chosen
 _TREES = 32  # in an item
-_ROWS = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -55,23 +55,19 @@ class GearedTrees(Made):
 
     def count(self) -> int:
         """Count the trains, with their roles (exact)."""
-        return self._choose(self.roles, np.zeros((2, 0), np.int64))
+        return self._choose(self.roles)[0]
 
     def graphs(self) -> Iterator[MechanismGraph]:
         """Yield the trains as coloured graphs."""
-        chosen = np.empty((2, _ROWS), np.int64)
-        if (number := self._choose(NO_ROLES, chosen)) > _ROWS:
-            chosen = np.empty((2, number), np.int64)
-            self._choose(NO_ROLES, chosen)
-        trees = trees_of_axes(self.links)
-        pairs: list[bytes] = []
-        known = -1
-        for tree, choice in zip(*chosen[:, :number].tolist()):
-            if tree != known:
-                pairs, known = _possible_pairs(trees[tree]), tree
-            places = [place for place in range(len(pairs)) if choice >> len(pairs) - 1 - place & 1]
-            graph = _geared(trees[tree], [pairs[place] for place in places])
-            yield from (_numbered(graph, chosen) for chosen in self._chosen(graph))
+        number, _ = self._choose(NO_ROLES)
+        _, chosen = self._choose(NO_ROLES, number)
+        for at, choices in groupby(zip(*chosen.tolist()), itemgetter(0)):
+            tree = trees_of_axes(self.links)[at]
+            pairs = _possible_pairs(tree)
+            for _, choice in choices:
+                places = [place for place in range(len(pairs)) if choice >> len(pairs) - 1 - place & 1]
+                graph = _geared(tree, [pairs[place] for place in places])
+                yield from (_numbered(graph, roles) for roles in self._chosen(graph))
 
     def urns(self) -> list[tuple[int, Draw]]:
         """List each tree with its number of choices of gear pairs and roles, locked or not, up to its symmetries."""
@@ -82,10 +78,12 @@ class GearedTrees(Made):
                 found.append((total // order, partial(self._drawn, tree, total)))
         return found
 
-    def _choose(self, roles: int, out: NDArray[np.int64]) -> int:
+    def _choose(self, roles: int, room: int = 0) -> tuple[int, NDArray[np.int64]]:
+        """Return the number of trains, and the first of them: their trees and choices of gear pairs."""
         (choose_gears,) = named("graphsynth.synthesis.kernels.gears", "choose_gears")
         asked = self.start, self.stop, self.gears, self.rotation, roles
-        return int(choose_gears(self.links, _matrices(self.links), *asked, _moves(self.links), out))
+        out = np.empty((2, room), np.int64)
+        return int(choose_gears(self.links, _matrices(self.links), *asked, _moves(self.links), out)), out
 
     def _chosen(self, graph: MechanismGraph) -> list[tuple[int, ...]]:
         """List the roles of the links of a train, each once up to its symmetries."""
@@ -133,10 +131,8 @@ def _numbered(graph: MechanismGraph, roles: tuple[int, ...]) -> MechanismGraph:
     """Return the graph with the links that have roles first, the first of them fixed."""
     if not roles:
         return graph
-    place = [0] * graph.links
-    for at, link in enumerate([*roles, *(link for link in range(graph.links) if link not in roles)]):
-        place[link] = at
-    return graph.relabelled(place).with_frame(0)
+    order = [*roles, *(link for link in range(graph.links) if link not in roles)]
+    return graph.relabelled([order.index(link) for link in range(graph.links)]).with_frame(0)
 
 
 def _all_roles(tree: MechanismGraph, roles: int) -> list[tuple[int, ...]]:

@@ -6,7 +6,9 @@ from collections import Counter
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from fractions import Fraction
+from functools import partial
 from io import StringIO
+from itertools import permutations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -16,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth import MechanismGraph, StructuralSpec
+from graphsynth.core.errors import SpecError, TooLargeError
 
 __all__ = ["Question", "of_the_engine", "of_the_second_count"]
 
@@ -92,7 +95,140 @@ def of_the_engine() -> list[Question]:
         ("streamed", lambda: _streamed(4), [117, 117, True]),
         ("streamed from few", lambda: _streamed(2), [117, 117, True]),
         ("grown", _grown, [3, 13, 24, 38, 23, 16, 87]),
+        *_beside_counts(),
     ]  # fmt: skip
+
+
+def _beside_counts() -> list[Question]:
+    """Ask what ``some_questions`` has, and for bounds, texts, roles, and chains of blocks by arithmetic."""
+    from some_questions import ASKED
+
+    return [
+        *((f"asked {at}", partial(_numbers_of, question), [number] * 3) for at, (question, number) in enumerate(ASKED)),
+        ("refused", _refused, [False, True, True, True, False, True, False, True, True, False, False, True]),
+        ("rooms", _rooms, [True, False, False, True, True, False, True]),
+        ("taken over", _taken_over, "3-3 3-15 4-4,3-3 girth 4 girth 7"),
+        ("texts of rings", _rings, ["Cl f0 P:0-3", "Cl f0 P:2-3", "A_ f0", "A_ 2:0-1", "Bw f0 2:0-2", "Bw f0 2:1-2"]),
+        ("levels of joined chains", _levels, [7, 10, 8, 1, 14]),
+        ("assortments of joined chains", _assortments, {("2", 0), ("2", 8), ("3", 0), ("3", 3), ("4", 1)}),
+        ("frames of joined chains", lambda: _joined(True), [34, 167, 32, 0, 104, 1006]),
+        ("joined chains", lambda: _joined(False), [5, 24, 6, 0, 17, 165]),
+        ("roles told apart", _roles, [50, 109, 37]),
+    ]
+
+
+def _numbers_of(question: Any) -> list[int]:
+    from some_questions import asked
+
+    listed, count = asked(question)
+    return [count, len(listed), len({answer.key for answer in listed})]
+
+
+def _is_refused(call: Callable[[], Any], error: type[Exception] = SpecError) -> bool:
+    try:
+        call()
+    except error:
+        return True
+    return False
+
+
+def _refused() -> list[bool]:
+    """Tell which numbers are refused: links, mobilities, spaces and joints at their bounds and beyond."""
+    from graphsynth import count_chains
+
+    def said_of_trusses() -> bool:
+        try:
+            return count_chains(4, 0) == 0
+        except SpecError as error:
+            return "Baranov" in str(error)
+
+    numbers: list[tuple[int, int, int, dict[int, int] | None]] = [
+        (2, 1, 3, None), (1, 1, 3, None), (4, 0, 3, None), (60, 50, 3, None), (60, 51, 3, None), (5, 1, 6, None),
+        (5, 1, 7, None), (3, 1, 3, {3: 1}), (3, 1, 3, {2: 0}), (3, 1, 3, {2: 100}), (3, 1, 3, {2: 101}),
+    ]  # fmt: skip
+    asked = [
+        _is_refused(lambda n=n, w=w, pi=pi, p=p: count_chains(n, w, space=pi, joints_by_mobility=p))
+        for n, w, pi, p in numbers
+    ]
+    return [*asked[:3], said_of_trusses(), *asked[3:]]
+
+
+def _rooms() -> list[bool]:
+    """Tell what is too large: kinds of two parallel paths, of which there are four; states of resources."""
+    from graphsynth.synthesis import edge_labels
+
+    labels = edge_labels.EdgeLabels(3, 1, 4, (), (2,), False)
+    found = []
+    for bound in (3, 4):
+        with mock.patch.object(edge_labels, "_MAX_LABELS", bound):
+            found.append(_is_refused(lambda: labels.labels(2, False), TooLargeError))
+    for binary, *higher in ((100,), (101,), (0, 101), (99, 99, 4), (99, 99, 4, 1)):
+        some = edge_labels.EdgeLabels(6, 1, binary, tuple(enumerate(higher, 2)), (1,), False)
+        vars(some)["by_kind"] = [[], [], [], []]
+        found.append(_is_refused(lambda some=some: some.tables, TooLargeError))
+    return found
+
+
+def _taken_over() -> str:
+    """Say which of some wishes the search takes over, so that no chain is made to be counted."""
+    from graphsynth.synthesis.problem import EnumerationProblem
+    from graphsynth.synthesis.wishes import Wishes
+
+    pairs: list[Any] = [(3, 3), (3, 2), (2, 3), (1, 3), (3, 15), (3, 16), ("frame", 3)]
+    wishes = {f"{one}-{other}": Wishes(jointed=[(one, other)]) for one, other in pairs}
+    wishes["4-4,3-3"] = Wishes(jointed=[(3, 4)], apart=[(4, 4), (3, 3)])
+    wishes |= {"planar": Wishes(apart=[(3, 3)], planar=True), "not planar": Wishes(planar=False)}
+    wishes["total"] = Wishes(mobility_type="total")
+    pinned = EnumerationProblem.multiple_joints(8, 1, 1)
+    girths = [f"girth {n}" for n in (4, 7, 8) if pinned.wishing(Wishes(girth=n)).wishes is None]
+    return " ".join([*(name for name, wish in wishes.items() if wish.is_searched), *girths])
+
+
+def _rings() -> list[str]:
+    """List rings of four links with a slider, of two links, and of three links with a joint of mobility 2."""
+    from graphsynth import enumerate_slider_chains
+    from graphsynth.synthesis.families import rings
+
+    four = [chain.to_text() for chain in enumerate_slider_chains(4, 1, framed=True)]
+    others = (2, 1, 3, {}, True), (2, 2, 3, {2: 1}, False), (3, 1, 3, {2: 1}, True)
+    return [*four, *(graph.to_text() for other in others for graph in rings(*other))]
+
+
+def _levels() -> list[int]:
+    """Count mechanisms of seven links and two freedoms, fractionated ones among them, by sizes of levels."""
+    from graphsynth import count_mechanisms
+
+    asked: list[dict[int, Any]] = [{-1: 1}, {1: 2}, {2: (3, None)}, {4: 1}, {5: 0}]
+    return [count_mechanisms(StructuralSpec(W=2, links=7, fractionated=True, levels=at)) for at in asked]
+
+
+def _assortments() -> set[tuple[str, int]]:
+    """Count the same by assortment; those that fall apart at their frame are one."""
+    from graphsynth import count_mechanisms
+
+    found = StructuralSpec(W=2, links=7, fractionated=True).solve()
+    return {(str(assortment.t0), count_mechanisms(assortment)) for assortment in found}
+
+
+def _joined(framed: bool) -> list[int]:
+    """Count fractionated chains by arithmetic, where joints have mobility 1, 2 or 3 too."""
+    from graphsynth.synthesis.fractionated import count_fractionated
+
+    asked = (9, 2, 3, ()), (10, 3, 3, ()), (7, 3, 3, ((2, 1),)), (5, 2, 3, ()), (7, 3, 4, ((2, 1), (3, 1)))
+    return [count_fractionated(*numbers, framed) for numbers in (*asked, (7, 3, 3, ((2, 3),)))]
+
+
+def _roles() -> list[int]:
+    """Count trains of five links by what they are when links with roles, the first of them fixed, are told apart."""
+    from graphsynth import enumerate_planetary_gear_trains
+
+    numbers = []
+    for roles, asked in zip((1, 3, 3), ROLES[1:]):
+        orders = [[*range(roles), *rest] for rest in permutations(range(roles, 5))]
+        trains = [train.coloured for train in enumerate_planetary_gear_trains(5, **asked)]
+        forms = {min(train.relabelled(order).packed for order in orders) for train in trains if train.frame == 0}
+        numbers.append(len(forms))
+    return numbers
 
 
 def _together() -> list[int]:
@@ -176,8 +312,6 @@ def _drawn_trains() -> bool:
 
 def _drawn_choices() -> bool:
     """Tell whether choices of gear pairs that a symmetry keeps are equally likely, by every way to draw them."""
-    from functools import partial
-
     from gear_symmetries import every_draw, kept_choices, weights
 
     from graphsynth.synthesis.geared_trees import _kept_choice, _possible_pairs, trees_of_axes

@@ -5,43 +5,20 @@ from __future__ import annotations
 import coloured
 import pytest
 from coloured import Question
+from some_questions import ASKED, asked
 
 from graphsynth import (
-    StructuralSpec,
     Wishes,
     count_chains,
-    count_mechanisms,
     count_multiple_joint_chains,
     count_slider_chains,
     enumerate_chains,
-    enumerate_mechanisms,
     enumerate_multiple_joint_chains,
     enumerate_slider_chains,
 )
 from graphsynth.cli.main import main
 from graphsynth.core.errors import SpecError
 from graphsynth.synthesis.problem import EnumerationProblem
-
-
-def asked(question: Question):
-    """Return the list of answers and their number, as graphsynth finds them."""
-    numbers = question.links, question.mobility
-    if question.kind == "multiple":
-        more = {"multiple": question.higher, "framed": question.framed, "wishes": question.wishes}
-        return list(enumerate_multiple_joint_chains(*numbers, **more)), count_multiple_joint_chains(*numbers, **more)
-    if question.kind == "sliders":
-        more = dict(zip(("sliding_links", "sliding_loops", "cylinders"), question.rules))
-        given = question.links, question.higher, question.mobility
-        more |= {"framed": question.framed, "wishes": question.wishes}
-        return list(enumerate_slider_chains(*given, **more)), count_slider_chains(*given, **more)
-    wanted = {"symmetry": question.symmetry, "wishes": question.wishes}
-    if question.framed:
-        spec = StructuralSpec(
-            W=question.mobility, links=question.links, p2=question.higher, fractionated=question.fractionated
-        )
-        return list(enumerate_mechanisms(spec, **wanted)), count_mechanisms(spec, **wanted)
-    more = {"joints_by_mobility": {2: question.higher}, "fractionated": question.fractionated, **wanted}
-    return list(enumerate_chains(*numbers, **more)), count_chains(*numbers, **more)
 
 
 def check(numbers, *, large):
@@ -58,6 +35,16 @@ def check(numbers, *, large):
 @pytest.mark.long
 def test_some_questions():
     check(range(40), large=False)
+
+
+@pytest.mark.long
+def test_numbers_of_some_questions_are_those_of_trying_everything():
+    """The changes of the orbit engine are measured against these numbers (``tests/mutation``)."""
+    for question, number in ASKED:
+        keys, _ = coloured.answers(question)
+        listed, count = asked(question)
+        assert {answer.key for answer in listed} == keys, question
+        assert (count, len(listed)) == (number, number) == (len(keys), len(keys)), question
 
 
 @pytest.mark.slow
