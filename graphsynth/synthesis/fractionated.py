@@ -168,14 +168,14 @@ def _glued(parent: MechanismGraph, at: int, block: MechanismGraph, link: int) ->
     return graph
 
 
-def _marked_form(graph: MechanismGraph, marked: set[int]) -> tuple[bool, int, tuple[tuple[int, ...], ...]]:
+def _marked_form(graph: MechanismGraph, marked: set[int]) -> tuple[int, tuple[tuple[int, ...], ...]]:
     """Return a form that is equal for two sets of links exactly when an automorphism maps one to the other."""
     colours = np.array([int(v in marked) for v in range(graph.links)], np.int64)
     order = canon_packed(graph.links, np.frombuffer(graph.packed, np.uint8), colours)[0]
     place = {int(v): i for i, v in enumerate(order)}
     joints = sorted((*sorted((place[a], place[b])), f) for a, b, f in graph.joints)
-    # single joints first: a chain without loose ends then has parents with few of them
-    return len(marked) > 1, len(marked), tuple(joints)
+    # the fewest links first, single joints: a chain without loose ends then has parents with few of them
+    return len(marked), tuple(joints)
 
 
 @lru_cache(maxsize=512)
@@ -323,7 +323,7 @@ class _Joined:
                 if fixed:
                     free = tuple((length, n - (pointed and length == 1)) for length, n in cycles)
                     total += weight * fixed * self._distributed(free, rest, own[0] == 1)
-        return int(total)
+        return total.numerator  # of a whole number
 
     def _distributed(self, cycles: Cycles, rest: Exponents, everywhere: bool) -> int:
         """Count the distributions of sets of parts over links that a permutation with given cycles keeps."""

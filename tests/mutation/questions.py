@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from contextlib import redirect_stdout
+from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from io import StringIO
-from itertools import permutations
+from itertools import combinations, permutations
 from pathlib import Path
+from random import Random
 from tempfile import TemporaryDirectory
 from typing import Any
 from unittest import mock
@@ -108,12 +110,20 @@ def _beside_counts() -> list[Question]:
         ("refused", _refused, [False, True, True, True, False, True, False, True, True, False, False, True]),
         ("rooms", _rooms, [True, False, False, True, True, False, True]),
         ("taken over", _taken_over, "3-3 3-15 4-4,3-3 girth 4 girth 7"),
-        ("texts of rings", _rings, ["Cl f0 P:0-3", "Cl f0 P:2-3", "A_ f0", "A_ 2:0-1", "Bw f0 2:0-2", "Bw f0 2:1-2"]),
+        (
+            "texts of rings",
+            _rings,
+            ["Cl f0 P:0-3", "Cl f0 P:2-3", "Cl f0 P:0-3,1-2", "A_ f0", "A_ 2:0-1", "Bw f0 2:0-2", "Bw f0 2:1-2"],
+        ),
         ("levels of joined chains", _levels, [7, 10, 8, 1, 14]),
         ("assortments of joined chains", _assortments, {("2", 0), ("2", 8), ("3", 0), ("3", 3), ("4", 1)}),
-        ("frames of joined chains", lambda: _joined(True), [34, 167, 32, 0, 104, 1006]),
-        ("joined chains", lambda: _joined(False), [5, 24, 6, 0, 17, 165]),
+        ("assortment given", _given_assortment, 4),
+        ("frames of joined chains", lambda: _joined(True), [34, 167, 32, 0, 104, 1006, 96]),
+        ("joined chains", lambda: _joined(False), [5, 24, 6, 0, 17, 165, 20]),
         ("roles told apart", _roles, [50, 109, 37]),
+        ("made of blocks", _made_of_blocks, 17),
+        ("drawn from the list", _drawn_from_the_list, True),
+        ("choices that move", _choices_that_move, True),
     ]
 
 
@@ -185,11 +195,12 @@ def _taken_over() -> str:
 
 
 def _rings() -> list[str]:
-    """List rings of four links with a slider, of two links, and of three links with a joint of mobility 2."""
+    """List rings of four links with one slider or two, of two links, and of three links with a joint of mobility 2."""
     from graphsynth import enumerate_slider_chains
     from graphsynth.synthesis.families import rings
 
     four = [chain.to_text() for chain in enumerate_slider_chains(4, 1, framed=True)]
+    four += [chain.to_text() for chain in enumerate_slider_chains(4, 2, framed=True, sliding_loops=True)]
     others = (2, 1, 3, {}, True), (2, 2, 3, {2: 1}, False), (3, 1, 3, {2: 1}, True)
     return [*four, *(graph.to_text() for other in others for graph in rings(*other))]
 
@@ -210,12 +221,65 @@ def _assortments() -> set[tuple[str, int]]:
     return {(str(assortment.t0), count_mechanisms(assortment)) for assortment in found}
 
 
+def _made_of_blocks() -> int:
+    """List fractionated chains with joints of mobility 2 and 3."""
+    from graphsynth.synthesis.fractionated import fractionated_chains
+
+    return len({chain.key for chain in fractionated_chains(7, 3, 4, ((2, 1), (3, 1)))})
+
+
+def _drawn_from_the_list() -> bool:
+    """Tell whether rotation graphs, and trains of two freedoms, are drawn that are listed, and each is sometimes."""
+    from graphsynth import enumerate_planetary_gear_trains
+    from graphsynth.synthesis.geared_trees import geared_trees
+
+    for links, rotation, mobility in ((5, True, 1), (6, False, 2)):
+        listed = {train.key for train in enumerate_planetary_gear_trains(links, mobility, rotation=rotation)}
+        draw = Random(1)
+        drawn = {
+            item.chain(graph).key
+            for item in geared_trees(links, rotation, mobility, 0)
+            for _, urn in item.urns()
+            for graph in (urn(draw) for _ in range(40))
+            if graph is not None
+        }
+        if drawn != listed:
+            return False
+    return True
+
+
+def _choices_that_move() -> bool:
+    """Tell whether any three gear pairs on trees of five links are locked when a set of links has too many of them."""
+    from graphsynth.synthesis.geared_trees import _moves_freely, _possible_pairs, trees_of_axes
+
+    sets = [set(some) for size in (2, 3, 4, 5) for some in combinations(range(5), size)]
+    for tree in trees_of_axes(5):
+        joined = {frozenset(joint[:2]) for joint in tree.joints}
+        pairs = _possible_pairs(tree)
+        carriers = [next(c for c in range(5) if {frozenset((a, c)), frozenset((b, c))} <= joined) for a, b, _ in pairs]
+        held = [{a, b, carrier} for (a, b, _), carrier in zip(pairs, carriers)]
+        for chosen in combinations(range(len(pairs)), 3):
+            right = all(sum(held[at] <= some for at in chosen) <= len(some) - 2 for some in sets)
+            if _moves_freely(5, tree, [pairs[at] for at in chosen]) != right:
+                return False
+    return True
+
+
+def _given_assortment() -> int:
+    """Count mechanisms of four links with three joints each, by an assortment with a mapping of one's own."""
+    from graphsynth import count_mechanisms
+
+    solutions = StructuralSpec(W=1, links=4, p2=4).solve()
+    assortment = next(one for one in solutions if one.n_a[3] == 3)
+    return count_mechanisms(replace(assortment, n_a={3: 3}))
+
+
 def _joined(framed: bool) -> list[int]:
     """Count fractionated chains by arithmetic, where joints have mobility 1, 2 or 3 too."""
     from graphsynth.synthesis.fractionated import count_fractionated
 
     asked = (9, 2, 3, ()), (10, 3, 3, ()), (7, 3, 3, ((2, 1),)), (5, 2, 3, ()), (7, 3, 4, ((2, 1), (3, 1)))
-    return [count_fractionated(*numbers, framed) for numbers in (*asked, (7, 3, 3, ((2, 3),)))]
+    return [count_fractionated(*numbers, framed) for numbers in (*asked, (7, 3, 3, ((2, 3),)), (6, 4, 3, ((2, 3),)))]
 
 
 def _roles() -> list[int]:
