@@ -18,6 +18,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.core.native.wasm import MODULES
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.simulation import simulate
+from graphsynth.mechanism import gallery
 from graphsynth.mechanism.files import to_dict
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
@@ -149,6 +150,36 @@ def test_ranges_between_limits_are_those_of_the_library(tmp_path: Path) -> None:
     assert not away["reached"] and abs(away["input"] - reach) < 1e-12 and away["stop"]["kind"] == "limit"
     assert home["reached"]
     assert np.abs(np.reshape(result["done"][2]["pose"], (4, 3))[:, :2] - posed.poses[0][:, :2]).max() < 1e-9
+
+
+@pytest.mark.long
+def test_the_range_of_a_larger_group_is_seen_whole(tmp_path: Path) -> None:
+    """Between two limits at which a group of four links is singular, so that nothing can be followed from there."""
+    linkage = gallery.stephenson_six_bar()
+    (pose,) = simulate(linkage, [0.3], events=False).poses
+    posed = Mechanism(linkage.graph, linkage.joints, linkage.drivers, pose=tuple(map(tuple, pose.tolist())))
+    partly = []
+    for joint in posed.graph.joints:
+        for frame, link in ((joint.a, joint.b), (joint.b, joint.a)):
+            own = inversion(posed, frame, link)
+            known = simulate(own) if own is not None and len(compile_program(own).steps[-1].links) == 4 else None
+            if own is not None and known is not None and not known.closure.closed and known.completed:
+                partly.append((own, known))
+    assert len(partly) >= 3
+    for (own, known), result in zip(
+        partly, in_page(tmp_path, [(own, [["sweep", 121]]) for own, _ in partly]), strict=True
+    ):
+        swept = result["done"][0]["result"]
+        inputs, poses = array(swept["inputs"], 121), array(swept["poses"], 121, own.graph.links, 3)
+        assert np.isfinite(poses[1:-1]).all() and (np.diff(inputs) > 0.0).all()
+        assert np.allclose(inputs[[0, -1]], known.inputs[[0, -1]], atol=2e-3 * np.ptp(inputs))
+        start, compared = own.pose[own.drivers[0].link][2], 0
+        for there in (inputs[inputs > start][:-1], inputs[inputs < start][:0:-1]):
+            theirs = simulate(own, np.append(start, there), events=False).poses[1:]
+            off = np.abs((theirs - poses[np.searchsorted(inputs, there)])[..., :2])
+            assert np.all(off < 1e-9 * known.Lc)
+            compared += len(there)
+        assert compared >= 118
 
 
 def test_a_change_point_upon_a_sample_ends_the_range_as_in_the_library(tmp_path: Path) -> None:

@@ -322,14 +322,26 @@ const Engine = (() => {
         return { ...forward, full: true, turns: Infinity };
       }
       const backward = this.swept(this.state, start, end(-span), driver, 2);
-      /* from the lower limit, reached from here, to the upper one */
-      const low = Float64Array.from(start), high = Float64Array.from(start);
-      low[driver] = backward.at;
-      high[driver] = forward.at;
-      const events = [[backward, low], [forward, high]].filter(([way]) => way.stop)
-        .map(([way, at]) => ({ ...way.stop, input: at[driver] }));
-      const whole = this.swept(this.spare, low, high, driver, n);
+      const events = [backward, forward].filter((way) => way.stop).map((way) => ({ ...way.stop, input: way.at }));
+      const whole = this.between(start, backward.at, forward.at, driver, n);
       return { ...whole, events: [...events, ...whole.events].sort((a, b) => a.input - b.input), full: false };
+    }
+
+    /* Samples from one limit to the other, followed from here both ways: a group of more than two links is singular there. */
+    between(start, low, high, driver, n) {
+      const at = (input) => start.map((q, j) => (j === driver ? input : q)), step = (high - low) / (n - 1);
+      const k = Math.min(n - 2, Math.max(1, Math.round((start[driver] - low) / step) || 1)), middle = at(low + k * step);
+      const [down, up] = [[low, k + 1], [high, n - k]].map(([end, count]) => {
+        this.swept(this.state, start, middle, driver, 2);
+        return this.swept(this.spare, middle, at(end), driver, count);
+      });
+      const found = { events: [...down.events, ...up.events] };
+      for (const name of ["inputs", "poses", "velocities", "accelerations", "margins"]) {
+        const width = up[name].length / (n - k), made = found[name] = new Float64Array(n * width);
+        for (let i = 0; i < k; i++) made.set(down[name].subarray((k - i) * width, (k - i + 1) * width), i * width);
+        made.set(up[name], k * width);
+      }
+      return found;
     }
 
     /* Whether the last pose of a sweep is the first one, but for whole turns. */
