@@ -283,6 +283,15 @@ def test_lengths_are_read_with_the_units_that_are_shown_in_every_language(script
         assert angle == "°"
 
 
+def test_kinds_of_joints_are_words_of_the_language(scripts):
+    """All but the signs R and P: groups and joints whose axis leans are named with them."""
+    kinds = ["R", "P", "pin-slot", "gear", "cam"]
+    found = scripts(
+        "return Bench.languages().map(name => { Bench.speak(name); return args[0].map(Bench.kindName); })", kinds
+    )
+    assert found == [kinds, ["R", "P", "палец в пазу", "зацепление", "кулачок"]]
+
+
 def test_places_snap_to_points_then_angles_then_the_grid(scripts):
     found = scripts(
         """const p = {x: 3.02, y: 2.9}, point = {x: 3.1, y: 3};
@@ -315,7 +324,8 @@ def test_every_word_is_asked_for_and_every_word_asked_for_is_there():
     text = page_file("index.html") + "".join(page_file(f"{name}.js") for name in names)
     known = languages()["en"]
     groups = (
-        "tool hint template name pair mode do language said fault.file event know chain chains jam target passing unit"
+        "tool hint template name pair kind mode do language said fault.file event know chain chains jam target passing"
+        " unit"
     )
     built = [f"{group}." for group in groups.split()]
     for key in known:

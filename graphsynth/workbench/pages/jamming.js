@@ -9,7 +9,7 @@
   /** The joints that can be asked about: [number, words]. */
   function joints(app, data) {
     const ids = Object.keys(app.sheet.links), name = k => Bench.linkName(app.sheet, ids[k]);
-    return data.joints.map((joint, k) => [k, Bench.word("jam.joint", { kind: joint.kind, a: name(joint.a), b: name(joint.b) })])
+    return data.joints.map((joint, k) => [k, Bench.word("jam.joint", { kind: Bench.kindName(joint.kind), a: name(joint.a), b: name(joint.b) })])
       .filter(([k]) => ["R", "P", "pin-slot"].includes(data.joints[k].kind));
   }
 

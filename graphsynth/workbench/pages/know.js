@@ -140,6 +140,6 @@
   /** The name of a group in the reader's language: dyads by their joints, larger ones by their links. */
   Bench.groupName = kind => {
     const many = /^group of (\d+) links$/.exec(kind);
-    return many ? Bench.word("know.many", { n: many[1] }) : kind;
+    return many ? Bench.word("know.many", { n: many[1] }) : kind.split("+").map(Bench.kindName).join("+");
   };
 })();

@@ -24,6 +24,9 @@ var Bench = globalThis.Bench = globalThis.Bench || {};
   /** A unit as it is written in the reader's language; what is no length ("°") as it is. */
   Bench.unitName = unit => (Bench.UNITS.includes(unit) ? Bench.word(`unit.${unit}`) : unit);
 
+  /** The kind of a joint in the reader's language; R and P are signs. */
+  Bench.kindName = kind => (["pin-slot", "gear", "cam"].includes(kind) ? Bench.word(`kind.${kind}`) : kind);
+
   /** What a user can mend: the key of a sentence and its values. */
   Bench.Fault = class extends Error {
     constructor(key, values = {}) {
