@@ -165,6 +165,10 @@ def test_the_chart_of_a_stroke_shows_its_limits_and_the_caption_what_is_reached(
     assert "least" in chart.svg and "most" in chart.svg and "lowest place" in chart.caption
     told = re.search(r"Blade: link \d, which turns through ([\d.]+)°", picture.caption)
     assert told and 50 - 0.5 <= float(told[1]) <= 55 + 0.5
+    ram = {"stroke": [2, 2.1], "within": 0.01, "link": "ram"}
+    (picture,) = execute(scene(("animations",), swings=[ram], sliders=1))["animations"]
+    told = re.search(r"Ram: link \d, which slides by ([\d.]+)\.$", picture.caption)
+    assert told and 1.99 <= float(told[1]) <= 2.11
 
 
 def test_an_impossible_task_gives_a_report_that_says_why() -> None:

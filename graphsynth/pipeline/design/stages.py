@@ -242,12 +242,13 @@ def _caption(designs: Designs, answer: DesignedMechanism) -> str:
 
 
 def _swing(designs: Designs, answer: DesignedMechanism, name: str) -> str:
-    """How far a link turns on the frame, or against another one, if a target names it."""
-    own = (t for t in designs.task.targets if isinstance(t, LinkTarget) and t.link == name and not t.slides)
+    """How far a link turns or slides on the frame, or against another one, if a target names it."""
+    own = (t for t in designs.task.targets if isinstance(t, LinkTarget) and t.link == name)
     if (target := next(own, None)) is None:
         return ""
     against = f" against {target.base}" if target.base else ""
-    return f", which turns through {np.ptp(_output(designs, answer, target)):.4g}°{against}"
+    way = f"{np.ptp(_output(designs, answer, target)):.4g}"
+    return f", which {f'slides by {way}' if target.slides else f'turns through {way}°'}{against}"
 
 
 def _drawn_targets(designs: Designs) -> tuple[Shape, ...]:
