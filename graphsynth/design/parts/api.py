@@ -74,6 +74,8 @@ def parts(
     if not isinstance(motion, Motion):
         raise GeometryError(f"{type(motion).__name__} is not a motion of graphsynth.simulate; give one")
     begin, unit = perf_counter(), positive("unit", unit)
+    if not 1e-9 <= unit <= 1e9:
+        raise GeometryError(f"unit = {unit:g} mm is no unit of length of a part; give 1e-9 to 1e9")
     reached = motion.poses[motion.assembled] * [unit, unit, 1.0]
     if len(reached) < 2:
         raise GeometryError(f"{len(reached)} poses of the motion are assembled; parts need a motion of two or more")

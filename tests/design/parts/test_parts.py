@@ -364,6 +364,8 @@ def test_bad_input_is_told():
     motion = gs.simulate(LAMBDA)
     with pytest.raises(GeometryError, match=r"unit = 0\.0 must be positive"):
         gs.parts(motion, unit=0.0)
+    with pytest.raises(GeometryError, match=r"unit = 1e\+300 mm is no unit"):
+        gs.parts(motion, unit=1e300)
     with pytest.raises(GeometryError, match=r"pin = -1\.0 must be positive"):
         PartSizes(pin=-1.0)
     with pytest.raises(GeometryError, match="hole = 3 is smaller than the pin, 5"):
