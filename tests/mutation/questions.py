@@ -32,6 +32,8 @@ SAMPLED = ["1CAvElhAw", "1CAvIkEjQ", "1CAvQWghQ"]  # by the same draws always
 
 def of_the_engine() -> list[Question]:
     """Name, question and answer; the answers are published or those of trying everything (``tests/synthesis``)."""
+    from kernel_questions import of_the_kernels
+
     import graphsynth as gs
 
     trains, ways = gs.count_planetary_gear_trains, ("any", "coaxial")
@@ -98,6 +100,7 @@ def of_the_engine() -> list[Question]:
         ("streamed from few", lambda: _streamed(2), [117, 117, True]),
         ("grown", _grown, [3, 13, 24, 38, 23, 16, 87]),
         *_beside_counts(),
+        *of_the_kernels(),
     ]  # fmt: skip
 
 

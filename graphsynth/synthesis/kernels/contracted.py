@@ -89,7 +89,7 @@ def automorphisms(k, mult, perms):
         return 1
     order = _search_order(k, mult, colour)
     image = np.full(k, -1, np.int64)
-    candidate = np.zeros(k + 1, np.int64)
+    candidate = np.zeros(k, np.int64)
     used = np.zeros(k, np.bool_)
     count = 1
     depth = 0
@@ -179,7 +179,7 @@ def _needs(k, m, mult, classes, space, subsets):
     weight = np.zeros((k, k), np.int16)
     for e in range(m):
         weight[classes[V, e], classes[U, e]] = classes[HEAVIEST, e]
-    need[0] = space + 1
+    need[0] = space + 1  # more than single vertices need, so that these are implied; no two vertices need anything
     for v in range(k):
         inside[0] = np.int64(mult[v, v]) - space
         for w in range(v):
@@ -189,9 +189,6 @@ def _needs(k, m, mult, classes, space, subsets):
         size = 1 << v
         for u in range(size):
             need[size + u] = need[u] + inside[u]
-    need[0] = 0
-    for v in range(k):  # single vertices need nothing
-        need[1 << v] = 0
     return need
 
 

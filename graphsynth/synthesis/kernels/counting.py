@@ -57,7 +57,7 @@ def _store(key, words, number, layer, shift, value, keys, states):
             states[lay.SUM, half + at] += value
             return number
         slot = (slot + 1) & (capacity - 1)
-    if (number + 1) * words > capacity or 2 * (number + 1) > capacity:
+    if (number + 1) * words > capacity:  # two words at least: half of the slots remain free
         return -1
     states[lay.STAMP, slot] = layer
     states[lay.SLOT, slot] = number
@@ -154,9 +154,7 @@ def count_states(count, sets, tables, work):
 def fixed_by(member, m, sets, tables, work):
     """Count the admissible labellings fixed by automorphism number ``member``; negative: see ``count_states``."""
     count = build_variables(m, sets, work.perms[member], tables, work)
-    if not plain_entries(count, tables, work):
-        return np.int64(TOO_LARGE)
-    if count < 0 or unconstrained_ways(count, np.bool_(False), tables, work) > _LIMIT:
+    if not plain_entries(count, tables, work) or unconstrained_ways(count, np.bool_(False), tables, work) > _LIMIT:
         return np.int64(TOO_LARGE)
     return count_states(count, sets, tables, work)
 

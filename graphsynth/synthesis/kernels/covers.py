@@ -25,15 +25,13 @@ def covered_sets(k, mult, sets, tables, work):
     pairs = tables.rules >> lay.PAIRS
     work.state[LAID_COVERS] = lay.COVERS if girth or pairs else lay.SLIDING_COVERS
     count = 8 * work.state[PLAIN]
-    for s in range(sets, min(count, work.sets.shape[1])):  # the word is filled with sets that need nothing
+    for s in range(sets, work.sets.shape[1]):  # the word is filled with sets that need nothing
         work.sets[lay.MASK, s] = 0
         work.sets[lay.NEED, s] = 0
     if tables.rules & lay.NO_SLIDING_LINK:
         for v in range(k):
             if _joints_at(k, mult, v) <= tables.sliders and mult[v, v] == 0:
                 count = _add(count, 1, v, np.int64(0), work)
-                if count < 0:
-                    return np.int64(-1)
     while pairs:
         count = _add_pair(k, mult, count, pairs & 15, (pairs >> 4) & 15, (pairs >> 8) & 1, work)
         pairs >>= lay.PAIR
@@ -69,7 +67,6 @@ def _add_pair(k, mult, count, one, other, apart, work):
 def _add(count, need, vertex, cycle, work):
     if count < 0 or count >= work.sets.shape[1]:
         return np.int64(-1)
-    work.sets[lay.MASK, count] = 0
     work.sets[lay.NEED, count] = need
     work.sets[lay.VERTEX, count] = vertex
     work.sets[lay.CYCLE, count] = cycle
@@ -79,8 +76,8 @@ def _add(count, need, vertex, cycle, work):
 @inner
 def _add_cycles(k, mult, count, need, longest, work):
     """Add the cycles of ``longest`` classes and one more: larger ones have anyway what they need."""
-    path = np.empty(k + 1, np.int64)
-    following = np.empty(k + 1, np.int64)
+    path = np.empty(k, np.int64)
+    following = np.empty(k, np.int64)
     for first in range(k):  # the lowest vertex of the cycle
         path[0] = first
         following[0] = first + 1
@@ -122,11 +119,8 @@ def cover_of(j, cover, s, laid, classes, sets):
             given += (cycle >> e) & ~cover & 1
         elif vertex < 0:
             given += ((cycle >> e) & 1) * (cover >> 2)
-        if vertex < 0:
-            continue
-        turned = classes[lay.FLIP, e]
-        if classes[lay.U, e] == vertex:
-            given += (cover >> turned) & 1
+        elif classes[lay.U, e] == vertex:
+            given += (cover >> classes[lay.FLIP, e]) & 1
         elif classes[lay.V, e] == vertex:
-            given += (cover >> (1 - turned)) & 1
+            given += (cover >> (1 - classes[lay.FLIP, e])) & 1
     return min(given, np.int64(lay.BYTE))

@@ -73,18 +73,13 @@ def _is_connected(links, near):
 
 
 @inner
-def _is_finest(n, joined, pairs, chosen, gears):
+def _is_finest(n, joined, near):
     """Tell whether every axis is needed: no link or pair of parts on it could have an axis of its own.
 
-    The links on an axis are joined where one carries a gear pair of the other; taking any one away must leave the
-    others connected.
+    The links on an axis are joined where one carries a gear pair of the other, see ``_near_of`` (a gear pair itself
+    joins no two links on an axis); taking any one away must leave the others connected.  An axis of two links is always
+    needed: one carries a gear pair of the other, or nothing held the two sides together.
     """
-    near = np.zeros(n, np.int64)
-    for i in range(gears):
-        a, b, c = pairs[_A, chosen[i]], pairs[_B, chosen[i]], pairs[_CARRIER, chosen[i]]
-        near[c] |= np.int64(1) << a | np.int64(1) << b
-        near[a] |= np.int64(1) << c
-        near[b] |= np.int64(1) << c
     for a in range(n):
         for b in range(a + 1, n):
             if not joined[a, b]:
@@ -94,10 +89,6 @@ def _is_finest(n, joined, pairs, chosen, gears):
                 axis |= np.int64(joined[a, c] and joined[b, c]) << c
             if axis & ((1 << b) - 1) != 1 << a:
                 continue  # met before, at its two lowest links
-            if axis == 1 << a | 1 << b:
-                if not near[a] >> b & 1:
-                    return False
-                continue
             for v in range(n):
                 if axis >> v & 1 and not _is_connected(axis ^ (np.int64(1) << v), near):
                     return False
@@ -215,7 +206,7 @@ def choose_gears(n, trees, start, stop, gears, finest, roles, perms, out):
                 _near_of(n, pairs, chosen, gears, near)
                 if gears < n - 2 and not _is_whole(n, near):
                     continue
-                if finest and not _is_finest(n, trees[h], pairs, chosen, gears):
+                if finest and not _is_finest(n, trees[h], near):
                     continue
                 if roles:
                     count += _role_orbits(chosen, gears, grown, order, images, kept)

@@ -199,11 +199,12 @@ def _is_ordered(depth, label, labels, variables, pairs):
 
 @inner
 def _open_search(symmetry, tables, work):
-    """Lay out the variables of the search the state points to; return False when a byte could overflow."""
+    """Lay out the variables of the search the state points to; return False without room, or where bytes overflow."""
     st = work.state
     member = work.members[st[WITNESS]] if st[WITNESS] < st[KEPT] and symmetry else np.int64(0)
     st[COUNT] = build_variables(st[CLASSES], st[SETS], work.perms[member], tables, work)
-    plain_entries(st[COUNT], tables, work)
+    if not plain_entries(st[COUNT], tables, work):
+        return False
     unconstrained_ways(st[COUNT], np.bool_(True), tables, work)
     lay_gains(st[COUNT], tables, work)
     st[WORDS] = (st[SETS] + 7) // 8
@@ -334,7 +335,6 @@ def rewind(start, part, parts, work):
     for i in range(work.state.shape[0]):
         work.state[i] = 0
     work.state[GRAPH] = start
-    work.state[WITNESS] = -1
     work.state[PART] = part
     work.state[PARTS] = parts
 

@@ -80,7 +80,7 @@ def split_all(k, mults, start, joined, layers, codes):
                 moved = 0
                 for i in range(neighbours):
                     moved += given[i]
-                if moved + joined < 3 or degree - moved + joined < 3 or moved == 0 or moved == degree:
+                if moved + joined < 3 or degree - moved + joined < 3 or moved == degree:
                     continue
                 if 2 * given[0] > mults[h, v, neighbour[0]]:
                     continue  # the same split with the halves exchanged
