@@ -18,12 +18,13 @@ from graphsynth.formats.attributes import OF_EDGE, OF_GRAPH, Edge, Item, Spent, 
 from graphsynth.structure.text import LINKS_MAX
 
 _TOKEN = re.compile(
-    r"(?:\s++|//[^\n]*+|\#[^\n]*+|/\*[^*]*+(?:\*(?!/)[^*]*+)*+\*/)*+"
-    r'(?:(?P<quoted>"[^"\\]*+(?:\\.[^"\\]*+)*+")'
+    # blanks and comments one by one: early releases of Python 3.11 get a possessive group of all of them wrong
+    r"(?P<blank>\s++|//[^\n]*+|\#[^\n]*+|/\*.*?\*/)"
+    r'|(?P<quoted>"[^"\\]*+(?:\\.[^"\\]*+)*+")'
     r"|(?P<name>-?(?:\.[0-9]++|[0-9]++(?:\.[0-9]*+)?))"
     r"|(?P<word>[A-Za-z_\x80-\U0010ffff][A-Za-z_0-9\x80-\U0010ffff]*+)"
     r"|(?P<mark>--|->|[][{}=;,:<+])"
-    r"|(?P<bad>.)|\Z)",
+    r"|(?P<bad>.)",
     re.DOTALL,
 )
 #: Characters of a text.
@@ -67,8 +68,8 @@ def _tokens(text: str) -> list[_Token]:
     found: list[_Token] = []
     for match in _TOKEN.finditer(text):
         kind, end = match.lastgroup, match.end() - 1
-        if kind is None:  # the end
-            break
+        if kind is None or kind == "blank":
+            continue
         piece = match[kind]
         if kind == "bad":
             raise FormatError(f"{piece!r} begins nothing of the DOT language", _line(text, end))
