@@ -73,9 +73,8 @@ def _tokens(text: str) -> list[_Token]:
         piece = match[kind]
         if kind == "bad":
             raise FormatError(f"{piece!r} begins nothing of the DOT language", _line(text, end))
-        mark = piece if kind == "mark" else ""
-        if kind == "word" and piece.lower() in _KEYWORDS:
-            mark = piece.lower()
+        low = piece.lower()
+        mark = low if kind == "mark" or (kind == "word" and low in _KEYWORDS) else ""
         if kind == "quoted":  # \" and \\ are the characters, a line end after a backslash is nothing
             piece = re.sub(r'\\(["\\\n])', lambda escaped: escaped[1].strip("\n"), piece[1:-1])
         found.append((piece, end, mark))
