@@ -127,14 +127,15 @@ class TaskProblem:
         deep = max(rows.loads.shape[1] for rows, _, _ in every)
         frames = np.concatenate([frames for _, frames, _ in every], axis=1)
         centre = model.centre(u)
-        turned = turned_with(frames, centre)
-        frames[..., :2] = (frames[..., :2] - centre[:, None, None] + turned) / scale
         loads = np.zeros((sets, deep, model.links, 3, frames.shape[1]))
         at = np.cumsum([0, *(rows.loads.shape[4] for rows, _, _ in every)])
         for k, (rows, _, _) in enumerate(every):
             loads[:, : rows.loads.shape[1], ..., at[k] : at[k + 1]] = rows.loads
-        moment = np.einsum("sdlan,snla->sdln", loads[..., :2, :], turned[..., ::-1] * [1.0, -1.0])
-        loads[..., 2, :] += moment  # about the centre
+        if centre.any():  # moments about it
+            turned = turned_with(frames, centre)
+            frames[..., :2] += turned - centre[:, None, None]
+            loads[..., 2, :] += np.einsum("sdlan,snla->sdln", loads[..., :2, :], turned[..., ::-1] * [1.0, -1.0])
+        frames[..., :2] /= scale
         loads[..., :2, :] *= scale[..., None]
         places = u.places - centre[:, None]
         table = model.plan.design.dimensions(places / scale[:, 0], u.numbers)
