@@ -280,6 +280,14 @@ def _turns(args: tuple[Any, ...], rng: np.random.Generator) -> tuple[Any, ...]:
     return at(args, _0=args[0] * (1.0 + 10.0 ** rng.uniform(-15, -9) * rng.standard_normal(args[0].shape)))
 
 
+def _loops(args: tuple[Any, ...], rng: np.random.Generator) -> tuple[Any, ...]:
+    """Join bodies anyhow, in one part or in several."""
+    joints, bodies = len(args[0]), args[1]
+    first = rng.integers(bodies, size=joints)
+    pairs = np.stack([first, (first + rng.integers(1, bodies, joints)) % bodies], axis=1)
+    return at(args, _0=pairs, _2=int(rng.integers(bodies)), _3=np.zeros((joints, joints)))
+
+
 #: By kernel of whole numbers, or of data that must fit together: other arguments that it may be given.
 OTHERS: dict[str, Callable[[tuple[Any, ...], np.random.Generator], tuple[Any, ...]]] = {
     "structure.kernels.canon": _canon,
@@ -298,6 +306,7 @@ OTHERS: dict[str, Callable[[tuple[Any, ...], np.random.Generator], tuple[Any, ..
     "synthesis.kernels.listing.list_rows": _list_rows,
     "synthesis.kernels.listing.rewind": lambda args, rng: at(args, _0=int(rng.integers(99)), _1=int(rng.integers(9))),
     "systems.platform.kernels.turns": _turns,
+    "jamming.joints.kernels.sharing.loops": _loops,
     "synthesis.kernels.splitting.split_all": lambda args, rng: at(
         shuffled(args, 1, rng=rng), _2=int(rng.integers(len(args[1]), endpoint=True))
     ),
