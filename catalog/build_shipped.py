@@ -4,7 +4,7 @@
 
 All planar chains of mobility-1 joints with mobility 1 to 4 and at most ten links, fractionated ones included.  One
 mechanism of each chain with at most eight links has dimensions with which it turns, where drivers on one link move it
-(in five chains of mobility 3 and 4 none do); the four-bar linkage also has a verdict on jamming.
+(in five chains of mobility 3 and 4 none do); those of mobility 1 also have a verdict on jamming.
 
 The check compares the structural content exactly (digest of all rows, and the statement beside it), and which
 mechanisms were evaluated, with every status, unit and guarantee.  The digits of dimensions are found by optimisation;
@@ -36,7 +36,7 @@ def evaluate(path: Path) -> None:
     """Give the smaller chains dimensions."""
     with Catalogue(path) as catalogue:
         catalogue.evaluate(EVALUATED, MOBILITIES)
-        catalogue.evaluate([4], [1], jamming=JAMMING)
+        catalogue.evaluate(EVALUATED, [1], jamming=JAMMING)
 
 
 def statement(catalogue: Catalogue) -> str:
