@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
 TABLES = ("chains", "mechanisms")
-_MANIFEST, _FORM = "manifest.json", 1
+_MANIFEST, _FORM = "manifest.json", 2  # 2: with the type of mobility
 _ABOUT = {
     "what": "kinematic chains in the plane with revolute joints, each once, and their mechanisms by frame and drivers",
     "licence": "as graphsynth",
@@ -351,7 +351,7 @@ class _Family:
         tasks = tasks_of(self.links, self.mobility, self.fractionated)
         if not tasks:
             return
-        cut = f"{fingerprint(problem, tasks)}{'+' if self.mechanisms else '-'}"
+        cut = f"{_FORM} {fingerprint(problem, tasks)}{'+' if self.mechanisms else '-'}"
         jobs = jobs_of(tasks, self.mechanisms)
         done = self._done(cut)
         i, m = (1, 1) if shard is None else checked(shard)

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.atlas import facts
 from graphsynth.atlas.building import is_planar
-from graphsynth.atlas.facts import Rows, assortments, contracted_of, driven_text, graph6_of, mechanisms_of, modes_of_all
 from graphsynth.atlas.making import Task, blocks_of
 from graphsynth.core.extras import need
 
@@ -64,9 +64,8 @@ def jobs_of(tasks: list[Task], mechanisms: bool) -> list[Job]:
 
 def make_part(job: Job) -> Part:
     """Make a part (computed in the worker)."""
-    rows = Rows()
-    columns: dict[str, list[Any]] = {name: [] for name in ("keys", "order", "orbits", "girth", "cuts", "count")}
-    kinds: list[str] = []
+    rows, names = facts.Rows(), ("keys", "order", "orbits", "girth", "cuts", "count", "kinds", "types")
+    columns: dict[str, list[Any]] = {name: [] for name in names}
     shapes: list[int] = []
     driven: list[tuple[NDArray[Any], ...]] = []
     start = 0
@@ -74,12 +73,11 @@ def make_part(job: Job) -> Part:
         n = block.orbit.shape[1]
         orbits = (block.orbit == np.arange(n)).sum(axis=1)
         values = (block.keys, block.order, orbits, block.girth, block.cuts != 0, block.mechanisms)
-        for column, value in zip(columns.values(), values):
-            column.append(value.copy())
-        kinds += assortments(block)
-        shapes += contracted_of(block, rows)
+        for column, value in zip(columns.values(), (*values, facts.assortments(block), facts.mobility_types(block))):
+            column.append(np.array(value))
+        shapes += facts.contracted_of(block, rows)
         if job.mechanisms:
-            chains, frames, drives, structures = mechanisms_of(block, rows)
+            chains, frames, drives, structures = facts.mechanisms_of(block, rows)
             driven.append((start + chains, frames, drives, structures))
         start += len(block.keys)
     if not start:
@@ -87,7 +85,7 @@ def make_part(job: Job) -> Part:
     whole = {name: np.concatenate(parts) for name, parts in columns.items()}
     order = np.lexsort(whole["keys"].T[::-1])  # neighbours are alike: half the bytes
     links = job.tasks[0].links
-    tables = {"chains": _chains(links, whole, kinds, shapes, rows, order)}
+    tables = {"chains": _chains(links, whole, shapes, rows, order)}
     count = 0
     if driven:
         mechanisms = [np.concatenate(parts) for parts in zip(*driven)]
@@ -104,20 +102,19 @@ def labelled_of(links: int, orders: NDArray[Any]) -> int:
 def _chains(
     links: int,
     whole: dict[str, NDArray[Any]],
-    kinds: list[str],
     shapes: list[int],
-    rows: Rows,
+    rows: facts.Rows,
     order: NDArray[np.int64],
 ) -> bytes:
-    pa = _arrow()
     contracted = list(rows.contracted)
     planar = np.array([is_planar(edges) for _, edges in contracted])
     vertices = np.array([size for size, _ in contracted], np.uint8)
     shape = np.array(shapes)[order]
+    kinds, types = (_arrow().array(whole[name][order]).dictionary_encode() for name in ("kinds", "types"))
     return _parquet(
         {
-            "graph6": graph6_of(links, whole["keys"][order]),
-            "assortment": pa.array(np.array(kinds)[order]).dictionary_encode(),
+            "graph6": facts.graph6_of(links, whole["keys"][order]),
+            "assortment": kinds,
             "automorphisms": whole["order"][order],
             "inversions": whole["orbits"][order].astype(np.uint8),
             "mechanisms": whole["count"][order].astype(np.uint16),
@@ -125,42 +122,42 @@ def _chains(
             "contracted_vertices": vertices[shape],
             "planar": planar[shape],
             "fractionated": whole["cuts"][order],
+            "mobility_type": types,
         },
         {"graph6": "DELTA_LENGTH_BYTE_ARRAY"},
         together=TOGETHER,
     )
 
 
-def _mechanisms(mechanisms: list[NDArray[Any]], rows: Rows, place: NDArray[np.int64]) -> bytes:
+def _mechanisms(mechanisms: list[NDArray[Any]], rows: facts.Rows, place: NDArray[np.int64]) -> bytes:
     pa = _arrow()
-    chains, frames, drives, structures = mechanisms
-    chains = place[chains]
+    chains, frames, drives, structures = place[mechanisms[0]], *mechanisms[1:]
     order = np.lexsort((drives, frames, chains))
     groups = list(rows.groups)
-    facts = np.array(
+    known = np.array(
         [
             (
                 max((groups[at].group_class for at in own), default=1),
                 max((groups[at].order for at in own), default=0),
                 len(own),
                 max((groups[at].links for at in own), default=0),
-                modes_of_all(groups[at].modes for at in own) or -1,
+                facts.modes_of_all(groups[at].modes for at in own) or -1,
             )
             for own in rows.structures
         ],
         dtype=np.int64,
     )[structures[order]]
-    names = {mask: str(driven_text(mask)) for mask in set(drives.tolist())}
+    names = {mask: str(facts.driven_text(mask)) for mask in set(drives.tolist())}
     return _parquet(
         {
             "chain": chains[order].astype(np.uint32),
             "frame": frames[order],
             "drivers": pa.array([names[mask] for mask in drives[order].tolist()]).dictionary_encode(),
-            "class": facts[:, 0].astype(np.uint8),
-            "order": facts[:, 1].astype(np.uint8),
-            "groups": facts[:, 2].astype(np.uint8),
-            "largest_group": facts[:, 3].astype(np.uint8),
-            "modes": facts[:, 4],
+            "class": known[:, 0].astype(np.uint8),
+            "order": known[:, 1].astype(np.uint8),
+            "groups": known[:, 2].astype(np.uint8),
+            "largest_group": known[:, 3].astype(np.uint8),
+            "modes": known[:, 4],
         },
         {"chain": "DELTA_BINARY_PACKED"},
     )

@@ -132,14 +132,17 @@ def _columns(block: Block) -> Iterator[Iterable[Any]]:
     yield [len(set(orbit)) for orbit in orbits]
     yield block.girth.tolist()
     yield (block.cuts != 0).astype(int).tolist()
-    yield [_mobility_type(pairs, n) for pairs in block.joints.tolist()]
+    yield mobility_types(block)
 
 
-def _mobility_type(joints: Sequence[Sequence[int]], links: int) -> str:
+def mobility_types(block: Block) -> list[str]:
+    """Type of mobility of every chain: total, partial or fractionated."""
     from graphsynth.structure.graph import MechanismGraph
 
-    graph = MechanismGraph(links, [(a, b) for a, b in joints])
-    return "total" if graph.mobility == 1 else graph.mobility_type
+    count, n = block.orbit.shape
+    if 3 * (n - 1) - 2 * block.joints.shape[1] == 1:
+        return ["total"] * count
+    return [MechanismGraph(n, [(a, b) for a, b in joints]).mobility_type for joints in block.joints.tolist()]
 
 
 def assortments(block: Block) -> list[str]:

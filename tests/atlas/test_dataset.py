@@ -40,7 +40,7 @@ def test_rows_are_those_of_a_catalogue(tmp_path, links, mobility):
     """The catalogue's rows, each checked by another route, and the same chains and mechanisms in number."""
     folder = Dataset.build(tmp_path / "set", [links], mobility, fractionated=True).folder
     with Catalogue.build(tmp_path / "some.sqlite", [links], mobility, fractionated=True) as catalogue:
-        columns = "graph6, assortment, automorphisms, inversions, girth, planar, fractionated"
+        columns = "graph6, assortment, automorphisms, inversions, girth, planar, fractionated, mobility_type"
         wanted = catalogue.sql(f"SELECT {columns} FROM chains ORDER BY graph6")
         driven = catalogue.sql(
             'SELECT graph6, frame, CAST(driver AS TEXT) AS drivers, class, m."order", groups FROM mechanisms m '
