@@ -187,6 +187,24 @@ def test_the_range_of_a_larger_group_is_seen_whole(tmp_path: Path) -> None:
         assert compared >= 118
 
 
+def test_a_limit_upon_a_sample_is_no_change_point(tmp_path: Path) -> None:
+    """A trammel of 3, 4 and 5: where it lies flat both modes meet, and none goes on."""
+    pins = [{"kind": "R", "a": 1, "b": k, "at_a": at, "at_b": at} for k, at in ((2, [0, 3]), (3, [4, 0]))]
+    slides = [
+        {"kind": "P", "a": 0, "b": k, "at_a": at, "at_b": at, "angle_a": turn, "angle_b": turn}
+        for k, at, turn in ((2, [0, 3], math.pi / 2), (3, [4, 0], 0.0))
+    ]
+    driver = {"base": 0, "link": 3, "law": {"kind": "linear", "rate": 1, "offset": 0}}
+    head = {"format": "graphsynth mechanism", "version": 1, "graph": "C] f0", "pose": [[0, 0, 0]] * 4, "points": {}}
+    trammel = Mechanism.from_json(json.dumps({**head, "joints": pins + slides, "drivers": [driver]}))
+    (result,) = in_page(tmp_path, [(trammel, [["sweep", 181], ["advance", 2.0], ["advance", -10.0]])])
+    swept, up, down = (done["result"] for done in result["done"])
+    ends = [event for event in swept["events"] if event["kind"] != "dead centre"]
+    assert [(event["kind"], round(event["input"], 9)) for event in ends] == [("limit", -9.0), ("limit", 1.0)]
+    assert up["stop"]["kind"] == down["stop"]["kind"] == "limit"
+    assert simulate(trammel, [0.0, 0.5, 1.1]).events[-1].kind == "fold"
+
+
 def test_a_change_point_upon_a_sample_ends_the_range_as_in_the_library(tmp_path: Path) -> None:
     """Scott Russell's crank and rod are equal: at +-90 degrees both modes meet and go on."""
     flat = Mechanism.four_bar(2.0, 1.0, 2.0, 1.0)

@@ -115,8 +115,8 @@ class Person:
             selector,
         )
 
-    def key(self, text, *, control=False, shift=False):
-        """Press a key, as the keyboard sends it."""
+    def key(self, text, *, control=False, shift=False, code=""):
+        """Press a key, as the keyboard sends it; ``code`` is its place, of letters in other alphabets."""
         named = {
             "Enter": 13,
             "Escape": 27,
@@ -128,13 +128,13 @@ class Person:
             "ArrowDown": 40,
             " ": 32,
         }
-        code = named.get(text, ord(text.upper()) if len(text) == 1 else 0)
-        event = {"key": text, "windowsVirtualKeyCode": code, "modifiers": 2 * control + 8 * shift}
-        if len(text) == 1 and not control:
-            event["text"] = text
+        number = named.get(text, ord(text.upper()) if len(text) == 1 else 0)
+        event = {"key": text, "code": code, "windowsVirtualKeyCode": number, "modifiers": 2 * control + 8 * shift}
+        if (len(text) == 1 or text == "Enter") and not control:
+            event["text"] = "\r" if text == "Enter" else text
         self.window.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": "keyDown", **event})
         self.window.execute_cdp_cmd(
-            "Input.dispatchKeyEvent", {"type": "keyUp", "key": text, "windowsVirtualKeyCode": code}
+            "Input.dispatchKeyEvent", {"type": "keyUp", "key": text, "windowsVirtualKeyCode": number}
         )
 
     def drawn(self):

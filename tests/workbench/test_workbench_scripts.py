@@ -197,6 +197,22 @@ def test_a_copy_is_driven_as_its_original_and_a_mirror_image_the_other_way(scrip
         assert np.allclose(other, sense * one, atol=1e-12)
 
 
+def test_a_copy_of_a_multiple_joint_has_its_joints_and_its_driver(scripts):
+    """Three links at one place in a row, the last one driven on the second: so are their copies."""
+    graph = MechanismGraph(6, [(0, 1), (0, 3), (0, 5), (1, 2), (2, 3), (2, 4), (4, 5)], frame=0)
+    places = [(0, 0), (8, 0), (6, -1), (1, 3), (6, 3), (1, 3), (5, 2)]
+    made = Mechanism.from_graph(graph, places, driver=(2, 4))
+    data = scripts(
+        """const s = Bench.opened(Bench.checked(args[0]));
+           return Bench.written(Bench.copied(s, Object.keys(s.links), (x, y) => [x + 20, y])[0]);""",
+        to_dict(made),
+    )
+    both = Mechanism.from_json(json.dumps(data))
+    pairs = {(joint.a, joint.b) for joint in both.graph.joints}
+    assert {(d.base, d.link) for d in both.drivers} == {(2, 4), (7, 9)}
+    assert all((joint.a + 5 if joint.a else 0, joint.b + 5) in pairs for joint in graph.joints)
+
+
 def test_numbers_with_units(scripts):
     asked = [
         ["12", "mm"],

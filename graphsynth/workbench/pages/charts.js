@@ -64,7 +64,6 @@
     root.addEventListener("pointerdown", event => {
       const box = root.getBoundingClientRect(), at = ((event.clientX - box.left) / box.width) * WIDE;
       motion.pause();
-      if (app.mode !== "run") app.setMode("run");
       motion.to(Math.min(last, Math.max(first, first + ((at - LEFT) / (WIDE - LEFT - 6)) * (last - first))));
       app.changed("rest");
     });
@@ -90,7 +89,7 @@
       const [root, moves] = chart(app, motion, swept, own);
       move = moves;
       move();
-      place.replaceChildren(select, root);
+      Bench.refill(place, select, root);
     };
     app.on("sheet view rest", build);
     app.on("pose", () => { if (move && !app.motion.waits) move(); });

@@ -48,17 +48,24 @@
   /** Keys: with Ctrl (or the command key) written "^". */
   Bench.KEYS = {
     "^z": "undo", "^y": "redo", "^Z": "redo", Delete: "delete", Backspace: "delete", "^d": "duplicate", "^m": "mirror",
-    "^a": "all", f: "fit", h: "mode", "#": "grid", n: "snap", x: "names", "?": "help", Escape: "escape",
+    "^a": "all", f: "fit", h: "mode", "#": "grid", "№": "grid", n: "snap", x: "names", "?": "help", Escape: "escape",
     "^s": "save", "^o": "open", " ": "play", u: "share",
   };
 
   const typing = target => target.closest && target.closest("input:not([type=range]):not([type=checkbox]), select, textarea, dialog");
 
+  /** The key whatever Caps Lock says, and as it is in Latin letters where others are typed. */
+  const keyOf = ({ key, code, shiftKey }) => {
+    const own = key.length === 1 && key > "~" && code.startsWith("Key") ? code[3] : key;
+    if (own.length > 1) return own;
+    return shiftKey ? own.toUpperCase() : own.toLowerCase();
+  };
+
   Bench.listen = app => document.addEventListener("keydown", event => {
     if (event.defaultPrevented || event.altKey || typing(event.target)) return;
-    const control = event.ctrlKey || event.metaKey;
-    const name = Bench.KEYS[(control ? "^" : "") + event.key];
-    const tool = !control && Object.keys(Bench.TOOLS).find(own => Bench.TOOLS[own].key === event.key.toLowerCase());
+    const control = event.ctrlKey || event.metaKey, key = keyOf(event);
+    const name = Bench.KEYS[(control ? "^" : "") + key];
+    const tool = !control && Object.keys(Bench.TOOLS).find(own => Bench.TOOLS[own].key === key.toLowerCase());
     if (event.key === " " && event.target.closest("button, summary, a, [type=checkbox]")) return;
     if (name && Bench.do[name]) Bench.do[name](app);
     else if (tool) app.pick(tool);

@@ -174,6 +174,9 @@
     const fixed = from.links[GROUND].points.filter(point => to[point]).map(point => to[point]);
     sheet = Bench.extended(sheet, GROUND, fixed);
     const of = id => (id === GROUND ? GROUND : to[id]);
+    const trees = Object.keys(from.points).filter(id => to[id] && from.points[id].tree).map(id =>
+      [to[id], { ...sheet.points[to[id]], tree: from.points[id].tree.map(pins => pins.map(of)) }]);
+    sheet = { ...sheet, points: { ...sheet.points, ...Object.fromEntries(trees) } };
     for (const pair of Object.values(from.pairs)) {
       if (!of(pair.a) || !of(pair.b) || !to[pair.at] || (pair.on && !to[pair.on])) continue;
       const along = pair.along && pair.along.every(p => to[p]) ? pair.along.map(p => to[p]) : undefined;

@@ -26,7 +26,7 @@ const Engine = (() => {
   const KINDS = ["R", "P", "pin-slot", "gear", "cam"];
   const FAULTS = ["", "drivers", "length", "parallel", "twice"];
   const STOPS = ["", "limit", "lost", "lost", "singular", "input", "change point", "passage"];
-  const TWO_MODES = [2, 3, 4, 7], DRIVE_P = 1, TURNS = 6;
+  const LIMIT = 1, MEETING = 6, BEHIND = 4e-7, TWO_MODES = [2, 3, 4, 7], DRIVE_P = 1, TURNS = 6;
   const ROW_WIDTH = 12, ELIMINATED_WIDTH = 13, DRIVE_WIDTH = 8, SAMPLES = 4;
   const STEPS = 0, TOUCHED = 1, ROWS = 2, CORE = 3, GONE = 4, DRIVES = 5, GEARS = 6, AT = 7;
   /* Shifts of driver coordinates with which a pose on the limit of a driver is assembled. */
@@ -242,11 +242,19 @@ const Engine = (() => {
       }
     }
 
-    stopOf(code, step) {
+    /* What stopped a driver that went a way to coordinates; where two modes meet and it is not assembled right behind, they end. */
+    stopOf(code, step, inputs, driver, way, state) {
       if (code === 0) return null;
-      const group = step >= 0 ? this.order[step] : -1;
-      return { kind: STOPS[code], group, links: group >= 0 ? this.groups[group].links : [] };
+      const group = step >= 0 ? this.order[step] : -1, found = new Float64Array(3);
+      if (code === MEETING) {
+        const on = inputs.map((q, k) => (k === driver ? q + Math.sign(way) * BEHIND * (this.slides(driver) ? this.Lc : 1) : q));
+        this.spared(state);
+        this.call("advancing.advance", this.tables, this.modes, this.spare, on, on, new Float64Array(on.length), this.sizes, found);
+      }
+      return { kind: STOPS[found[1] ? LIMIT : code], group, links: group >= 0 ? this.groups[group].links : [] };
     }
+    slides(driver) { return this.joints[this.given.drivers.data[2 * driver]].kind === "P"; }
+    spared(from) { for (const [name, array] of Object.entries(this.spare)) array.data.set(from[name].data); }
 
     /* Move a driver to a coordinate, the others stay. */
     advance(to, driver = 0) {
@@ -258,7 +266,7 @@ const Engine = (() => {
       const from = this.inputs[driver], [part, code, step] = found;
       this.inputs[driver] = part === 1 ? to : from + part * (to - from);
       this.read(true);
-      return { reached: code === 0, input: this.inputs[driver], stop: this.stopOf(code, step) };
+      return { reached: code === 0, input: this.inputs[driver], stop: this.stopOf(code, step, this.inputs, driver, to - from, this.state) };
     }
 
     /* Pull a point of a link (in its own frame) to a place, as near as it comes. */
@@ -275,7 +283,7 @@ const Engine = (() => {
     /* The drivers at their coordinates swept over n samples; nothing that stands here changes. */
     swept(from, start, goal, driver, n) {
       const { links } = this, steps = this.modes.shape[0], watched = this.watched();
-      for (const [name, array] of Object.entries(this.spare)) array.data.set(from[name].data);
+      this.spared(from);
       const out = {
         poses: { data: new Float64Array(n * links * 3), shape: [n, links, 3] },
         velocities: { data: new Float64Array(n * links * 3), shape: [n, links, 3] },
@@ -286,14 +294,14 @@ const Engine = (() => {
       const found = new Float64Array(5), way = goal[driver] - start[driver];
       const table = { data: Float64Array.from(watched.flatMap(({ link, along }) => [link, ...along])), shape: [watched.length, 3] };
       this.call("advancing.sweep", this.tables, this.modes, this.spare, start, goal, 1 / way, table, out, this.sizes, found);
-      const [reached, part, code, step, count] = found;
+      const [reached, part, code, step, count] = found, at = start[driver] + part * way, there = start.map((q, k) => (k === driver ? at : q));
       const events = Array.from({ length: count }, (_, k) => ({
         kind: "dead centre", input: start[driver] + out.reversals.data[2 * k + 1] * way,
         links: [watched[out.reversals.data[2 * k]].link], group: this.groupNumber[watched[out.reversals.data[2 * k]].link] - 1,
       }));
       const inputs = Float64Array.from({ length: n }, (_, i) => start[driver] + (i / Math.max(1, n - 1)) * way);
       return { inputs, ...Object.fromEntries(Object.entries(out).map(([name, array]) => [name, array.data])),
-        events, reached, at: start[driver] + part * way, stop: this.stopOf(code, step) };
+        events, reached, at, stop: this.stopOf(code, step, there, driver, way, this.spare) };
     }
 
     /* Coordinates on the frame that are not driven: a link, and the direction in which it slides (zeros if it turns). */
@@ -310,8 +318,7 @@ const Engine = (() => {
     /* A whole rotation from here, or all that is reached from here in both directions, over n samples. */
     sweep(n = 361, driver = 0) {
       if (!this.ready) return null;
-      const slides = this.joints[this.given.drivers.data[2 * driver]].kind === "P";
-      const span = slides ? 4 * this.Lc : 2 * Math.PI, start = Float64Array.from(this.inputs);
+      const slides = this.slides(driver), span = slides ? 4 * this.Lc : 2 * Math.PI, start = Float64Array.from(this.inputs);
       const end = (by) => start.map((q, k) => (k === driver ? q + by : q));
       const forward = this.swept(this.state, start, end(span), driver, n);
       if (!forward.stop && !slides) {
@@ -387,7 +394,7 @@ const Engine = (() => {
     }
   }
 
-  return { open: (motion, drawn) => new Mechanism(motion, drawn), graphOf, FAULTS, STOPS, DRIVE_P };
+  return { open: (motion, drawn) => new Mechanism(motion, drawn), graphOf, FAULTS, STOPS, TURNS, DRIVE_P };
 })();
 
 if (typeof module !== "undefined") module.exports = Engine;

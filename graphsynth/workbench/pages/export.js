@@ -62,13 +62,13 @@
   };
   Bench.do.dxf = app => {
     const { motion } = app, swept = motion && motion.driven ? motion.sweep() : null;
-    const paths = swept ? Bench.tracedPoints(app.sheet).map(([, k, at]) => ({ points: Bench.pathOver(motion, k, at).filter(p => p.every(Number.isFinite)), closed: swept.full })) : [];
+    const paths = swept ? Bench.tracedPoints(app.sheet).map(([, k, at]) => ({ points: Bench.pathOver(motion, k, at).filter(p => p.every(Number.isFinite)), closed: swept.full && swept.turns < Infinity })) : [];
     saved(app, "mechanism.dxf", Bench.toDxf(app.posed(), paths), "image/vnd.dxf");
   };
 
   /** Pictures of one pass of the motion, each handed to `take` as a canvas. */
   async function filmed(app, count, width, height, take) {
-    const { motion } = app;
+    const { motion, mode } = app;
     if (!motion || !motion.driven) { app.say(motion ? motion.why : "said.noengine"); return false; }
     motion.pause();
     const swept = motion.sweep(), before = motion.input, first = swept.inputs[0], last = swept.inputs[swept.inputs.length - 1];
@@ -80,6 +80,8 @@
       app.say("said.filming", { k: k + 1, n: count });
     }
     motion.to(before, true);
+    if (mode === "draw") app.pose = null; // it stands as it was drawn
+    app.setMode(mode);
     app.changed("rest");
     return true;
   }
@@ -116,6 +118,7 @@
     box.value = program;
     dialog.dataset.name = name;
     document.getElementById("pythonAbout").textContent = Bench.word(about, { name });
+    Bench.app.say(about, { name });
     dialog.showModal();
     box.setSelectionRange(0, 0);
     box.scrollTop = 0;

@@ -102,7 +102,7 @@
           make("div", { class: "acts" }, Bench.button(this.proof && !this.proof.found ? "jam.stop" : "jam.prove", () => this.prove(), { "data-prove": true }),
             Bench.button("jam.python", () => this.python(), { "data-program": true })));
       }
-      place.replaceChildren(...parts.filter(Boolean));
+      Bench.refill(place, ...parts);
       this.show();
     }
 
@@ -125,7 +125,7 @@
       if (seats.fault || !this.answer) { layer.replaceChildren(); return; }
       const now = this.now = seats.at(motion.engine.pose), words = new Map(joints(this.app, this.data));
       const text = now.binds ? Bench.word("jam.binds", { factor: this.factor(now.factor), joint: words.get(now.first) || "–" })
-        : Bench.word("jam.free", { factor: Bench.shown(now.allowed, 3), joint: words.get(now.first) || "–" });
+        : Bench.word(Number.isFinite(now.allowed) ? "jam.free" : "jam.loose", { factor: Bench.shown(now.allowed, 3), joint: words.get(now.first) || "–" });
       this.answer.replaceChildren(make("p", { class: now.binds ? "warn" : "" }, text));
       const at = k => { const { a, at_a: own } = this.data.joints[k]; return this.app.view.px(Bench.carried(motion.row(a), own)); };
       const rings = now.joints.filter(({ joint }) => joint !== this.joint).map(({ joint, used, price }) => {
@@ -161,7 +161,7 @@
     /** The proof over the whole motion, in the worker; where its kernels do not know a joint, the library's program. */
     async prove() {
       const { app, motion, data } = this;
-      if (this.proof && !this.proof.found) { this.proof = null; app.work.stop(); app.changed("rest"); return; }
+      if (this.proof && !this.proof.found) { this.proof = null; app.work.stop(); app.say("said.stopped"); app.changed("rest"); return; }
       const seats = this.open(), swept = motion.driven && !seats.fault ? motion.sweep() : null, own = { found: null, swept };
       if (!swept || this.data.drivers.length !== 1) { this.python(); return; }
       const { inputs } = swept, turns = swept.full && swept.turns < Infinity ? swept.turns : 0;

@@ -47,14 +47,14 @@
     const swept = motion.sweep();
     if (!swept) return [];
     const first = swept.inputs[0], last = swept.inputs[swept.inputs.length - 1];
-    const text = swept.full ? Bench.word(swept.turns === 1 ? "know.full" : "know.fullbut", { n: swept.turns === Infinity ? "–" : swept.turns }) : Bench.word("know.range", { from: Bench.shownInput(motion, first), to: Bench.shownInput(motion, last) });
+    const text = swept.full ? Bench.word(swept.turns === 1 ? "know.full" : swept.turns < Infinity ? "know.fullbut" : "know.fullopen", { n: Math.min(swept.turns, Engine.TURNS) }) : Bench.word("know.range", { from: Bench.shownInput(motion, first), to: Bench.shownInput(motion, last) });
     const angles = [];
     const steps = swept.margins.length / swept.inputs.length;
     for (let i = 0; i < swept.inputs.length; i++) {
       for (const { angle } of motion.engine.transmission(swept.margins.subarray(i * steps, (i + 1) * steps))) if (Number.isFinite(angle)) angles.push(angle);
     }
     const rows = [[Bench.word("know.rotation"), text]];
-    if (angles.length) rows.push([Bench.word("know.transmission"), `${Bench.shown(Math.round((Math.min(...angles) * 1800) / Math.PI) / 10)}°`]);
+    if (angles.length) rows.push([Bench.word(motion.engine.groups.every(own => own.twoModes) ? "know.transmission" : "know.transmission.dyads"), `${Bench.shown(Math.round((Math.min(...angles) * 1800) / Math.PI) / 10)}°`]);
     const events = swept.events.map(event => [motion.told(event), () => { motion.to(event.input); app.changed("rest"); }]);
     return [Bench.rows(rows), ...proof(app, motion, swept), events.length ? buttons(events) : null];
   }
@@ -133,8 +133,8 @@
         parts.push(make("h3", {}, Bench.word("know.modes")), buttons(engine.groups.map((group, k) => [name(group), () => motion.assemble(k), { "data-group": k }])));
       }
     }
-    place.replaceChildren(...[Bench.rows(rows), kin(app, data, key), ...parts, ...(motion.driven ? rotation(app, motion) : []),
-      ...(engine.mobility > 0 ? drivers(app, motion) : []), ...frames(app)].filter(Boolean));
+    Bench.refill(place, Bench.rows(rows), kin(app, data, key), ...parts, ...(motion.driven ? rotation(app, motion) : []),
+      ...(engine.mobility > 0 ? drivers(app, motion) : []), ...frames(app));
   };
 
   /** The name of a group in the reader's language: dyads by their joints, larger ones by their links. */

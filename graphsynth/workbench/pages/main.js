@@ -24,7 +24,7 @@
   const icon = name => Bench.svg("svg", { viewBox: "0 0 24 24", width: 22, height: 22, "aria-hidden": "true" }, Bench.svg("path", { d: ICONS[name] }));
 
   function toolbar(app) {
-    $("tools").replaceChildren(...Object.entries(Bench.TOOLS).map(([name, { key }]) => {
+    Bench.refill($("tools"), ...Object.entries(Bench.TOOLS).map(([name, { key }]) => {
       const title = Bench.word("tool.tip", { name: Bench.word(`tool.${name}`), key: key.toUpperCase() });
       const pressed = app.tool === name && app.mode === "draw";
       return make("button", { type: "button", title, "aria-label": title, "aria-pressed": String(pressed), "data-tool": name, "aria-keyshortcuts": key,
@@ -45,7 +45,7 @@
   /** The list of keys in the help. */
   function help() {
     const tools = Object.entries(Bench.TOOLS).map(([name, { key }]) => [key.toUpperCase(), Bench.word(`hint.${name}`)]);
-    const shown = key => key.replace("^", "Ctrl ").replace(/^ $/, Bench.word("key.space"));
+    const shown = key => (key.length > 2 ? key : key.toUpperCase()).replace("^", "Ctrl ").replace(/^ $/, Bench.word("key.space"));
     const seen = new Set(), keys = Object.entries(Bench.KEYS).filter(([, name]) => !seen.has(name) && seen.add(name))
       .map(([key, name]) => [shown(key), Bench.word(`do.${name}`)]);
     $("keys").replaceChildren(...[...tools, ...keys].map(([key, text]) =>
@@ -97,8 +97,10 @@
 
   function menus(app) {
     for (const element of document.querySelectorAll("[data-do]")) {
-      element.addEventListener("click", () => {
-        element.closest("details")?.removeAttribute("open");
+      element.addEventListener("click", event => {
+        const menu = element.closest("details");
+        if (menu) menu.open = false;
+        if (menu && !event.detail) menu.firstElementChild.focus(); // from the keyboard: what was hidden has no focus
         Bench.do[element.dataset.do](app);
       });
     }

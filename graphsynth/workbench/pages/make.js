@@ -41,6 +41,13 @@
     return make("label", { class: "field" }, make("span", {}, Bench.word(key)), select);
   };
 
+  /** Fill a place anew; the control that had the focus, or that stands there now, has it still. */
+  Bench.refill = (place, ...children) => {
+    const controls = () => [...place.querySelectorAll("input,select,button")], at = controls().indexOf(document.activeElement);
+    place.replaceChildren(...children.filter(Boolean));
+    if (at >= 0) controls()[at]?.focus({ preventScroll: true });
+  };
+
   /** Rows of a name and a value. */
   Bench.rows = pairs => make("dl", {}, ...pairs.flatMap(([name, value]) =>
     [make("div", {}, make("dt", {}, name), make("dd", {}, value))]));

@@ -56,7 +56,9 @@
     get waits() { return this.playing && this.beat !== 0; }
 
     row(link) { return Array.from(this.engine.pose.subarray(3 * link, 3 * link + 3)); }
+    /** Show where it stands: moved, it is no longer what is drawn on. */
     show() {
+      this.app.setMode("run");
       this.beat = (this.beat + 1) % 6;
       this.app.pose = Float64Array.from(this.engine.pose);
       this.app.changed("pose");
@@ -134,7 +136,7 @@
     toggle() { if (this.playing) this.pause(); else this.play(); }
     play() {
       if (!this.driven || this.stands) { this.app.say(this.why); return; }
-      if (this.app.mode !== "run") this.app.setMode("run");
+      this.app.setMode("run");
       this.playing = true;
       let before = performance.now();
       const step = now => {

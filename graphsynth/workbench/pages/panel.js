@@ -150,7 +150,6 @@
 
   /** Show what is chosen. */
   Bench.showPanel = (app, place) => {
-    const focused = place.contains(document.activeElement) ? [...place.querySelectorAll("input,select,button")].indexOf(document.activeElement) : -1;
     const { sheet, selection } = app, [id] = selection;
     let parts;
     if (app.tool === "poses") parts = Bench.posePanel(app);
@@ -163,7 +162,6 @@
       parts.push(make("div", { class: "acts" }, button("do.duplicate", () => Bench.do.duplicate(app)),
         button("do.mirror", () => Bench.do.mirror(app)), button("do.delete", () => Bench.do.delete(app))));
     }
-    place.replaceChildren(...parts.filter(Boolean));
-    if (focused >= 0) [...place.querySelectorAll("input,select,button")][focused]?.focus();
+    Bench.refill(place, ...parts);
   };
 })();

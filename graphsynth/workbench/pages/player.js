@@ -52,9 +52,8 @@
     const { motion } = app, time = $("time");
     $("play").addEventListener("click", () => motion.toggle());
     time.addEventListener("input", () => {
-      let goal = Number(time.value); // before the mode changes, which puts the slider where the driver is
+      let goal = Number(time.value); // before the pause, which puts the slider where the driver is
       motion.pause();
-      if (app.mode !== "run") app.setMode("run");
       const swept = motion.sweep(), span = swept.inputs[swept.inputs.length - 1] - swept.inputs[0];
       if (swept.full) goal += Math.round((motion.input - goal) / span) * span;
       motion.to(goal);

@@ -117,9 +117,9 @@
 
   /** Symbols that a link carries with it. */
   Bench.linkSymbols = (sheet, id, px) => {
-    const parts = [];
-    for (const pair of Object.values(sheet.pairs)) if (pair.a === id) parts.push(...guide(sheet, pair, px));
-    if (id !== Bench.GROUND) parts.push(...body(sheet, id, px));
+    const parts = id === Bench.GROUND ? [] : body(sheet, id, px);
+    // a slot is seen in the body, all else under it
+    for (const pair of Object.values(sheet.pairs)) if (pair.a === id) parts[pair.kind === "pin-slot" ? "push" : "unshift"](...guide(sheet, pair, px));
     for (const pair of Object.values(sheet.pairs)) if (pair.b === id) parts.push(...follower(sheet, pair, px));
     return parts;
   };
