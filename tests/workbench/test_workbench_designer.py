@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import time
@@ -237,3 +238,79 @@ def test_the_least_transmission_angle_names_the_groups_that_have_one(person):
         person.press("[data-do=templates]")
         person.press(f"[data-template={name}]")
         assert f"Least transmission angle{of}\n" in text(person, "known")
+
+
+def test_each_driver_has_a_range_of_its_own(person):
+    """A five-bar with two cranks: the range that is shown is that of the driver that is chosen, the other one held."""
+    person.look_at(0, 40, 4)
+    person.tool("link")
+    for ends in (((-30, 0), (-60, 40)), ((-60, 40), (0, 80)), ((0, 80), (60, 60)), ((60, 60), (30, 0))):
+        person.drag(*ends)
+    for tool in ("ground", "driver"):
+        person.tool(tool)
+        person.click(-30, 0)
+        person.click(30, 0)
+    person.script("const w = document.getElementById('which'); w.value = 1; w.dispatchEvent(new Event('change'))")
+    low, high = person.script("const s = Bench.app.motion.sweep().inputs; return [s[0], s[s.length - 1]]")
+    shown = [f"{math.degrees(end):.4g}".replace("-", "−") for end in (low, high)]
+    assert f"{shown[0]}° to {shown[1]}°" in text(person, "known")
+    data = person.drawn()
+    data["drivers"][0]["law"] = {"kind": "polynomial", "coefficients": [0.0]}
+    for end in (low, high):
+        event = Mechanism.from_json(json.dumps(data)).simulate(np.linspace(0.0, 1.05 * end, 400)).events[-1]
+        assert event.ends_motion and event.input == pytest.approx(end)
+
+
+def test_another_language_is_spoken_at_once(person):
+    four_bar(person)
+    person.press("[data-certify]")
+    person.until("return document.getElementById('proved')", seconds=60)
+    person.press("[data-do=chains]")
+    person.until("return document.querySelectorAll('#chainList button').length === 2", seconds=60)
+    person.script("document.getElementById('chains').close()")
+    person.script("const s = document.getElementById('language'); s.value = 'ru'; s.dispatchEvent(new Event('change'))")
+    assert text(person, "proved").startswith("Доказано") and person.said().startswith("Привод")
+    person.press("[data-do=chains]")
+    person.until("return document.querySelectorAll('#chainList button').length === 2", seconds=60)
+    assert "цепь Уатта" in person.script("return document.getElementById('chainList').textContent")
+
+
+def test_mechanisms_that_were_found_are_as_large_in_another_unit(person):
+    """What was found for poses in millimetres goes through the same poses after the drawing is in inches."""
+    person.look_at(40, 0, 3)
+    person.tool("poses")
+    for x, y, turn in ((0, 0, 0.0), (40, 20, 0.5), (70, 10, 1.2)):
+        person.drag((x, y), (x + 20 * math.cos(turn), y + 20 * math.sin(turn)))
+    person.press("[data-passing]")
+    person.until("return document.getElementById('candidates').open", seconds=120)
+    before = mechanism(person)
+    person.script("document.getElementById('candidates').close()")
+    person.script("const u = document.getElementById('unit'); u.value = 'in'; u.dispatchEvent(new Event('change'))")
+    person.press("[data-do=candidates]")
+    person.script("document.querySelector('#candidateList button').click()")
+    sizes = [[math.dist(*own) for own in joints] for joints in (pivots(before), pivots(mechanism(person)))]
+    assert sizes[1] == pytest.approx([size / 25.4 for size in sizes[0]])
+
+
+def pivots(found):
+    """Pairs of places of successive joints."""
+    places = [joint.at_a for joint in found.joints]
+    return list(itertools.pairwise(places))
+
+
+@pytest.mark.parametrize("change", ["move", "drive", "undo"])
+def test_a_measure_is_gone_when_what_it_measured_moves(person, change):
+    four_bar(person)
+    person.tool("measure")
+    person.click(-40, 0)
+    person.click(30, 60)
+    person.look()
+    assert person.script("return document.querySelectorAll('.measure').length") == 1
+    if change == "move":
+        person.script("Bench.app.attempt(s => ({ sheet: Bench.placed(s, { [Object.keys(s.points)[2]]: [30, 65] }) }))")
+    elif change == "drive":
+        person.script("Bench.app.motion.to(0.5)")
+    else:
+        person.press("#undo")
+    person.look()
+    assert person.script("return document.querySelectorAll('.measure').length") == 0

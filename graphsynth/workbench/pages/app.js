@@ -27,8 +27,7 @@
 
     /** Take a new drawing; it can be undone. */
     take(sheet, { select, say } = {}) {
-      this.draft = null;
-      this.pose = null;
+      this.draft = this.pose = this.measured = null;
       if (this.motion) this.motion.pause();
       this.history.push(sheet);
       this.selection = (select || this.selection).filter(id => this.has(id));
@@ -71,7 +70,7 @@
     step(name, can) {
       if (!can) return this.say("said.end");
       this.history[name]();
-      this.draft = this.pose = null;
+      this.draft = this.pose = this.measured = null;
       this.picks = [];
       this.selection = this.selection.filter(id => this.has(id));
       this.changed("sheet");
@@ -103,6 +102,7 @@
       }
       this.mode = mode;
       this.picks = [];
+      this.measured = null;
       this.changed("tool");
     }
     select(ids) {

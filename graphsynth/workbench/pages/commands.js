@@ -29,7 +29,7 @@
     },
     fresh: app => {
       const { unit } = app.sheet;
-      Object.assign(app, { measured: null, target: null, poses: [] });
+      Object.assign(app, { target: null, poses: [] });
       app.take({ ...Bench.empty(), unit }, { select: [], say: ["said.fresh"] });
       Object.assign(app.view.camera, { x: 0, y: 0, scale: 2 * Bench.UNIT_SIZE[unit] });
       app.changed("view");

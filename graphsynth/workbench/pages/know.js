@@ -62,7 +62,7 @@
   /** The certificate of the motion: asked for by a button, computed in the worker. */
   function proof(app, motion, swept) {
     const own = app.proof && app.proof.swept === swept ? app.proof : null;
-    if (own && own.told) return [make("p", { id: "proved", class: own.good ? "" : "warn" }, own.told), make("p", { class: "soft" }, Bench.word("know.proofabout", { n: own.boxes }))];
+    if (own && own.told) return [make("p", { id: "proved", class: own.good ? "" : "warn" }, own.told()), make("p", { class: "soft" }, Bench.word("know.proofabout", { n: own.boxes }))];
     return [make("div", { class: "acts" }, make("button", { type: "button", "data-certify": true, disabled: Boolean(own), on: { click: () => prove(app, motion, swept) } }, Bench.word("know.prove")))];
   }
 
@@ -77,7 +77,7 @@
     if (app.proof !== own) return;
     app.proof = null;
     if (found && !found.known) Bench.showPython(Binding.program(data, [], ["print(graphsynth.certify(motion).statement)\n"]), "python.certify", "prove.py");
-    if (found && found.known) app.proof = { swept, boxes: found.boxes, good: found.high > found.low, told: proved(motion, found, turns) };
+    if (found && found.known) app.proof = { swept, boxes: found.boxes, good: found.high > found.low, told: () => proved(motion, found, turns) };
     if (app.proof) app.say(app.proof.good ? "said.proved" : "know.unproved");
     app.changed("rest");
   }

@@ -79,7 +79,7 @@
   function settings(app) {
     const language = $("language"), theme = $("theme"), unit = $("unit");
     language.replaceChildren(...Bench.languages().map(name => make("option", { value: name, selected: name === Bench.language() }, Bench.word(`language.${name}`))));
-    language.onchange = () => { Bench.speak(language.value); remembered("workbench-language", language.value); speak(app); };
+    language.onchange = () => { Bench.speak(language.value); remembered("workbench-language", language.value); speak(app); app.say(`hint.${app.tool}`); };
     theme.value = document.documentElement.dataset.theme || "auto";
     theme.onchange = () => { document.documentElement.dataset.theme = theme.value; remembered("workbench-theme", theme.value); };
     unit.replaceChildren(...Bench.UNITS.map(name => make("option", { value: name }, Bench.unitName(name))));
@@ -91,6 +91,7 @@
     help();
     templates(app);
     settings(app);
+    $("chainList").replaceChildren(); // listed anew when it is opened
     app.changed("tool");
     app.changed("sheet");
   }
@@ -139,7 +140,6 @@
     for (const key of ["x", "y", "width", "height"]) if (background) background[key] *= by;
     if (target) app.target = { ...target, curve: target.curve.map(times) };
     if (poses) app.poses = poses.map(times);
-    Object.assign(app, { measured: null });
     app.jamming.end *= by;
   }
 

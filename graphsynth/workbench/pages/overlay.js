@@ -55,7 +55,7 @@
       svg("path", { class: `head ${kind}`, d: Bench.pathOf([to, side(1), side(-1)], true) })];
   }
 
-  /** Arrows of all joints and traced points: the longest over the sweep is a sixth of the view. */
+  /** Arrows of all joints and traced points: the longest over the sweep is a fifth of the view. */
   function arrows(app, motion, parts) {
     const { view, sheet } = app, { engine } = motion;
     for (const kind of ["velocity", "acceleration"]) {

@@ -60,7 +60,7 @@
     });
     time.addEventListener("change", () => app.changed("rest"));
     $("speed").addEventListener("change", () => { motion.speed = Number($("speed").value); });
-    $("which").addEventListener("change", () => { motion.driver = Number($("which").value); motion.swept = null; app.changed("view"); });
+    $("which").addEventListener("change", () => { motion.driver = Number($("which").value); motion.swept = null; app.changed("rest"); });
     app.on("sheet view tool play rest", () => controls(app));
     app.on("sheet view tool play rest pose", kind => { if (kind !== "pose" || !motion.waits) refresh(app); });
     matchMedia("(prefers-reduced-motion: reduce)").addEventListener("change", event => { if (event.matches) motion.pause(); });

@@ -21,13 +21,14 @@
 
   /** Look for mechanisms in the worker; the best is laid on the table, all are kept for the list. */
   async function answer(app, needs, name, args, said, why) {
+    const { unit } = app.sheet;
     if (app.work.busy) app.work.stop();
     app.say(said, { share: 0 });
     const found = await Bench.job(app, needs, name, args, share => app.say(said, { share: Math.round(100 * share) }));
     if (!found) return;
     if (!found.length) { app.fault(new Bench.Fault(why)); return; }
-    app.candidates = found;
-    lay(app, found[0]);
+    app.candidates = found.map(own => ({ ...own, unit }));
+    lay(app, app.candidates[0]);
     Bench.do.candidates(app);
   }
 
@@ -79,7 +80,7 @@
 
   function lay(app, own) {
     const say = own.error === undefined ? ["said.passed", { text: told(own) }] : ["said.candidate", { error: Bench.shown(100 * own.error, 2) }];
-    app.attempt(() => ({ sheet: { ...Bench.opened(Bench.checked(own.data)), unit: app.sheet.unit }, select: [], say }));
+    app.attempt(() => ({ sheet: Bench.inUnit({ ...Bench.opened(Bench.checked(own.data)), unit: own.unit }, app.sheet.unit), select: [], say }));
     Bench.do.fit(app);
   }
 
