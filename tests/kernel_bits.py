@@ -275,6 +275,21 @@ def _open_fixed(args: tuple[Any, ...], rng: np.random.Generator) -> tuple[Any, .
     return at(args, _1=args[1][np.ix_(order, order)], _2=int(FRAME_NONE), _3=0, _4=0)
 
 
+def _outline(args: tuple[Any, ...], rng: np.random.Generator) -> tuple[Any, ...]:
+    """Renumber links, hold another one, drive other joints; half of the time joint others, or let some slide."""
+    drawn, _, out = args
+    links, joints, drivers = len(out.structure), drawn.joints.copy(), drawn.drivers.copy()
+    joints[:, 1:] = rng.permutation(links)[joints[:, 1:]]
+    if rng.random() < 0.5:
+        k = rng.integers(len(joints))
+        joints[k, 2] = (joints[k, 1] + rng.integers(1, links)) % links
+    low = (joints[:, 0] <= 2) & (rng.random(len(joints)) < 0.3 * rng.integers(2))
+    joints[low, 0] = rng.choice((0, 0, 1, 2), low.sum())
+    drivers[:, 0] = rng.permutation(len(joints))[: len(drivers)]
+    drivers[:, 1] = joints[drivers[:, 0], rng.integers(1, 3, len(drivers))]
+    return drawn._replace(joints=joints, drivers=drivers), int(rng.integers(links)), out
+
+
 def _turns(args: tuple[Any, ...], rng: np.random.Generator) -> tuple[Any, ...]:
     """Change machines by so little that their branches go on: others are followed in ever smaller steps."""
     return at(args, _0=args[0] * (1.0 + 10.0 ** rng.uniform(-15, -9) * rng.standard_normal(args[0].shape)))
@@ -307,6 +322,7 @@ OTHERS: dict[str, Callable[[tuple[Any, ...], np.random.Generator], tuple[Any, ..
     "synthesis.kernels.listing.rewind": lambda args, rng: at(args, _0=int(rng.integers(99)), _1=int(rng.integers(9))),
     "systems.platform.kernels.turns": _turns,
     "jamming.joints.kernels.sharing.loops": _loops,
+    "kinematics.engine.kernels.planning.outline": _outline,
     "synthesis.kernels.splitting.split_all": lambda args, rng: at(
         shuffled(args, 1, rng=rng), _2=int(rng.integers(len(args[1]), endpoint=True))
     ),

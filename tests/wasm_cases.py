@@ -162,6 +162,8 @@ def _open_chain(links: int) -> tuple[Any, np.ndarray]:
 def page_computations() -> Recorded:
     """Record the calls with which the page moves mechanisms: planned, settled, followed, swept and pulled."""
     import graphsynth as gs
+    from graphsynth.kinematics.engine.program import compile_program
+    from graphsynth.mechanism import gallery
 
     kept: Recorded = {}
     crank, rocker = gs.Mechanism.four_bar(2.0, 1.0, 2.5, 2.5), gs.Mechanism.four_bar(4.0, 3.0, 2.0, 2.5)
@@ -171,6 +173,9 @@ def page_computations() -> Recorded:
             _moved(mechanism, pose)
             _pulled(mechanism, pose)
             _proved(mechanism, pose)
+    with recording(kept, all_calls=True):
+        for name in gallery.__all__:
+            compile_program(getattr(gallery, name)())
     for mechanism, pose in closed:
         with recording(kept, all_calls=True):
             _tilted(mechanism, np.ascontiguousarray(pose[None]))
