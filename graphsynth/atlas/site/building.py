@@ -20,6 +20,7 @@ from graphsynth.atlas.site.families import (
     sketch_scripts,
 )
 from graphsynth.atlas.site.named import named_script
+from graphsynth.atlas.site.sliders import sliders_script
 from graphsynth.atlas.stored import stored_mechanisms
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.core.wholefolders import PageFolder, put
@@ -142,6 +143,7 @@ def _write(
     put(data / "contents.js", known)
     put(data / "groups.js", groups)
     put(data / "names.js", named_script())
+    put(data / "sliders.js", sliders_script(found))
     begins = ["contents", "names", *(f"family-{name}" for name in first)]
     loaded = [*_write_pages(folder, begins), *(data / f"{name}.js" for name in begins)]
     put(folder / _PAGES.mark, "This folder is written by 'graphsynth catalog site' and replaced by it.\n")

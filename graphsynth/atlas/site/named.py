@@ -10,7 +10,7 @@ from graphsynth.atlas.site.families import script
 
 
 def named() -> list[dict[str, Any]]:
-    """Return the entries of ``names.toml``: key, name, uses, source, and the template of the workbench."""
+    """Return the entries of ``names.toml``: key, name, uses, source; a template of the workbench, sliders, frame."""
     text = files("graphsynth.atlas.site").joinpath("names.toml").read_text("utf-8")
     entries: list[dict[str, Any]] = tomllib.loads(text)["named"]
     return entries

@@ -35,7 +35,15 @@
     return app.attempt(() => {
       const sheet = Bench.opened(Bench.checked(data));
       return { sheet: { ...sheet, unit: app.sheet.unit }, select: [] };
-    }) && (Bench.do.fit(app), app.say(app.motion && app.motion.driven && app.motion.sweep().full ? "said.turns" : "said.turnsnot"), true);
+    }) && (Bench.do.fit(app), app.say(...reached(app.motion)), true);
+  };
+
+  /** Whether the driver turns fully, or how far it moves from where it is drawn. */
+  const reached = motion => {
+    const swept = motion && motion.driven ? motion.sweep() : null;
+    if (!swept || swept.full) return [swept ? "said.turns" : "said.turnsnot"];
+    const [from, to] = [swept.inputs[0], swept.inputs[swept.inputs.length - 1]].map(input => Bench.shownInput(motion, input));
+    return [motion.turns ? "said.swings" : "said.slides", { from, to }];
   };
 
   const still = (app, chain, dialog) => {

@@ -54,13 +54,9 @@
 
   /** The drawing of the address; said if it is damaged. */
   Bench.openAddress = async app => {
+    if (app.work.busy) app.work.stop(); // what an older address asked for is not wanted any more
     try {
-      const named = /^#k=([\w-]+)(?:&f=(\d+)&d=([\d,]+))?$/.exec(location.hash);
-      if (named) {
-        const chain = Bench.fromKey(app, named[1]), drivers = named[3] && named[3].split(",").map(Number);
-        if (!chain) throw new Bench.Fault("fault.key");
-        return Bench.layChain(app, chain, named[2] ? { frame: Number(named[2]), drivers } : {});
-      }
+      if (location.hash.startsWith("#k=")) return Bench.layChain(app, ...Bench.chainOfAddress(app, location.hash));
       const template = /^#t=(\w+)$/.exec(location.hash), found = template && Bench.templates.find(own => own.name === template[1]);
       if (found) return Bench.openText(app, found.text, Bench.word(`template.${found.name}`));
       const sheet = await Bench.fromFragment(location.hash);

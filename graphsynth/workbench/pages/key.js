@@ -1,14 +1,20 @@
-// The chain of a drawing: its canonical key, and its relatives.
+// The chain of a drawing or of an address: its canonical key, and its relatives.
 "use strict";
 
 (function () {
-  /** Key of the chain of a mechanism in the form of files, with the kernel of the module "labels". */
-  Bench.chainKey = (labels, data) => {
-    const links = data.pose.length, loose = joint => (joint.kind === "R" || joint.kind === "P" ? 1 : 2);
+  function coloured(labels, data, loose) {
+    const links = data.pose.length;
     const joints = Labelling.sorted(data.joints.map(joint => [Math.min(joint.a, joint.b), Math.max(joint.a, joint.b), loose(joint)]));
     const { to } = Labelling.found(labels, links, joints, new Array(links).fill(0));
     return Labelling.key(links, Labelling.moved(joints, to), 3);
-  };
+  }
+
+  /** Key of the chain of a mechanism in the form of files, with the kernel of the module "labels". */
+  Bench.chainKey = (labels, data) => coloured(labels, data, ({ kind }) => (kind === "R" || kind === "P" ? 1 : 2));
+
+  /** Key of a chain with lower pairs that tells which of them are prismatic. */
+  Bench.sliderKey = (labels, data) => (data.joints.some(({ kind }) => kind === "P")
+    ? `1p.${coloured(labels, data, ({ kind }) => (kind === "P" ? 2 : 1)).slice(1)}` : Bench.chainKey(labels, data));
 
   const keyOf = Bench.keyOf = (app, { links, joints }) =>
     Bench.chainKey(app.labels, { pose: Array(links).fill(0), joints: joints.map(([a, b]) => ({ kind: "R", a, b })) });
@@ -46,5 +52,28 @@
       for (let b = 1, bit = 0; b < links; b++) for (let a = 0; a < b; a++, bit++) if (bytes[2 + (bit >> 3)] & (128 >> (bit & 7))) joints.push([a, b]);
       return keyOf(app, { links, joints }) === key ? { links, joints } : null;
     } catch { return null; }
+  };
+
+  const numbers = text => (/^\d{1,2}(,\d{1,2})*$/.test(text) ? text.split(",").map(Number) : null);
+
+  /** "#k=KEY&p=0-3&f=0&d=1": a chain, its prismatic joints, frame and driven links; a `Fault` for what it has not. */
+  Bench.chainOfAddress = (app, address) => {
+    const { k: key, ...asked } = Object.fromEntries(address.slice(1).split("&").map(part => part.split(/=(.*)/s).slice(0, 2)));
+    const chain = Bench.fromKey(app, key || ""), more = {};
+    if (!chain) throw new Bench.Fault("fault.key");
+    const jointed = (a, b) => chain.joints.some(pair => pair.includes(a) && pair.includes(b) && a !== b);
+    if (asked.p !== undefined) {
+      const sliders = asked.p.split(",").map(pair => numbers(pair.replace("-", ",")) || []);
+      const whole = sliders.every(pair => pair.length === 2 && jointed(...pair));
+      if (!whole || new Set(sliders.map(pair => String(pair.sort((a, b) => a - b)))).size < sliders.length) throw new Bench.Fault("fault.key.sliders", { given: asked.p.slice(0, 40) });
+      more.sliders = sliders;
+    }
+    if (asked.f !== undefined || asked.d !== undefined) {
+      const [frame, ...rest] = numbers(asked.f || "") || [], drivers = numbers(asked.d || "") || [];
+      const whole = frame < chain.links && !rest.length && drivers.length > 0 && drivers.every(link => jointed(frame, link));
+      if (!whole) throw new Bench.Fault("fault.key.driver");
+      Object.assign(more, { frame, drivers });
+    }
+    return [chain, more];
   };
 })();

@@ -37,7 +37,7 @@
     const chain = key && Bench.chainOf(data);
     if (!chain) return null;
     return make("div", { class: "acts" }, make("button", { type: "button", "data-kin": key, on: { click: () => Bench.showRelatives(app, chain) } }, Bench.word("know.kin")),
-      Bench.atlas ? make("a", { href: `${Bench.atlas}#/${key}`, target: "_top" }, Bench.word("know.atlas")) : null);
+      Bench.atlas ? make("a", { href: `${Bench.atlas}#/${Bench.sliderKey(app.labels, data)}`, target: "_top" }, Bench.word("know.atlas")) : null);
   }
 
   /** A row of buttons, one for each entry. */

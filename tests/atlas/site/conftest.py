@@ -5,6 +5,7 @@ import pytest
 from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.site import build_site
 from tests.chromium import started
+from tests.workbench.conftest import scripts as scripts
 
 
 @pytest.fixture(scope="session")

@@ -16,7 +16,7 @@ from graphsynth.core.errors import GraphsynthError
 PAGES = files("graphsynth.atlas.site").joinpath("pages")
 SCRIPTS = sorted(path.name for path in PAGES.iterdir() if path.name.endswith(".js"))
 #: These draw SVG, of numbers and escaped titles; ``markup.js`` is the one place that escapes.
-DRAWING = {"drawing.js", "editor.js", "writing.js"}
+DRAWING = {"blocks.js", "drawing.js", "editor.js", "writing.js"}
 
 
 @pytest.mark.parametrize("name", SCRIPTS)

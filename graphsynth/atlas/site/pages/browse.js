@@ -147,7 +147,7 @@
     item.setAttribute("aria-posinset", k + 1);
     item.setAttribute("aria-setsize", found.length);
     const marks = [row.symmetry > 1 ? `symmetry ${row.symmetry}` : "", row.planar ? "" : "not planar"].filter(Boolean).join(", ");
-    item.innerHTML = html`<a href="#/${row.key}"><span class="thumb" style="width:${size[0]}px;height:${size[1]}px"></span><span
+    item.innerHTML = html`<a href="#/${row.key}${Atlas.searched(question.text || "", row)}"><span class="thumb" style="width:${size[0]}px;height:${size[1]}px"></span><span
  class="words"><b>${row.label}</b> <small class="key">${row.key}</small><small>${row.inversions} inversion${row.inversions > 1 ? "s" : ""}</small><small>${marks}</small><small
  class="more">shortest loop ${row.girth}</small><small class="more">class ${Atlas.classes(row)}</small></span></a>`;
     shown.set(k, item);

@@ -59,10 +59,11 @@
 
   /**
    * The kinematic diagram as SVG text.  Options: width, height, frame, drivers, groups (as from Atlas.groups), numbers,
-   * title, file (colours inside, for a file of its own), small.
+   * title, file (colours inside, for a file of its own), small, sliders (places of prismatic joints, for
+   * which Atlas.loadSliders is waited for).
    */
   Atlas.sketch = function (graph, places, options = {}) {
-    const {width = 420, height = 340, frame = null, drivers = [], groups = [], numbers = true, small = false, title = ""} = options;
+    const {width = 420, height = 340, frame = null, drivers = [], groups = [], numbers = true, small = false, title = "", sliders = []} = options;
     const at = fit(places, width, height, small ? 7 : 26), outlines = Atlas.outlines(graph, places);
     const middle = [at.reduce((s, p) => s + p[0], 0) / at.length, at.reduce((s, p) => s + p[1], 0) / at.length];
     const wide = small ? 1.6 : 3.2, radius = small ? 2 : 5, hatch = `hatch${++pictures}`;
@@ -88,10 +89,10 @@
       if (numbers && !small) letters.push(...['stroke="var(--paper)" stroke-width="3.5" stroke-linejoin="round" aria-hidden="true"', ""].map(edge =>
         letter(cx, cy, link, 13, `text-anchor="middle" fill="var(--${fixed ? "ink" : colour(link)})" ${edge}`)));
     });
-    const joints = graph.joints.map(([a, b], k) =>
+    const joints = graph.joints.map(([a, b], k) => sliders.includes(k) ? Atlas.block(graph, at, k, outlines, [frame, ...drivers], small) :
       `<circle data-joint="${a}-${b}" cx="${short(at[k][0])}" cy="${short(at[k][1])}" r="${radius}" fill="var(--paper)" stroke="var(--ink)" stroke-width="${small ? 1.1 : 1.8}"/>`);
     const arrows = small ? [] : graph.joints.flatMap(([a, b], k) =>
-      (a === frame && drivers.includes(b)) || (b === frame && drivers.includes(a)) ? [arrow(at[k])] : []);
+      sliders.includes(k) ? [] : (a === frame && drivers.includes(b)) || (b === frame && drivers.includes(a)) ? [arrow(at[k])] : []);
     const pattern = frame !== null && outlines[frame].length > 2
       ? `<defs><pattern id="${hatch}" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><path d="M0 0V6" fill="none" stroke="var(--soft)" stroke-width="1.6"/></pattern></defs>` : "";
     return wrap(width, height, title, options.file, pattern + [...plates, ...bars, ...joints, ...arrows, ...letters].join(""));

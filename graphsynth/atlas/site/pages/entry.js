@@ -45,16 +45,21 @@ ${loops} ${Atlas.term("loop")}, ${Atlas.term("mobility")} ${row.mobility}.`;
     html`<div class="scroll"><table class="matrix"><caption>${caption}</caption><thead><tr><td></td>${heads.map(h => html`<th scope="col">${h}</th>`)}</tr></thead>
 <tbody>${rows.map((row, k) => html`<tr><th scope="row">${k}</th>${row.map(v => (v ? html`<td class="one">${v}</td>` : html`<td>·</td>`))}</tr>`)}</tbody></table></div>`;
 
+  const pairs = () => Atlas.pairs(state.graph, state.sliders);
+
   /** The workbench with this frame and these drivers: dimensions of the catalogue where it holds some, else found there. */
   function bench() {
-    const {row, frame, drivers} = state, held = state.mechanism, same = held && held[0] === frame && String(held[1]) === String(drivers);
-    return `workbench/index.html${same ? held[2] : `#k=${row.key}${frame === null || !drivers.length ? "" : `&f=${frame}&d=${listed(drivers, ",")}`}`}`;
+    const {row, frame, drivers, sliders} = state, held = state.mechanism, same = held && !sliders.length && held[0] === frame && String(held[1]) === String(drivers);
+    return `workbench/index.html${same ? held[2] : `#k=${row.key}${sliders.length ? `&p=${pairs()}` : ""}${frame === null || !drivers.length ? "" : `&f=${frame}&d=${listed(drivers, ",")}`}`}`;
   }
+
+  const sliding = ({key, frame, sliders}) => `#/${key}?${frame === undefined ? "" : `frame=${frame}&`}sliders=${sliders}`;
 
   function named(row) {
     const own = Atlas.names.filter(one => one.key === row.key);
     return own.length > 0 && html`<h2>Names and uses</h2><ul class="named">${own.map(one =>
-      html`<li><a href="workbench/index.html#t=${one.template}">${one.name}</a>: ${one.uses}. <small class="soft">${one.source}</small></li>`)}</ul>`;
+      html`<li><a href="${one.template ? `workbench/index.html#t=${one.template}` : sliding(one)}">${one.name}</a>: ${one.uses}.
+${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>.`} <small class="soft">${one.source}</small></li>`)}</ul>`;
   }
 
   /** Best choice to begin with: that of the catalogue's dimensions, or the first driver that gives the lowest class. */
@@ -105,9 +110,9 @@ ${loops} ${Atlas.term("loop")}, ${Atlas.term("mobility")} ${row.mobility}.`;
   }
 
   function pictures() {
-    const {row, graph, frame, drivers, groups, places} = state;
-    const held = frame === null ? `Chain ${row.label}` : `Chain ${row.label}, frame ${frame}, driver ${listed(drivers)}`;
-    const own = {frame, drivers, groups: groups || [], title: `${held}: diagram`};
+    const {row, graph, frame, drivers, groups, places, sliders} = state, chain = `Chain ${row.label}${sliders.length ? `, sliders ${pairs()}` : ""}`;
+    const held = frame === null ? chain : `${chain}, frame ${frame}, driver ${listed(drivers)}`;
+    const own = {frame, drivers, sliders, groups: groups || [], title: `${held}: diagram`};
     return {
       sketch: file => (places ? Atlas.sketch(graph, places, {...own, file}) : ""),
       levels: file => (frame === null ? "" : Atlas.levelSketch({...graph, frame}, {drivers, groups: groups || [], title: `${held}: adjacency levels`, file})),
@@ -164,13 +169,33 @@ ${loops} ${Atlas.term("loop")}, ${Atlas.term("mobility")} ${row.mobility}.`;
     const {graph, row} = state, near = frame === null ? [] : Atlas.neighbours(graph)[frame];
     const kept = drivers.filter(link => near.includes(link));
     Object.assign(state, {frame, drivers: kept.length || frame === null ? kept : driverSets(graph, frame).find(set => Atlas.groups({...graph, frame}, set)) || []});
-    const words = frame === null ? "frame=none" : `frame=${frame}${state.drivers.length ? `&driver=${state.drivers}` : ""}`;
+    const held = frame === null ? "frame=none" : `frame=${frame}${state.drivers.length ? `&driver=${state.drivers}` : ""}`;
+    const words = `${held}${state.sliders.length ? `&sliders=${pairs()}` : ""}`;
     history.replaceState(null, "", `#/${row.key}?${words}`);
     showChoice();
   }
 
+  /** Let joints slide; the section of choices follows. */
+  function slide(chosen, again = null) {
+    const {row, graph, frame, drivers} = state;
+    state.sliders = chosen;
+    if (again) {
+      const own = Atlas.turning(graph, {frame, drivers}, chosen, driverSets);
+      choose(own.frame, own.drivers);
+    }
+    const open = [...$("sliders").querySelectorAll("details")].map(one => one.open);
+    $("sliders").innerHTML = html`${Atlas.sliderSection(row, graph, chosen)}`;
+    $("sliders").querySelectorAll("details").forEach((one, k) => { if (open[k]) one.open = true; });
+    const same = again && [...$("sliders").querySelectorAll(".pick")].find(one => one.dataset.sliders === again.dataset.sliders);
+    if (same) same.focus({preventScroll: true});
+  }
+
   function listen() {
     const entry = $("entry");
+    $("sliders").addEventListener("click", event => {
+      const button = event.target.closest(".pick");
+      if (button) slide(button.dataset.sliders ? Atlas.chosen(state.graph, button.dataset.sliders) : [], button);
+    });
     $("copy").addEventListener("click", async event => {
       try { await navigator.clipboard.writeText(state.row.key); event.target.textContent = "copied"; } catch { getSelection().selectAllChildren(entry.querySelector(".keyline code")); event.target.textContent = "selected"; }
     });
@@ -232,7 +257,7 @@ ${loops} ${Atlas.term("loop")}, ${Atlas.term("mobility")} ${row.mobility}.`;
         html`<tr>${k ? cells(["", ""]) : cells([frame, drivers])}${cells([kind, status, measure(value, unit), guarantee || ""])}</tr>`);
     });
     $("evaluations").innerHTML = html`<div class="scroll"><table class="inversions"><thead><tr>${heads}</tr></thead><tbody>${lines}</tbody></table></div>
-<p class="soft">Other frames and drivers: not computed in this catalogue.</p>`;
+<p class="soft">Other frames, drivers and sliders: not computed in this catalogue.</p>`;
   }
 
   function choiceIn(parameters, row, graph, label, mechanism) {
@@ -244,23 +269,38 @@ ${loops} ${Atlas.term("loop")}, ${Atlas.term("mobility")} ${row.mobility}.`;
     return {frame: +frame, drivers: given.length ? given : driverSets(graph, +frame).find(set => Atlas.groups({...graph, frame: +frame}, set)) || []};
   }
 
+  /** Prismatic joints of an address; none, and why, where it names what is no joint. */
+  function slidersIn(parameters, graph) {
+    try { return {sliders: parameters.get("sliders") ? Atlas.chosen(graph, parameters.get("sliders")) : []}; } catch (fault) {
+      if (!(fault instanceof Atlas.Fault)) throw fault;
+      return {sliders: [], wrong: fault.message};
+    }
+  }
+
   Atlas.entry = async function (name, parameters) {
-    const entry = $("entry"), mark = {};
+    const entry = $("entry"), mark = {}, sliding = Atlas.withSliders(name);
     state = mark;
+    if (sliding) {
+      const {key, frame, sliders} = sliding;
+      history.replaceState(null, "", `#/${key}?${frame === null ? "" : `frame=${frame}&`}sliders=${sliders}`);
+      return Atlas.entry(key, new URLSearchParams({...(frame !== null && {frame}), sliders}));
+    }
     const row = await Atlas.find(name);
     if (state !== mark) return null;
     if (!row) {
       entry.innerHTML = html`<h1 tabindex="-1">Not in this atlas</h1><p>No chain here has the key or label <code>${name}</code>. <a href="#/find">Find my mechanism</a> says why.</p>`;
       return "Not in this atlas";
     }
-    const [places, mechanism] = await Promise.all([Atlas.loadPlaces(row), Atlas.mechanismOf(row), Atlas.loadClasses()]);
+    const [places, mechanism, , able] = await Promise.all([Atlas.loadPlaces(row), Atlas.mechanismOf(row), Atlas.loadClasses(), Atlas.loadSliders()]);
     if (state !== mark) return null;
     const graph = Atlas.decodeKey(row.key), label = Atlas.label(graph);
-    state = {row, graph, label, places, mechanism, ...choiceIn(parameters, row, graph, label, mechanism)};
+    const {sliders, wrong} = able ? slidersIn(parameters, graph) : {sliders: [], wrong: "The list of sliders could not be loaded."}, held = choiceIn(parameters, row, graph, label, mechanism);
+    state = {row, graph, label, places, mechanism, sliders, ...(!able || parameters.has("driver") || held.frame === null ? held : Atlas.turning(graph, held, sliders, driverSets, parameters.has("frame")))};
     const joints = graph.joints.map(([a, b]) => `${a}-${b}`);
     entry.innerHTML = html`${header(row)}<p class="lead">${sentence(row, graph)}</p>
 <div class="plate"><figure><div id="sketch" class="picture"></div><figcaption>Kinematic diagram</figcaption></figure>
 <figure><div id="levelsketch" class="picture"></div><figcaption>Graph by ${Atlas.term("levels")}</figcaption></figure></div>${controls(graph)}
+<h2>${Atlas.term("slider", "Sliders")}</h2><div id="sliders" class="sliders"></div>
 <div class="columns"><section><h2>${Atlas.term("group", "Structural groups")}</h2><div id="groups"></div></section><section><h2>Properties</h2>${properties(row, label)}</section></div>
 <h2>${Atlas.term("inversion", "Inversions")} and drivers</h2>${inversions(graph, label)}
 ${named(row)}<div id="moving"><h2>Motion</h2><p>This frame and these drivers on the workbench: play it, drag it, change its dimensions. <a id="openbench" href="workbench/index.html">On a page of its own</a></p>
@@ -272,6 +312,8 @@ ${matrixTable(Atlas.incidence(graph), Atlas.term("incidence"), joints)}</div>
 <h2>Save</h2><div id="files" class="files"></div>`;
     listen();
     showChoice();
+    if (able) slide(sliders);
+    if (wrong) $("sliders").prepend(wrong);
     relatives(row);
     evaluations(row);
     return `${row.label} · chain`;

@@ -13,7 +13,7 @@
 <label for="pasted">Adjacency ${Atlas.term("adjacency", "matrix")}, list of joints, ${Atlas.term("graph6")}, ${Atlas.term("key")} or ${Atlas.term("label")}</label>
 <textarea id="pasted" rows="9" spellcheck="false" autocomplete="off" placeholder="0-1, 1-2, 2-3, 0-3"></textarea>
 <p class="soft">Examples: <button type="button" data-example="0 1 0 1 0 0&#10;1 0 1 0 0 0&#10;0 1 0 1 0 1&#10;1 0 1 0 1 0&#10;0 0 0 1 0 1&#10;0 0 1 0 1 0">matrix</button>
-<button type="button" data-example="1-2, 2-3, 3-4, 4-1, 4-5, 5-6, 6-1">joints</button> <button type="button" data-example="G@Q?~C">graph6</button></p></section>
+<button type="button" data-example="1-2, 2-3, 3-4, 4-1, 4-5, 5-6, 6-1">joints</button> <button type="button" data-example="G@Q?~C">graph6</button> <button type="button" data-example="0-1, 1-2, 2-3, 0-3 P:0-3">sliders</button></p></section>
 <section><h2>Draw</h2><div id="editor"></div></section></div>`;
     $("pasted").addEventListener("input", () => fromText());
     $("pasted").addEventListener("paste", event => { // the browser would lay millions of characters out first
@@ -41,7 +41,7 @@
       if (read.label) {
         const row = await Atlas.find(read.label);
         if (row) tell(Atlas.decodeKey(row.key), "Read as a label.", null); else say(`No chain here has the label ${read.label}.`);
-      } else await tell(read.graph, `Read as ${read.form}.`, read.names);
+      } else await tell(read.graph, `Read as ${read.form}.`, read.names, read.sliders);
     } catch (fault) { excuse(fault); }
   }
 
@@ -59,7 +59,7 @@
 <tr><th scope="row">here</th>${own.map(link => html`<td>${to[link]}</td>`)}</tr></tbody></table></div>`;
   }
 
-  async function tell(graph, how, names) {
+  async function tell(graph, how, names, sliders = []) {
     const mine = ++asked;
     const head = `${how} ${graph.links} links, ${graph.joints.length} joints${graph.frame === null ? "" : `, frame ${names ? names[graph.frame] : graph.frame}`}.`;
     const fault = Atlas.judge(graph, names);
@@ -74,11 +74,13 @@
       $("answer").innerHTML = html`<p>${head} <strong>Not in this atlas.</strong> ${why}</p><p>${Atlas.term("key")} <code>${label.key}</code></p>`;
       return;
     }
-    const address = `#/${row.key}${graph.frame === null ? "" : `?frame=${label.to[graph.frame]}`}`;
+    const sliding = sliders.map(k => graph.joints[k].slice(0, 2).map(link => label.to[link]).join("-")).join(",");
+    const words = [graph.frame !== null && `frame=${label.to[graph.frame]}`, sliding && `sliders=${sliding}`].filter(Boolean).join("&");
+    const address = `#/${row.key}${words && `?${words}`}`;
     $("answer").innerHTML = html`<div class="hit"><a class="thumb" href="${address}" tabindex="-1" aria-hidden="true" style="width:132px;height:106px"></a><div><p>${head}</p>
-<p>It is <a class="found" href="${address}"><b>${row.label}</b></a>, ${Atlas.term("key")} <code>${row.key}</code>.</p>${numbering(graph, label.to, names)}</div></div>`;
-    const places = await Atlas.loadPlaces(row), box = $("answer").querySelector(".thumb");
-    if (mine === asked && places && box) box.innerHTML = Atlas.drawn(Atlas.sketch(label.canonical, places, {width: 132, height: 106, small: true}));
+<p>It is <a class="found" href="${address}"><b>${row.label}</b></a>, ${Atlas.term("key")} <code>${row.key}</code>${sliding && `, joints ${sliding} prismatic`}.</p>${numbering(graph, label.to, names)}</div></div>`;
+    const [places, able] = await Promise.all([Atlas.loadPlaces(row), sliding && Atlas.loadSliders()]), box = $("answer").querySelector(".thumb");
+    if (mine === asked && places && box) box.innerHTML = Atlas.drawn(Atlas.sketch(label.canonical, places, {width: 132, height: 106, small: true, sliders: able ? Atlas.chosen(label.canonical, sliding) : []}));
   }
 
   Atlas.openFind = function () { if (!built) build(); return "Find my mechanism"; };

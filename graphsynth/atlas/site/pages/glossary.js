@@ -6,6 +6,7 @@
     mobility: ["mobility", "Freedoms left when one link is held: W = 3(n − 1) − 2p for n links and p revolute or prismatic joints in the plane. With W = 1 one driver moves everything."],
     link: ["link", "A rigid body of the mechanism. Binary, ternary, quaternary: with 2, 3, 4 joints."],
     joint: ["joint", "Two links in lasting contact. Here of mobility 1: a revolute joint (one link turns in the other) or, in its place, a prismatic joint (it slides)."],
+    slider: ["prismatic joint", "Also slider: one link slides in the other along a line and does not turn in it. It has mobility 1, so the chain, its groups and its mobility are the same."],
     loop: ["loops", "Independent closed circuits of links and joints: p − n + 1."],
     assortment: ["assortment", "The numbers of links with 2, 3, 4, … joints, written 4-4 for four binary and four ternary links."],
     label: ["label", "mobility.links.assortment.rank: the rank counts the chains of one assortment in the order of their keys. It belongs to the complete catalogue and is permanent."],

@@ -165,6 +165,21 @@ Atlas.decodeKey = function (text) {
   return Atlas.graph(links, joints, flags >> 3 & 1 ? 0 : null, space);
 };
 
+// --- prismatic joints: places in the list of joints, written 0-3,1-2
+
+Atlas.pairs = (graph, chosen) => chosen.map(k => graph.joints[k].slice(0, 2).join("-")).join(",");
+
+/** Places of the joints of a text; `names` are what it calls the links.  A Fault for what is no joint. */
+Atlas.chosen = function (graph, text, names = null) {
+  const own = text.split(",").map(pair => {
+    const ends = /^\d+-\d+$/.test(pair) ? pair.split("-").map(name => (names ? names.indexOf(+name) : +name)) : [];
+    const k = graph.joints.findIndex(joint => ends[0] !== ends[1] && ends.includes(joint[0]) && ends.includes(joint[1]));
+    if (k < 0) throw new Atlas.Fault(`${pair.slice(0, 20)} is to slide, but is no joint: prismatic joints are written P:0-3,1-2.`);
+    return k;
+  });
+  return [...new Set(own)].sort((x, y) => x - y);
+};
+
 /** Adjacency matrix; an entry is the mobility of the joint. */
 Atlas.matrix = function (graph) {
   const rows = Array.from({length: graph.links}, () => new Array(graph.links).fill(0));

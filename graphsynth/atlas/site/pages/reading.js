@@ -1,11 +1,18 @@
 // What people paste: a key, a label, graph6 (with the frame, mobilities and space of the one-line form), JSON, an
-// adjacency matrix, or a list of joints.  Each reader returns {form, graph} or throws a Fault with one sentence.
+// adjacency matrix, or a list of joints.  Each reader returns {form, graph} or throws a Fault with one sentence.  Behind P:
+// stand prismatic joints, and a key of a chain with such begins with 1p.; they come as {sliders}.
 "use strict";
 
 (function () {
   const LONGEST = Atlas.LONGEST = 20000;
 
   Atlas.read = function (text) {
+    const sliding = text.length <= LONGEST && /(^|\s)P:(\S*)/.exec(text);
+    if (sliding) {
+      const {sliders, ...plain} = Atlas.read(text.replace(sliding[0], " "));
+      if (!plain.graph) throw new Atlas.Fault("Beside a label no joints are named: give the key.");
+      return {...plain, sliders: Atlas.chosen(plain.graph, sliding[2], plain.names)};
+    }
     const {held, ...found} = readPlain(text);
     // files of graphsynth say the frame in a remark: "# frame 2"
     if (held === undefined || !found.graph) return found;
@@ -20,6 +27,10 @@
     if (/^\d+\.\d+\.[\d-]+\.\d+$/.test(text)) return {form: "label", label: text};
     if (/^1[A-Za-z0-9_-]{3,}$/.test(text)) {
       try { return {form: "key", graph: Atlas.decodeKey(text)}; } catch (fault) { if (!/^[\d-]+$/.test(text)) throw fault; }
+    }
+    if (/^1p\.[A-Za-z0-9_-]+$/.test(text)) {
+      const {joints, ...own} = Atlas.decodeKey(`1${text.slice(3)}`);
+      return {form: "key", graph: {...own, joints: joints.map(([a, b]) => [a, b, 1])}, sliders: [...joints.keys()].filter(k => joints[k][2] > 1)};
     }
     if (/^\s*\{/.test(text)) return {form: "JSON", graph: fromJson(text)};
     const frame = /^#\s*frame\s+(\d+)/m.exec(text);
@@ -57,6 +68,21 @@
     }
     return Atlas.graph(plain.links, plain.joints, frame, space);
   }
+
+  let last = ["", null];
+  /** Of a text with prismatic joints: {key, frame, sliders: "0-3"} in the numbers of the key's chain; null for any other text. */
+  Atlas.withSliders = function (text) {
+    if (!/^\s*1p\.|\sP:/.test(text)) return null;
+    if (last[0] !== text) {
+      last = [text, null];
+      try {
+        const {graph, sliders} = Atlas.read(text), {to, key, canonical} = Atlas.label({...graph, frame: null});
+        const own = sliders.map(k => graph.joints[k].slice(0, 2).map(link => to[link]).join("-")).join(",");
+        last[1] = {key, frame: graph.frame === null ? null : to[graph.frame], sliders: Atlas.pairs(canonical, Atlas.chosen(canonical, own))};
+      } catch (fault) { if (!(fault instanceof Atlas.Fault)) throw fault; }
+    }
+    return last[1];
+  };
 
   /** Rows of numbers if the text is square like a matrix; null otherwise. */
   function matrixRows(text) {

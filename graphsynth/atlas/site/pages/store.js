@@ -113,6 +113,9 @@
     return relatives.get(row.family)?.evaluations[row.place] || [];
   };
 
+  /** The choices of prismatic joints, with what shows them: Atlas.sliderSection. */
+  Atlas.loadSliders = () => load("sliders");
+
   /** Class of a structural group by its key, and its number of assembly modes, or undefined. */
   Atlas.loadClasses = async () => { await load("groups"); };
   Atlas.classOf = key => groups?.[key]?.[0];
@@ -130,6 +133,7 @@
     high: ["highest class", row => row.high],
   };
 
+  const matches = (one, lower) => `${one.name} ${one.uses}`.toLowerCase().includes(lower);
   const TESTS = {
     mobility: value => row => row.mobility === +value,
     links: value => { const set = new Set(value.split(",").map(Number)); return row => set.has(row.links); },
@@ -143,11 +147,20 @@
     named: () => { const keys = new Set(Atlas.names.map(one => one.key)); return row => keys.has(row.key); },
     text: value => {
       const plain = value.trim(), lower = plain.toLowerCase();
-      let key = "";
-      try { key = Atlas.label(Atlas.fromGraph6(plain)).key; } catch { /* no graph6 */ }
-      const keys = new Set(lower.length < 3 ? [] : Atlas.names.filter(one => `${one.name} ${one.uses}`.toLowerCase().includes(lower)).map(one => one.key));
+      let key = Atlas.withSliders(plain)?.key || "";
+      if (!key) try { key = Atlas.label(Atlas.fromGraph6(plain)).key; } catch { /* no graph6 */ }
+      const keys = new Set(lower.length < 3 ? [] : Atlas.names.filter(one => matches(one, lower)).map(one => one.key));
       return row => row.label.includes(lower) || row.key.startsWith(plain) || row.key === key || keys.has(row.key);
     },
+  };
+
+  /** What a search says of prismatic joints of a chain: a part of its address, or nothing. */
+  Atlas.searched = function (text, row) {
+    const lower = text.trim().toLowerCase(), own = Atlas.withSliders(text.trim());
+    const fitting = lower.length < 3 || own ? [] : Atlas.names.filter(one => one.key === row.key && matches(one, lower));
+    const called = fitting.filter(one => one.name.toLowerCase().includes(lower)), named = called.length ? called : fitting;
+    const {sliders, frame = null} = own && own.key === row.key ? own : named.length === 1 ? named[0] : {};
+    return sliders ? `?${frame === null ? "" : `frame=${frame}&`}sliders=${sliders}` : "";
   };
 
   /** Rows that pass all questions, in an order: {text, links, ..., sort, down}. */
