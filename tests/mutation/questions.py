@@ -440,6 +440,9 @@ def of_the_second_count() -> list[Question]:
             lines = path.read_text("utf-8").splitlines(keepends=True)
             path.write_text("".join(lines[:9])[:-2], "utf-8")  # in the middle of a number
             second.main(8, path)
+            for shard in ("2/3", "1/3", "3/3"):
+                second.main(8, Path(folder, "parts"), shard)
+            assert second.read(Path(folder, "parts")) == second.read(path)
             clusters = second.Clusters(8, 10)
             right = second.read(path) == {p: second.kept_by(clusters, p) for p in second.partitions(8, 8)}
             return [said.getvalue(), str(right and path.read_text("utf-8") == "".join(lines))]
@@ -476,5 +479,5 @@ def of_the_second_count() -> list[Question]:
         ("connected without joints", lambda: connected(14, 0), [(1, 0, 1)]),
         ("connected", lambda: connected(6, 7), trees),
         ("asked for", lambda: [asked(1), asked(0)], [("1\n", 11), ("0\n", 1)]),
-        ("written", written, ["16\n16\n", "True"]),
+        ("written", written, ["16\n16\n16\n", "True"]),
     ]

@@ -5,7 +5,8 @@ two or more links.  Any graph falls apart in one way only into its largest rigid
 together to one vertex, a graph without rigid sets.  So graphs without rigid sets are all graphs less those that have
 clusters.  The lemma of Burnside is used on the permutations of the links: one that keeps a graph permutes its clusters.
 
-`python tests/synthesis/rigid_clusters.py 20 FILE` counts the chains of 20 links and goes on where it was stopped.
+`python tests/synthesis/rigid_clusters.py 20 FILE` counts the chains of 20 links and goes on where it was stopped; a last
+argument 3/64 makes it do that part of the work.
 
 An *orbit* (c, cycles) stands for c clusters that a permutation p takes one to the next, p ** c permuting the links of
 each by cycles of these lengths; a *state* is a sorted tuple of orbits.  Polynomials are in the number of joints.
@@ -276,21 +277,27 @@ def _line(cycles: Cycles, count: int) -> str:
     return f"{' '.join(map(str, cycles))}: {count}\n"
 
 
-def main(links: int, path: Path) -> None:
-    """Write for each kind of permutation how many labelled chains it keeps, and print the number of chains."""
+def main(links: int, path: Path, shard: str = "1/1") -> None:
+    """Write for each kind of permutation how many labelled chains it keeps; all there, print the number of chains.
+
+    Shard i/m does every m-th kind from the i-th on; the files of all, joined, are a file that a last call goes on with.
+    """
+    first, step = map(int, shard.split("/"))
     kept = read(path) if path.exists() else {}
     path.write_text("".join(_line(cycles, count) for cycles, count in kept.items()), encoding="utf-8")
     clusters = Clusters(links, joints_of(links, 3))
-    for cycles in reversed([*partitions(links, links)]):  # powers of a permutation come before it
+    kinds = [*partitions(links, links)][::-1]  # powers of a permutation come before it
+    for cycles in kinds[first - 1 :: step]:
         if cycles not in kept:
             divisors = [n for n in range(2, max(cycles) + 1) if any(c % n == 0 for c in cycles)]
-            none = any(kept[power(cycles, n)] == 0 for n in divisors)  # its powers keep what it keeps
+            none = any(kept.get(power(cycles, n)) == 0 for n in divisors)  # its powers keep what it keeps
             kept[cycles] = 0 if none else kept_by(clusters, cycles)
             clusters.forget()
             with path.open("a", encoding="utf-8") as stream:
                 stream.write(_line(cycles, kept[cycles]))
-    print(mean(kept))
+    if len(kept) == len(kinds):
+        print(mean(kept))
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), Path(sys.argv[2]))
+    main(int(sys.argv[1]), Path(sys.argv[2]), *sys.argv[3:])

@@ -310,6 +310,18 @@ def test_the_second_count_goes_on_where_it_was_stopped(tmp_path, capsys):
     assert path.read_text(encoding="utf-8") == "".join(lines)
 
 
+def test_the_second_count_in_shards(tmp_path, capsys):
+    rigid_clusters.main(8, tmp_path / "whole")
+    for shard in ("1/2", "2/2"):
+        rigid_clusters.main(8, tmp_path / shard[0], shard)
+    joined = tmp_path / "joined"
+    joined.write_bytes(b"".join((tmp_path / name).read_bytes() for name in "12"))
+    assert capsys.readouterr().out == "16\n"
+    rigid_clusters.main(8, joined)
+    assert capsys.readouterr().out == "16\n"
+    assert rigid_clusters.read(joined) == rigid_clusters.read(tmp_path / "whole")
+
+
 @pytest.mark.long
 def test_twenty_links_told_apart_are_fewer_than_twenty_factorial_for_each_chain():
     count = tomllib.loads((COUNTS / "twenty-links.toml").read_text(encoding="utf-8"))["chains"]
