@@ -5,8 +5,8 @@ two or more links.  Any graph falls apart in one way only into its largest rigid
 together to one vertex, a graph without rigid sets.  So graphs without rigid sets are all graphs less those that have
 clusters.  The lemma of Burnside is used on the permutations of the links: one that keeps a graph permutes its clusters.
 
-`python tests/synthesis/rigid_clusters.py 20 FILE` counts the chains of 20 links and goes on where it was stopped; a last
-argument 3/64 makes it do that part of the work.
+`python tests/synthesis/rigid_clusters.py 20 FILE` counts the chains of 20 links and goes on where it was stopped; a
+last argument 3/64 makes it do that part of the work.
 
 An *orbit* (c, cycles) stands for c clusters that a permutation p takes one to the next, p ** c permuting the links of
 each by cycles of these lengths; a *state* is a sorted tuple of orbits.  Polynomials are in the number of joints.
