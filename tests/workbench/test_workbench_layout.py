@@ -103,6 +103,22 @@ def test_what_is_put_on_the_table_turns_in_the_library_too(scripts, kinds):
             assert turned < 1e-7 * 100, chain.key
 
 
+@pytest.mark.parametrize("label", ["3.6.6.1", "3.8.6-2.3", "3.8.6-2.5", "3.8.6-2.6", "4.7.7.1"])
+def test_where_no_drivers_on_the_frame_are_enough_some_sit_between_moving_links(scripts, label):
+    """The shipped chains that have no mechanisms with all drivers on the frame, held by each link in turn."""
+    with Catalogue(SHIPPED) as catalogue:
+        assert catalogue.entry(label)["mechanisms"] == []
+        chain = MechanismGraph.from_key(catalogue.chain(label).key)
+    found = scripts(TURNED, [given(chain, {"frame": k}) for k in range(chain.links)], modules=("sketch", "motion"))
+    for frame, data in enumerate(found):
+        mechanism = Mechanism.from_json(json.dumps(data))
+        assert mechanism.graph.frame == frame and len(mechanism.drivers) == chain.mobility
+        assert {own.base for own in mechanism.drivers} > {frame}
+        still = tuple(replace(own, law=Polynomial((0.0,))) for own in mechanism.drivers[1:])
+        first = replace(mechanism.drivers[0], law=Linear())
+        assert replace(mechanism, drivers=(first, *still)).simulate(np.linspace(0.0, 0.1, 5)).assembled.all()
+
+
 @pytest.mark.slow  # every frame and driver: two minutes a part
 @pytest.mark.parametrize("part", range(10))
 def test_all_chains_to_ten_links_turn_as_in_the_library(scripts, tmp_path, part):

@@ -112,6 +112,7 @@ WHOLE = {
     "#k=1BAN4&p=3-0,1-2": {"sliders": [[0, 3], [1, 2]]},
     "#k=1BAN4&p=0-3&f=0&d=2": {"sliders": [[0, 3]], "frame": 0, "drivers": [2]},
     "#k=1BAN4&f=0&d=2": {"frame": 0, "drivers": [2]},
+    "#k=1BAN4&f=0": {"frame": 0, "drivers": None},
 }
 HOSTILE = [
     *("", "0", "0-", "-", "0-1", "0-0", "0-99", "0-3,", "0-3,0-3", "0-3,3-0", "0-3-1", "%30-3", "a-b", "0-3;1-2"),
@@ -126,7 +127,7 @@ def test_addresses_with_sliders_are_read(scripts):
 def test_what_an_address_cannot_mean_is_one_sentence(scripts):
     asked = [f"#k=1BAN4&p={text}" for text in HOSTILE]
     asked += [
-        f"#k=1BAN4&p=0-3&{rest}" for rest in ("f=0", "d=1", "f=9&d=1", "f=0&d=1", "f=0&d=", "f=x&d=2", "f=0,1&d=2")
+        f"#k=1BAN4&p=0-3&{rest}" for rest in ("f=4", "d=1", "f=9&d=1", "f=0&d=1", "f=0&d=", "f=x&d=2", "f=0,1&d=2")
     ]
     asked += ["#k=", "#k=1BAN", "#k=1BAN4x&p=0-3", "#k=%00"]
     for address, told in zip(asked, scripts(ADDRESS, asked, modules=()), strict=True):

@@ -69,8 +69,8 @@
       more.sliders = sliders;
     }
     if (asked.f !== undefined || asked.d !== undefined) {
-      const [frame, ...rest] = numbers(asked.f || "") || [], drivers = numbers(asked.d || "") || [];
-      const whole = frame < chain.links && !rest.length && drivers.length > 0 && drivers.every(link => jointed(frame, link));
+      const [frame, ...rest] = numbers(asked.f || "") || [], drivers = asked.d === undefined ? null : numbers(asked.d) || [];
+      const whole = frame < chain.links && !rest.length && (!drivers || (drivers.length > 0 && drivers.every(link => jointed(frame, link))));
       if (!whole) throw new Bench.Fault("fault.key.driver");
       Object.assign(more, { frame, drivers });
     }

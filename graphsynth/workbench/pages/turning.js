@@ -18,10 +18,10 @@ const Turning = (() => {
   const WAYS = 8, MOST_WAYS = 64, LOTS = 120, WILD = 0.7, FRAMES = [1, 0.5, 0.25, 0.12], APART = 0.3;
 
   /* Sets of driven joints, as many as the mobility: those on the frame first. */
-  function sets(joints, frame, count, from = 0) {
+  function sets(joints, frame, count, most) {
     const order = [...joints.keys()].sort((p, q) => joints[q].includes(frame) - joints[p].includes(frame));
     const choose = (left, at) => (left === 0 ? [[]] : order.slice(at).flatMap((joint, k) => choose(left - 1, at + k + 1).map(rest => [joint, ...rest])));
-    return choose(count, from).filter((set, k) => k < MOST || set.every(joint => joints[joint].includes(frame)));
+    return choose(count, 0).filter((set, k) => k < most || set.every(joint => joints[joint].includes(frame)));
   }
 
   /* The text of a graph, as the library writes it: graph6 and the frame. */
@@ -147,7 +147,7 @@ const Turning = (() => {
     const scaled = SHIFTS.map(shifted), ways = together(joints, sliding);
     const frames = frame === null ? [...near.keys()].sort((p, q) => near[q].length - near[p].length) : [frame];
     const asked = own => drivers.map(link => between(own, link));
-    const choices = frames.flatMap(own => (drivers ? [asked(own)] : sets(joints, own, mobility)).map(set => [own, set]))
+    const choices = frames.flatMap(own => (drivers ? [asked(own)] : sets(joints, own, mobility, frame === null ? MOST : Infinity)).map(set => [own, set]))
       .sort((p, q) => away(p) - away(q)).slice(0, TRIES).filter(([, set]) => set.every(joint => joint >= 0));
     let best = null, most = 0;
     const judged = (...dimensions) => {

@@ -25,11 +25,12 @@ ${loops} ${Atlas.term("loop")}, ${Atlas.term("mobility")} ${row.mobility}.`;
 
   function properties(row, label) {
     const orbits = orbitsOf(label).filter(orbit => orbit.length > 1);
+    const shape = (Atlas.contents.contracted[row.contracted] || "none, a single loop").replace(/x/g, "×");
     const items = [
       ["symmetry", html`${row.symmetry === 1 ? "none" : `order ${row.symmetry}`}${orbits.length > 0 && html`; ${Atlas.term("orbit", "orbits")} ${orbits.map(orbit => `{${listed(orbit)}}`).join(" ")}`}`],
       ["inversion", `${row.inversions}`, "inversions"], ["planar", row.planar ? "yes" : "no"], ["girth", `${row.girth} links`],
-      ["fractionated", row.fractionated ? "yes" : "no"], ["class", `${Atlas.classes(row)} over all frames and drivers`],
-      ["contracted", html`<span class="shape">${(Atlas.contents.contracted[row.contracted] || "not computed").replace(/x/g, "×")}</span> <a href="#/?contracted=${row.contracted}">all with it</a>`],
+      ["fractionated", row.fractionated ? "yes" : "no"], ["class", row.low ? `${Atlas.classes(row)} over all frames and drivers` : "none: no drivers on one link move it"],
+      ["contracted", html`<span class="shape">${shape}</span> <a href="#/?contracted=${row.contracted}">all with it</a>`],
       ["graph6", html`<code>${Atlas.toGraph6(Atlas.decodeKey(row.key))}</code>`],
     ];
     return html`<dl>${items.map(([term, words, shown]) => html`<div><dt>${Atlas.term(term, shown)}</dt><dd>${words}</dd></div>`)}</dl>`;
@@ -50,8 +51,11 @@ ${loops} ${Atlas.term("loop")}, ${Atlas.term("mobility")} ${row.mobility}.`;
   /** The workbench with this frame and these drivers: dimensions of the catalogue where it holds some, else found there. */
   function bench() {
     const {row, frame, drivers, sliders} = state, held = state.mechanism, same = held && !sliders.length && held[0] === frame && String(held[1]) === String(drivers);
-    return `workbench/index.html${same ? held[2] : `#k=${row.key}${sliders.length ? `&p=${pairs()}` : ""}${frame === null || !drivers.length ? "" : `&f=${frame}&d=${listed(drivers, ",")}`}`}`;
+    return `workbench/index.html${same ? held[2] : `#k=${row.key}${sliders.length ? `&p=${pairs()}` : ""}${frame === null ? "" : `&f=${frame}${drivers.length && !apart() ? `&d=${listed(drivers, ",")}` : ""}`}`}`;
   }
+
+  /** Whether no drivers on the frame are enough: some sit between moving links, where the workbench puts them. */
+  const apart = () => state.frame !== null && !movingSets(state.graph, state.frame).length;
 
   const sliding = ({key, frame, sliders}) => `#/${key}?${frame === undefined ? "" : `frame=${frame}&`}sliders=${sliders}`;
 
@@ -83,6 +87,8 @@ ${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>
     add([], 0);
     return sets;
   }
+
+  const movingSets = (graph, frame) => driverSets(graph, frame).filter(set => Atlas.groups({...graph, frame}, set));
 
   function classOf(groups) {
     const found = groups.map(group => Atlas.classOf(group.key));
@@ -135,7 +141,7 @@ ${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>
     document.querySelectorAll("#entry .pick").forEach(button =>
       button.setAttribute("aria-pressed", button.dataset.frame === String(frame) && button.dataset.drivers === String(drivers)));
     saveButtons(shown);
-    const moves = frame === null || Boolean(state.groups), address = bench(), shownBench = $("bench");
+    const moves = frame === null || Boolean(state.groups) || apart(), address = bench(), shownBench = $("bench");
     $("openbench").href = address;
     $("moving").hidden = !moves;
     if (moves && shownBench.getAttribute("src") !== address) shownBench.setAttribute("src", address);
@@ -144,6 +150,7 @@ ${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>
   function groupList() {
     const {graph, frame, drivers, groups} = state;
     if (frame === null) return html`<p class="soft">Choose a frame and a driver.</p>`;
+    if (apart()) return html`<p class="soft">No drivers on this frame move the whole mechanism. On the workbench below some sit between moving links.</p>`;
     if (!groups) {
       const wanted = Atlas.mobility(graph);
       return html`<p class="soft">${drivers.length === wanted ? "These drivers do not move the mechanism." : `Choose ${wanted} driver${wanted > 1 ? "s" : ""}.`}</p>`;
@@ -168,7 +175,7 @@ ${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>
   function choose(frame, drivers) {
     const {graph, row} = state, near = frame === null ? [] : Atlas.neighbours(graph)[frame];
     const kept = drivers.filter(link => near.includes(link));
-    Object.assign(state, {frame, drivers: kept.length || frame === null ? kept : driverSets(graph, frame).find(set => Atlas.groups({...graph, frame}, set)) || []});
+    Object.assign(state, {frame, drivers: kept.length || frame === null ? kept : movingSets(graph, frame)[0] || []});
     const held = frame === null ? "frame=none" : `frame=${frame}${state.drivers.length ? `&driver=${state.drivers}` : ""}`;
     const words = `${held}${state.sliders.length ? `&sliders=${pairs()}` : ""}`;
     history.replaceState(null, "", `#/${row.key}?${words}`);
@@ -266,7 +273,7 @@ ${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>
     if (frame === null || !/^\d+$/.test(frame) || +frame >= graph.links) return firstChoice(row, graph, label, mechanism);
     const near = Atlas.neighbours(graph)[+frame];
     const given = (parameters.get("driver") || "").split(",").filter(Boolean).map(Number).filter(link => near.includes(link));
-    return {frame: +frame, drivers: given.length ? given : driverSets(graph, +frame).find(set => Atlas.groups({...graph, frame: +frame}, set)) || []};
+    return {frame: +frame, drivers: given.length ? given : movingSets(graph, +frame)[0] || []};
   }
 
   /** Prismatic joints of an address; none, and why, where it names what is no joint. */
