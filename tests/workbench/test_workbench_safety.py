@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from base64 import b64encode, urlsafe_b64encode
 from hashlib import sha256
 from pathlib import Path
@@ -214,6 +215,26 @@ def test_a_mechanism_opens_as_a_page_and_in_a_notebook(tmp_path):
     assert bench.page == path and "wasm-unsafe-eval" in path.read_text("utf-8")
     shown = bench._repr_html_()
     assert shown.startswith("<iframe") and 'sandbox="allow-scripts allow-downloads"' in shown and "<script" not in shown
+
+
+def test_in_a_notebook_it_moves_and_says_that_there_is_no_address(window, tmp_path):
+    cell = tmp_path / "cell.html"
+    bench = Mechanism.four_bar(4, 1, 3.5, 3).open(tmp_path / "page.html", browser=False)
+    cell.write_text(f"<!doctype html>{bench._repr_html_()}")
+    window.get_log("browser")
+    window.get(cell.as_uri())
+    window.switch_to.frame(0)
+    try:
+        ready = "return typeof Bench !== 'undefined' && Boolean(Bench.app?.motion?.driven)"
+        end = time.monotonic() + 30
+        while not window.execute_script(ready) and time.monotonic() < end:
+            time.sleep(0.1)
+        assert window.execute_script("return Bench.app.motion.sweep().full")
+        window.execute_async_script("Bench.do.share(Bench.app).then(arguments[0])")
+        assert "no address" in window.find_element("id", "said").text
+    finally:
+        window.switch_to.default_content()
+    assert not [entry for entry in window.get_log("browser") if entry["level"] == "SEVERE"]
 
 
 def test_a_mechanism_without_a_pose_is_assembled(tmp_path):

@@ -44,7 +44,7 @@
   Bench.do.share = async app => {
     try {
       const fragment = await Bench.toFragment(app.posed());
-      history.replaceState(null, "", fragment);
+      try { history.replaceState(null, "", fragment); } catch { throw new Bench.Fault("fault.noaddress"); } // in a notebook
       try { await navigator.clipboard.writeText(location.href); app.say("said.shared"); } catch { app.say("said.address"); }
     } catch (fault) {
       if (!(fault instanceof Bench.Fault)) throw fault;
