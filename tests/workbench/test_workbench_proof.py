@@ -65,7 +65,7 @@ def test_nothing_is_proved_through_a_position_where_branches_meet(scripts):
 @pytest.mark.slow  # numba compiles the kernels
 @pytest.mark.parametrize("name", ["klann", "peaucellier"])
 def test_the_page_has_the_bits_of_the_library_and_boxes_hold_the_motion(scripts, name):
-    from graphsynth.kinematics.certify import kernels
+    from graphsynth.kinematics.certify.kernels import marching, proving
     from graphsynth.kinematics.engine.program import equations
 
     mechanism = Mechanism.from_json(json.dumps(to_dict(assembled(getattr(gallery, name)()))))
@@ -81,35 +81,35 @@ def test_the_page_has_the_bits_of_the_library_and_boxes_hold_the_motion(scripts,
     def march(goal):
         """Node after node, as far as it goes."""
         given = rows, table, mechanism.frame, inputs, 0, goal, Lc, turns, box, state
-        while (code := kernels.march(*given, int(state[kernels.TESTED] + 1))) == kernels.LIMIT:
-            if state[kernels.AT] not in seen:
-                seen[state[kernels.AT]] = box.copy()
+        while (code := marching.march(*given, int(state[marching.TESTED] + 1))) == marching.LIMIT:
+            if state[marching.AT] not in seen:
+                seen[state[marching.AT]] = box.copy()
         return code
 
-    assert kernels.march(rows, table, mechanism.frame, inputs, 0, 9.0, Lc, turns, box, state, 0) == kernels.LIMIT
+    assert marching.march(rows, table, mechanism.frame, inputs, 0, 9.0, Lc, turns, box, state, 0) == marching.LIMIT
     first, goal = box.copy(), start + 2.0 * math.pi * asked["turns"] if asked["turns"] else float(asked["to"])
     code = march(goal)
-    assert found["high"] == state[kernels.AT]
+    assert found["high"] == state[marching.AT]
     if asked["turns"]:
-        assert code == kernels.DONE and found["boxes"] == state[kernels.NODES]
+        assert code == marching.DONE and found["boxes"] == state[marching.NODES]
         given = [rows, table, mechanism.frame, 0, first, start, box, goal, asked["turns"]]
-        assert found["full"] == kernels.closes(*given) is True
+        assert found["full"] == marching.closes(*given) is True
         given[4] = first * [[[1.0]], [[1.0]], [[1e-9]], [[1.0]]]  # nothing comes back so exactly
-        assert not kernels.closes(*given)
+        assert not marching.closes(*given)
     else:
-        boxes = state[kernels.NODES]
+        boxes = state[marching.NODES]
         box[:], state[:] = first, [start, -0.05, 1.0, 0.0]
         march(float(asked["from"]))
-        assert found["low"] == state[kernels.AT] and found["boxes"] == boxes + state[kernels.NODES] - 1
+        assert found["low"] == state[marching.AT] and found["boxes"] == boxes + state[marching.NODES] - 1
     # the engine goes through the nodes
     for way in (1.0, -1.0):
         own = sorted((node for node in seen.items() if way * (node[0] - start) > 0.0), key=lambda node: way * node[0])
         motion = mechanism.simulate([start, *(at for at, _ in own)], start=poses, events=False)
         assert motion.assembled.all()
         for pose, (_, node) in zip(motion.poses[1:], own, strict=True):
-            off = pose - node[kernels.CENTRE]
+            off = pose - node[proving.CENTRE]
             off[:, 2] = np.remainder(off[:, 2] + math.pi, math.tau) - math.pi
-            assert (np.abs(off) < node[kernels.TIGHT] + 1e-9).all()
+            assert (np.abs(off) < node[proving.TIGHT] + 1e-9).all()
     assert len(seen) > 100
 
 
