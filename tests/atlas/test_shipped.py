@@ -92,5 +92,5 @@ def test_the_smaller_chains_have_dimensions(shipped):
         if found:
             assert shipped.mechanism(row["label"]).graph.key
     jamming = shipped.query("evaluations", "kind = 'jamming'")
-    assert jamming["chain_id"].nunique() == 19
-    assert jamming["guarantee"].tolist() == ["certified"] * 19
+    assert jamming["chain_id"].nunique() == 28
+    assert jamming["guarantee"].tolist() == ["certified"] * 28

@@ -312,7 +312,7 @@ ${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>
 <h2>${Atlas.term("inversion", "Inversions")} and drivers</h2>${inversions(graph, label)}
 ${named(row)}<div id="moving"><h2>Motion</h2><p>This frame and these drivers on the workbench: play it, drag it, change its dimensions. <a id="openbench" href="workbench/index.html">On a page of its own</a></p>
 <iframe id="bench" title="Chain ${row.label} on the workbench" loading="lazy"></iframe></div>
-<h2>Evaluations</h2><div id="evaluations"><p class="soft">Dimensions, transmission, jamming: not computed in this catalogue.</p></div>
+<h2>Evaluations</h2><div id="evaluations"><p class="soft">${row.low ? "Dimensions, transmission, jamming: not computed in this catalogue." : "None: what is evaluated has all its drivers on one link."}</p></div>
 <h2>Matrices</h2><div class="columns">${matrixTable(Atlas.matrix(graph), Atlas.term("adjacency"), [...Array(graph.links).keys()])}
 ${matrixTable(Atlas.incidence(graph), Atlas.term("incidence"), joints)}</div>
 <h2>${Atlas.term("parent", "Parents and children")}</h2><div id="relatives" class="relatives"></div>
