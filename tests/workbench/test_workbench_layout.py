@@ -119,6 +119,15 @@ def test_where_no_drivers_on_the_frame_are_enough_some_sit_between_moving_links(
         assert replace(mechanism, drivers=(first, *still)).simulate(np.linspace(0.0, 0.1, 5)).assembled.all()
 
 
+@pytest.mark.parametrize("more", [{}, {"frame": 0}])
+def test_a_chain_of_very_many_sets_of_drivers_is_laid(scripts, more):
+    """A loop of 32 links with four chords: 21 drivers among 36 joints, in 5.6e9 ways."""
+    joints = [*((k, (k + 1) % 32) for k in range(32)), (0, 8), (2, 14), (5, 20), (10, 26)]
+    chain = MechanismGraph(32, [(min(pair), max(pair)) for pair in joints])
+    (data,) = scripts(TURNED, [given(chain, more)], modules=("sketch", "motion"))
+    assert len(data["drivers"]) == chain.mobility == 21
+
+
 @pytest.mark.slow  # every frame and driver: two minutes a part
 @pytest.mark.parametrize("part", range(10))
 def test_all_chains_to_ten_links_turn_as_in_the_library(scripts, tmp_path, part):

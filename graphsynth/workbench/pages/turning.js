@@ -17,11 +17,21 @@ const Turning = (() => {
      frame is made; sine of the least angle between two of one link. */
   const WAYS = 8, MOST_WAYS = 64, LOTS = 120, WILD = 0.7, FRAMES = [1, 0.5, 0.25, 0.12], APART = 0.3;
 
-  /* Sets of driven joints, as many as the mobility: those on the frame first. */
+  /* Choices of so many of a list, one after another: there may be very many. */
+  function* choose(list, count, from = 0) {
+    if (!count) yield [];
+    else for (let k = from; k <= list.length - count; k++) for (const rest of choose(list, count - 1, k + 1)) yield [list[k], ...rest];
+  }
+  function first(choices, most) {
+    const found = [];
+    for (const own of choices) if (found.push(own) === most) break;
+    return found;
+  }
+
+  /* Sets of driven joints, as many as the mobility: those on the frame, then some of the others. */
   function sets(joints, frame, count, most) {
-    const order = [...joints.keys()].sort((p, q) => joints[q].includes(frame) - joints[p].includes(frame));
-    const choose = (left, at) => (left === 0 ? [[]] : order.slice(at).flatMap((joint, k) => choose(left - 1, at + k + 1).map(rest => [joint, ...rest])));
-    return choose(count, 0).filter((set, k) => k < most || set.every(joint => joints[joint].includes(frame)));
+    const on = joint => joints[joint].includes(frame), order = [...joints.keys()].sort((p, q) => on(q) - on(p));
+    return [...first(choose(order.filter(on), count), TRIES), ...first(choose(order, count), most).filter(set => !set.every(on))];
   }
 
   /* The text of a graph, as the library writes it: graph6 and the frame. */
@@ -147,7 +157,7 @@ const Turning = (() => {
     const scaled = SHIFTS.map(shifted), ways = together(joints, sliding);
     const frames = frame === null ? [...near.keys()].sort((p, q) => near[q].length - near[p].length) : [frame];
     const asked = own => drivers.map(link => between(own, link));
-    const choices = frames.flatMap(own => (drivers ? [asked(own)] : sets(joints, own, mobility, frame === null ? MOST : Infinity)).map(set => [own, set]))
+    const choices = frames.flatMap(own => (drivers ? [asked(own)] : sets(joints, own, mobility, frame === null ? MOST : TRIES)).map(set => [own, set]))
       .sort((p, q) => away(p) - away(q)).slice(0, TRIES).filter(([, set]) => set.every(joint => joint >= 0));
     let best = null, most = 0;
     const judged = (...dimensions) => {
