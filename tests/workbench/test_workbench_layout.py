@@ -103,6 +103,7 @@ def test_what_is_put_on_the_table_turns_in_the_library_too(scripts, kinds):
             assert turned < 1e-7 * 100, chain.key
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("label", ["3.6.6.1", "3.8.6-2.3", "3.8.6-2.5", "3.8.6-2.6", "4.7.7.1"])
 def test_where_no_drivers_on_the_frame_are_enough_some_sit_between_moving_links(scripts, label):
     """The shipped chains that have no mechanisms with all drivers on the frame, held by each link in turn."""
@@ -119,6 +120,7 @@ def test_where_no_drivers_on_the_frame_are_enough_some_sit_between_moving_links(
         assert replace(mechanism, drivers=(first, *still)).simulate(np.linspace(0.0, 0.1, 5)).assembled.all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("more", [{}, {"frame": 0}])
 def test_a_chain_of_very_many_sets_of_drivers_is_laid(scripts, more):
     """A loop of 32 links with four chords: 21 drivers among 36 joints, in 5.6e9 ways."""
