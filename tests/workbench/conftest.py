@@ -11,6 +11,7 @@ import pytest
 from graphsynth.workbench.modules import script
 from graphsynth.workbench.writing import languages, page_file, write_workbench
 from tests.chromium import started
+from tests.workbench.person import Person
 
 #: Scripts that need no page: functions of drawings, files, addresses.
 PURE = [name for line in page_file("order.txt").splitlines()[:2] for name in line.split()]
@@ -53,3 +54,12 @@ def window(downloads):
     found = started(downloads)
     yield found
     found.quit()
+
+
+@pytest.fixture
+def person(window, bench):
+    """Someone at the page, of which the console has nothing to complain afterwards."""
+    window.get_log("browser")
+    someone = Person(window, bench).open()
+    yield someone
+    assert not someone.complaints()

@@ -7,6 +7,8 @@ import json
 import time
 from pathlib import Path
 
+from graphsynth import Mechanism
+
 
 class Person:
     """Someone in front of a page; places are those of the drawing, y up."""
@@ -147,6 +149,17 @@ class Person:
 
     def complaints(self):
         return [e["message"] for e in self.window.get_log("browser") if e["level"] in ("SEVERE", "WARNING")]
+
+
+def mechanism(person):
+    """Return what is drawn as the library reads it."""
+    return Mechanism.from_json(json.dumps(person.drawn()))
+
+
+def text(person, place):
+    """Return what a part of the page says."""
+    person.look()
+    return person.script("return document.getElementById(arguments[0]).innerText", place)
 
 
 def four_bar(person):

@@ -11,26 +11,9 @@ import numpy as np
 import pytest
 
 from graphsynth import Mechanism
-from tests.workbench.person import Person, four_bar
+from tests.workbench.person import four_bar, mechanism, text
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture
-def person(window, bench):
-    window.get_log("browser")
-    someone = Person(window, bench).open()
-    yield someone
-    assert not someone.complaints()
-
-
-def mechanism(person):
-    return Mechanism.from_json(json.dumps(person.drawn()))
-
-
-def text(person, place):
-    person.look()
-    return person.script("return document.getElementById(arguments[0]).innerText", place)
 
 
 def places(person):

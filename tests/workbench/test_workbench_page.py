@@ -13,14 +13,6 @@ from tests.workbench.person import Person, four_bar
 pytestmark = pytest.mark.long
 
 
-@pytest.fixture
-def person(window, bench):
-    window.get_log("browser")
-    someone = Person(window, bench).open()
-    yield someone
-    assert not someone.complaints()
-
-
 def drawn_four_bar(data):
     mechanism = Mechanism.from_json(json.dumps(data))
     assert mechanism.graph.links == 4 and mechanism.graph.mobility == 1

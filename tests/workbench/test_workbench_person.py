@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import re
@@ -18,20 +17,11 @@ import numpy as np
 import pytest
 
 from graphsynth import Mechanism
-from tests.workbench.person import Person, four_bar
+from tests.workbench.person import Person, four_bar, mechanism, text
 
 pytestmark = pytest.mark.slow
 DEVICES = {"desktop": ((1280, 800), False), "phone": ((390, 844), True)}
 KEY = "1BAN4"
-
-
-def mechanism(person):
-    return Mechanism.from_json(json.dumps(person.drawn()))
-
-
-def text(person, place):
-    person.look()
-    return person.script("return document.getElementById(arguments[0]).innerText", place)
 
 
 def choose(person, name):

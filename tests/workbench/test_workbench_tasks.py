@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 
 from graphsynth import Mechanism
 from graphsynth.workbench.writing import page_file
-from tests.workbench.person import Person, four_bar
+from tests.workbench.person import Person, four_bar, mechanism
 
 pytestmark = [
     pytest.mark.slow,
@@ -19,21 +18,9 @@ pytestmark = [
 
 
 @pytest.fixture
-def person(window, bench):
-    window.get_log("browser")
-    someone = Person(window, bench).open()
-    yield someone
-    assert not someone.complaints()
-
-
-@pytest.fixture
 def at_four_bar(person):
     four_bar(person)
     return person
-
-
-def mechanism(person):
-    return Mechanism.from_json(json.dumps(person.drawn()))
 
 
 def fill(person, label, text):

@@ -27,7 +27,6 @@
   /** Open a text; what it is not is said in one sentence, and the drawing stays. */
   Bench.openText = (app, text, name = "") => app.attempt(() => {
     const sheet = Bench.fromText(text), unit = Bench.unitOf(text) || app.sheet.unit;
-    app.measured = null;
     return { sheet: { ...sheet, unit }, select: [], say: ["said.opened", { file: name.slice(0, 60) }] };
   }) && (Bench.do.fit(app), true);
 

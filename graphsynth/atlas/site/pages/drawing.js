@@ -89,10 +89,10 @@
       if (numbers && !small) letters.push(...['stroke="var(--paper)" stroke-width="3.5" stroke-linejoin="round" aria-hidden="true"', ""].map(edge =>
         letter(cx, cy, link, 13, `text-anchor="middle" fill="var(--${fixed ? "ink" : colour(link)})" ${edge}`)));
     });
-    const joints = graph.joints.map(([a, b], k) => sliders.includes(k) ? Atlas.block(graph, at, k, outlines, [frame, ...drivers], small) :
+    const driven = ([a, b]) => !small && ((a === frame && drivers.includes(b)) || (b === frame && drivers.includes(a)));
+    const joints = graph.joints.map(([a, b], k) => sliders.includes(k) ? Atlas.block(graph, at, k, outlines, driven(graph.joints[k]), small) :
       `<circle data-joint="${a}-${b}" cx="${short(at[k][0])}" cy="${short(at[k][1])}" r="${radius}" fill="var(--paper)" stroke="var(--ink)" stroke-width="${small ? 1.1 : 1.8}"/>`);
-    const arrows = small ? [] : graph.joints.flatMap(([a, b], k) =>
-      sliders.includes(k) ? [] : (a === frame && drivers.includes(b)) || (b === frame && drivers.includes(a)) ? [arrow(at[k])] : []);
+    const arrows = graph.joints.flatMap((joint, k) => (driven(joint) && !sliders.includes(k) ? [arrow(at[k])] : []));
     const pattern = frame !== null && outlines[frame].length > 2
       ? `<defs><pattern id="${hatch}" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><path d="M0 0V6" fill="none" stroke="var(--soft)" stroke-width="1.6"/></pattern></defs>` : "";
     return wrap(width, height, title, options.file, pattern + [...plates, ...bars, ...joints, ...arrows, ...letters].join(""));

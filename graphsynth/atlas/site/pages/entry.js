@@ -51,13 +51,10 @@ ${loops} ${Atlas.term("loop")}, ${Atlas.term("mobility")} ${row.mobility}.`;
   /** The workbench with this frame and these drivers: dimensions of the catalogue where it holds some, else found there. */
   function bench() {
     const {row, frame, drivers, sliders} = state, held = state.mechanism, same = held && !sliders.length && held[0] === frame && String(held[1]) === String(drivers);
-    return `workbench/index.html${same ? held[2] : `#k=${row.key}${sliders.length ? `&p=${pairs()}` : ""}${frame === null ? "" : `&f=${frame}${drivers.length && !apart() ? `&d=${listed(drivers, ",")}` : ""}`}`}`;
+    return `workbench/index.html${same ? held[2] : `#k=${row.key}${sliders.length ? `&p=${pairs()}` : ""}${frame === null ? "" : `&f=${frame}${drivers.length && !state.apart ? `&d=${listed(drivers, ",")}` : ""}`}`}`;
   }
 
-  /** Whether no drivers on the frame are enough: some sit between moving links, where the workbench puts them. */
-  const apart = () => state.frame !== null && !movingSets(state.graph, state.frame).length;
-
-  const sliding = ({key, frame, sliders}) => `#/${key}?${frame === undefined ? "" : `frame=${frame}&`}sliders=${sliders}`;
+  const sliding = own => `#/${own.key}${Atlas.slidersAsked(own)}`;
 
   function named(row) {
     const own = Atlas.names.filter(one => one.key === row.key);
@@ -88,7 +85,7 @@ ${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>
     return sets;
   }
 
-  const movingSets = (graph, frame) => driverSets(graph, frame).filter(set => Atlas.groups({...graph, frame}, set));
+  const movingSet = (graph, frame) => driverSets(graph, frame).find(set => Atlas.groups({...graph, frame}, set));
 
   function classOf(groups) {
     const found = groups.map(group => Atlas.classOf(group.key));
@@ -128,6 +125,8 @@ ${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>
   function showChoice() {
     const {graph, frame, drivers} = state, near = frame === null ? [] : Atlas.neighbours(graph)[frame];
     state.groups = frame === null ? null : Atlas.groups({...graph, frame}, drivers);
+    // where no drivers on the frame are enough some sit between moving links: the workbench puts them there
+    state.apart = frame !== null && !state.groups && !movingSet(graph, frame);
     const shown = pictures();
     const picture = (svg, words) => (svg ? Atlas.drawn(svg) : html`<p class="soft">${words}</p>`);
     $("sketch").innerHTML = picture(shown.sketch(false), "This sketch could not be loaded.");
@@ -141,7 +140,7 @@ ${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>
     document.querySelectorAll("#entry .pick").forEach(button =>
       button.setAttribute("aria-pressed", button.dataset.frame === String(frame) && button.dataset.drivers === String(drivers)));
     saveButtons(shown);
-    const moves = frame === null || Boolean(state.groups) || apart(), address = bench(), shownBench = $("bench");
+    const moves = frame === null || Boolean(state.groups) || state.apart, address = bench(), shownBench = $("bench");
     $("openbench").href = address;
     $("moving").hidden = !moves;
     if (moves && shownBench.getAttribute("src") !== address) shownBench.setAttribute("src", address);
@@ -150,7 +149,7 @@ ${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>
   function groupList() {
     const {graph, frame, drivers, groups} = state;
     if (frame === null) return html`<p class="soft">Choose a frame and a driver.</p>`;
-    if (apart()) return html`<p class="soft">No drivers on this frame move the whole mechanism. On the workbench below some sit between moving links.</p>`;
+    if (state.apart) return html`<p class="soft">No drivers on this frame move the whole mechanism. On the workbench below some sit between moving links.</p>`;
     if (!groups) {
       const wanted = Atlas.mobility(graph);
       return html`<p class="soft">${drivers.length === wanted ? "These drivers do not move the mechanism." : `Choose ${wanted} driver${wanted > 1 ? "s" : ""}.`}</p>`;
@@ -175,7 +174,7 @@ ${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>
   function choose(frame, drivers) {
     const {graph, row} = state, near = frame === null ? [] : Atlas.neighbours(graph)[frame];
     const kept = drivers.filter(link => near.includes(link));
-    Object.assign(state, {frame, drivers: kept.length || frame === null ? kept : movingSets(graph, frame)[0] || []});
+    Object.assign(state, {frame, drivers: kept.length || frame === null ? kept : movingSet(graph, frame) || []});
     const held = frame === null ? "frame=none" : `frame=${frame}${state.drivers.length ? `&driver=${state.drivers}` : ""}`;
     const words = `${held}${state.sliders.length ? `&sliders=${pairs()}` : ""}`;
     history.replaceState(null, "", `#/${row.key}?${words}`);
@@ -273,7 +272,7 @@ ${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>
     if (frame === null || !/^\d+$/.test(frame) || +frame >= graph.links) return firstChoice(row, graph, label, mechanism);
     const near = Atlas.neighbours(graph)[+frame];
     const given = (parameters.get("driver") || "").split(",").filter(Boolean).map(Number).filter(link => near.includes(link));
-    return {frame: +frame, drivers: given.length ? given : movingSets(graph, +frame)[0] || []};
+    return {frame: +frame, drivers: given.length ? given : movingSet(graph, +frame) || []};
   }
 
   /** Prismatic joints of an address; none, and why, where it names what is no joint. */
@@ -285,12 +284,11 @@ ${one.template && one.sliders && html` <a href="${sliding(one)}">Its sliders</a>
   }
 
   Atlas.entry = async function (name, parameters) {
-    const entry = $("entry"), mark = {}, sliding = Atlas.withSliders(name);
+    const entry = $("entry"), mark = {}, other = Atlas.withSliders(name);
     state = mark;
-    if (sliding) {
-      const {key, frame, sliders} = sliding;
-      history.replaceState(null, "", `#/${key}?${frame === null ? "" : `frame=${frame}&`}sliders=${sliders}`);
-      return Atlas.entry(key, new URLSearchParams({...(frame !== null && {frame}), sliders}));
+    if (other) {
+      history.replaceState(null, "", sliding(other));
+      return Atlas.entry(other.key, new URLSearchParams(Atlas.slidersAsked(other)));
     }
     const row = await Atlas.find(name);
     if (state !== mark) return null;

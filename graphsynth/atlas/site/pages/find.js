@@ -74,7 +74,7 @@
       $("answer").innerHTML = html`<p>${head} <strong>Not in this atlas.</strong> ${why}</p><p>${Atlas.term("key")} <code>${label.key}</code></p>`;
       return;
     }
-    const sliding = sliders.map(k => graph.joints[k].slice(0, 2).map(link => label.to[link]).join("-")).join(",");
+    const sliding = Atlas.pairs(graph, sliders, label.to);
     const words = [graph.frame !== null && `frame=${label.to[graph.frame]}`, sliding && `sliders=${sliding}`].filter(Boolean).join("&");
     const address = `#/${row.key}${words && `?${words}`}`;
     $("answer").innerHTML = html`<div class="hit"><a class="thumb" href="${address}" tabindex="-1" aria-hidden="true" style="width:132px;height:106px"></a><div><p>${head}</p>

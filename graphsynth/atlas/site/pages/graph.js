@@ -167,7 +167,11 @@ Atlas.decodeKey = function (text) {
 
 // --- prismatic joints: places in the list of joints, written 0-3,1-2
 
-Atlas.pairs = (graph, chosen) => chosen.map(k => graph.joints[k].slice(0, 2).join("-")).join(",");
+/** Joints at these places; `to` are other numbers of the links. */
+Atlas.pairs = (graph, chosen, to = null) => chosen.map(k => graph.joints[k].slice(0, 2).map(link => (to ? to[link] : link)).join("-")).join(",");
+
+/** The part of an address that asks for sliders; frame: null or undefined for none. */
+Atlas.slidersAsked = ({frame = null, sliders}) => `?${frame === null ? "" : `frame=${frame}&`}sliders=${sliders}`;
 
 /** Places of the joints of a text; `names` are what it calls the links.  A Fault for what is no joint. */
 Atlas.chosen = function (graph, text, names = null) {

@@ -77,7 +77,7 @@
       last = [text, null];
       try {
         const {graph, sliders} = Atlas.read(text), {to, key, canonical} = Atlas.label({...graph, frame: null});
-        const own = sliders.map(k => graph.joints[k].slice(0, 2).map(link => to[link]).join("-")).join(",");
+        const own = Atlas.pairs(graph, sliders, to);
         last[1] = {key, frame: graph.frame === null ? null : to[graph.frame], sliders: Atlas.pairs(canonical, Atlas.chosen(canonical, own))};
       } catch (fault) { if (!(fault instanceof Atlas.Fault)) throw fault; }
     }

@@ -159,8 +159,8 @@
     const lower = text.trim().toLowerCase(), own = Atlas.withSliders(text.trim());
     const fitting = lower.length < 3 || own ? [] : Atlas.names.filter(one => one.key === row.key && matches(one, lower));
     const called = fitting.filter(one => one.name.toLowerCase().includes(lower)), named = called.length ? called : fitting;
-    const {sliders, frame = null} = own && own.key === row.key ? own : named.length === 1 ? named[0] : {};
-    return sliders ? `?${frame === null ? "" : `frame=${frame}&`}sliders=${sliders}` : "";
+    const asked = own && own.key === row.key ? own : named.length === 1 ? named[0] : {};
+    return asked.sliders ? Atlas.slidersAsked(asked) : "";
   };
 
   /** Rows that pass all questions, in an order: {text, links, ..., sort, down}. */
